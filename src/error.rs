@@ -1,0 +1,113 @@
+//! The one error type of the crate.
+//!
+//! Every variant carries its operands and its message tells the person what to do next. Messages about input name the file,
+//! the line (1-based, the header is line 1), the column, what was found and what was expected.
+
+use std::path::PathBuf;
+
+/// Result with this crate's [`Error`].
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything that can go wrong on the way from a log to a prediction.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder could not be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// One cell of a log is not what it should be.
+    #[error("{}, line {line}, column `{column}`: found {found}, expected {expected}", path.display())]
+    Cell {
+        /// The log.
+        path: PathBuf,
+        /// Line in the file, the header being line 1.
+        line: usize,
+        /// Column name as it stands in the file.
+        column: String,
+        /// What was found.
+        found: String,
+        /// What was expected.
+        expected: String,
+    },
+    /// A log as a whole, or its header, is not what it should be.
+    #[error("{}: found {found}, expected {expected}", path.display())]
+    Log {
+        /// The log or data folder.
+        path: PathBuf,
+        /// What was found.
+        found: String,
+        /// What was expected, and what to do.
+        expected: String,
+    },
+    /// A configuration value (model file, `dataset.toml`, training configuration, command line) is out of its range.
+    #[error("{place}: `{field}` is {found}, expected {expected}")]
+    Config {
+        /// File or command the value comes from.
+        place: String,
+        /// Name of the field, dotted.
+        field: String,
+        /// The value found.
+        found: String,
+        /// The range or form expected.
+        expected: String,
+    },
+    /// A formula does not parse or names something unknown. Two further lines show the formula and a caret under the place.
+    #[error("formula: {message}\n  {formula}\n  {:>width$}", "^", width = at + 1)]
+    Formula {
+        /// What is wrong, and what was expected.
+        message: String,
+        /// The formula as written.
+        formula: String,
+        /// Character (0-based) the error points at.
+        at: usize,
+    },
+    /// Shapes that do not fit an operation of the tape.
+    #[error("{operation}: {message}")]
+    Shape {
+        /// Operation by name.
+        operation: &'static str,
+        /// Both shapes and what would fit.
+        message: String,
+    },
+    /// The data do not determine what was asked of them.
+    #[error("{0}")]
+    Undetermined(String),
+    /// A file of this project's own formats is damaged, of another kind, or of a newer version.
+    #[error("{}: {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// The work was interrupted and its state saved.
+    #[error("interrupted; {saved}")]
+    Interrupted {
+        /// What was saved, and where.
+        saved: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`.
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.into();
+        move |source| Self::Io { path, source }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formula_errors_point_at_the_character() {
+        let error = Error::Formula { message: "unknown name `vq`".into(), formula: "vx + vq".into(), at: 5 };
+        assert_eq!(error.to_string(), "formula: unknown name `vq`\n  vx + vq\n       ^");
+    }
+}

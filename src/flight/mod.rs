@@ -1,0 +1,224 @@
+//! A flight log as columns: what every other part of the program reads.
+//!
+//! This file holds the plain types. Reading files, checking them, deriving accelerations, cutting into blocks and windows
+//! are in the sibling files. No physics here: a [`Flight`] knows what was recorded, not why.
+
+mod column;
+
+pub use column::Column;
+
+use crate::error::{Error, Result};
+use ndarray::Array2;
+use std::collections::BTreeMap;
+
+/// Standard gravity g₀, m/s² (exact by definition; 3rd CGPM 1901).
+pub const GRAVITY_M_S2: f64 = 9.806_65;
+
+/// Where the six acceleration targets of a flight come from. Every output that shows errors says which.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Targets {
+    /// The log carries `vx_dot … wz_dot`.
+    Recorded,
+    /// They were derived from `v` and `w` with a zero-phase differentiator.
+    Derived,
+}
+
+/// One flight: 22 canonical columns of equal length at one constant step, plus the log's own further columns.
+///
+/// Invariants, held by [`Flight::new`]: at least one sample, all columns equally long, every value finite, step > 0.
+/// A canonical column that the log lacks and may lack (position, heading) is all zero and listed in [`Flight::absent`].
+#[derive(Clone, Debug)]
+pub struct Flight {
+    /// Name of the flight, unique in its data set.
+    pub name: String,
+    /// Manoeuvre class.
+    pub manoeuvre: String,
+    /// Time of the first sample, s.
+    pub start_s: f64,
+    /// Sampling step, s.
+    pub step_s: f64,
+    /// Whether the targets were recorded or derived.
+    pub targets: Targets,
+    /// Canonical columns that were not in the log and are zero here.
+    pub absent: Vec<Column>,
+    /// Further columns of the log, by name, usable in formulas.
+    pub extra: BTreeMap<String, Vec<f64>>,
+    /// `[22, samples]`, one row a [`Column`], in the order of [`Column::ALL`].
+    canonical: Array2<f64>,
+}
+
+impl Flight {
+    /// Builds a flight from its canonical columns in the order of [`Column::ALL`], checking the invariants above.
+    ///
+    /// # Errors
+    /// [`Error::Log`] naming the column if lengths differ, a value is not finite, or the flight is empty.
+    pub fn new(
+        name: impl Into<String>,
+        manoeuvre: impl Into<String>,
+        start_s: f64,
+        step_s: f64,
+        columns: [Vec<f64>; Column::COUNT],
+        targets: Targets,
+    ) -> Result<Self> {
+        let name = name.into();
+        let fault = |found: String, expected: &str| Error::Log { path: name.clone().into(), found, expected: expected.into() };
+        let samples = columns[0].len();
+        if samples == 0 {
+            return Err(fault("no samples".into(), "at least one sample"));
+        }
+        if !(step_s > 0.0 && step_s.is_finite()) {
+            return Err(fault(format!("a step of {step_s} s"), "a positive, finite step"));
+        }
+        let mut canonical = Array2::zeros((Column::COUNT, samples));
+        for (column, values) in Column::ALL.into_iter().zip(&columns) {
+            if values.len() != samples {
+                let found = format!("{} samples in `{}` and {samples} in `x`", values.len(), column.name());
+                return Err(fault(found, "columns of one length"));
+            }
+            if let Some(at) = values.iter().position(|value| !value.is_finite()) {
+                return Err(fault(format!("{} in `{}`, sample {at}", values[at], column.name()), "finite numbers"));
+            }
+            canonical.row_mut(column as usize).assign(&ndarray::ArrayView1::from(values));
+        }
+        Ok(Self {
+            manoeuvre: manoeuvre.into(),
+            start_s,
+            step_s,
+            targets,
+            absent: Vec::new(),
+            extra: BTreeMap::new(),
+            canonical,
+            name,
+        })
+    }
+
+    /// Number of samples.
+    pub fn len(&self) -> usize {
+        self.canonical.ncols()
+    }
+
+    /// Never true: a flight has at least one sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// One canonical column.
+    pub fn column(&self, column: Column) -> &[f64] {
+        let samples = self.len();
+        let start = column as usize * samples;
+        &self.canonical.as_slice().unwrap_or_default()[start..start + samples]
+    }
+
+    /// A column by the name it has in the log: canonical, or one of [`Flight::extra`].
+    pub fn named(&self, name: &str) -> Option<&[f64]> {
+        Column::from_name(name).map(|column| self.column(column)).or_else(|| self.extra.get(name).map(Vec::as_slice))
+    }
+
+    /// All canonical columns as a `[22, samples]` view, rows in the order of [`Column::ALL`].
+    pub fn canonical(&self) -> ndarray::ArrayView2<'_, f64> {
+        self.canonical.view()
+    }
+
+    /// Time of a sample, s.
+    pub fn time_s(&self, sample: usize) -> f64 {
+        self.start_s + self.step_s * sample as f64
+    }
+
+    /// Length of the flight, s.
+    pub fn duration_s(&self) -> f64 {
+        self.step_s * self.len() as f64
+    }
+
+    /// The samples `range` as a flight of its own, with a new name. Panics never: the range is cut to what is there.
+    pub fn slice(&self, range: std::ops::Range<usize>, name: impl Into<String>) -> Option<Self> {
+        let range = range.start.min(self.len())..range.end.min(self.len());
+        if range.is_empty() {
+            return None;
+        }
+        Some(Self {
+            name: name.into(),
+            manoeuvre: self.manoeuvre.clone(),
+            start_s: self.time_s(range.start),
+            step_s: self.step_s,
+            targets: self.targets,
+            absent: self.absent.clone(),
+            extra: self.extra.iter().map(|(name, values)| (name.clone(), values[range.clone()].to_vec())).collect(),
+            canonical: self.canonical.slice(ndarray::s![.., range]).as_standard_layout().into_owned(),
+        })
+    }
+}
+
+/// Samples `[start, end)` of one flight of a data set, by index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Span {
+    /// Index of the flight.
+    pub flight: usize,
+    /// First sample.
+    pub start: usize,
+    /// One past the last sample.
+    pub end: usize,
+}
+
+/// A history of H rows that ends with, and includes, row `last`; the target is that row's acceleration (paper eqs. 10–11).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Window {
+    /// Index of the flight.
+    pub flight: usize,
+    /// Last row of the history.
+    pub last: usize,
+}
+
+/// Six acceleration columns in the order of [`Column::TARGETS`]: m/s², then rad/s².
+pub type Accelerations = [Vec<f64>; 6];
+
+/// The flights of one data set, sorted by manoeuvre and name.
+#[derive(Clone, Debug, Default)]
+pub struct DataSet {
+    /// The flights.
+    pub flights: Vec<Flight>,
+    /// What the reader did that a person should know (derived accelerations, rows left out by a filter, resampling).
+    pub notes: Vec<String>,
+}
+
+impl DataSet {
+    /// Manoeuvre classes, sorted, each once.
+    pub fn manoeuvres(&self) -> Vec<&str> {
+        let mut names: Vec<&str> = self.flights.iter().map(|flight| flight.manoeuvre.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// Total length, s.
+    pub fn duration_s(&self) -> f64 {
+        self.flights.iter().map(Flight::duration_s).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp(samples: usize) -> [Vec<f64>; Column::COUNT] {
+        std::array::from_fn(|column| (0..samples).map(|sample| (column * 1000 + sample) as f64).collect())
+    }
+
+    #[test]
+    fn columns_are_found_by_name_and_sliced() -> Result<()> {
+        let flight = Flight::new("a", "hover", 2.0, 0.01, ramp(50), Targets::Recorded)?;
+        assert_eq!(flight.named("wz_dot"), Some(flight.column(Column::WzDot)));
+        let part = flight.slice(10..20, "a[1]").ok_or(Error::Undetermined("empty".into()))?;
+        assert_eq!(part.column(Column::U1), &flight.column(Column::U1)[10..20]);
+        assert_eq!(part.start_s.to_bits(), flight.time_s(10).to_bits());
+        Ok(())
+    }
+
+    #[test]
+    fn a_nan_is_refused_by_column_and_sample() {
+        let mut columns = ramp(5);
+        columns[Column::Roll as usize][3] = f64::NAN;
+        let message = Flight::new("a", "m", 0.0, 0.01, columns, Targets::Recorded).map_err(|error| error.to_string());
+        assert!(matches!(message, Err(text) if text.contains("NaN in `roll`, sample 3")));
+    }
+}

@@ -1,0 +1,1 @@
+//! Networks on the tape: layers, Phy-Ture, its ablations and fusion variants.

@@ -1,0 +1,1 @@
+//! What we claim to know: effects, models, calibration.

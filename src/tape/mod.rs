@@ -1,0 +1,1 @@
+//! Reverse mode: graph, plan, session, operations, gradient check.

@@ -1,0 +1,1 @@
+//! Training: Adam, schedule, trainer, checkpoint.
