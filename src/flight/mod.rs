@@ -144,7 +144,7 @@ impl Flight {
             targets: self.targets,
             absent: self.absent.clone(),
             extra: self.extra.iter().map(|(name, values)| (name.clone(), values[range.clone()].to_vec())).collect(),
-            canonical: self.canonical.slice(ndarray::s![.., range]).as_standard_layout().into_owned(),
+            canonical: self.canonical.slice_axis(ndarray::Axis(1), range.into()).as_standard_layout().into_owned(),
         })
     }
 }
