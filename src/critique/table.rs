@@ -23,44 +23,49 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// As [`significant`]; a dash where there is no value.
-pub fn cell(value: Option<f64>) -> String {
-    value.map_or_else(|| "–".to_owned(), |value| significant(value, DIGITS))
-}
-
-/// Whether a measure is better when it is smaller.
+/// Kind of a measure: how it is printed and what is better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Better {
-    /// Errors.
-    Smaller,
-    /// R².
-    Larger,
+pub enum Kind {
+    /// An error in the unit of its channel: [`DIGITS`] significant digits, smaller is better.
+    Error,
+    /// A share such as R²: three decimals, larger is better.
+    Share,
 }
 
-/// The indices of the best values; more than one on a tie to the printed digits, none with fewer than two values.
-pub fn best(values: &[Option<f64>], better: Better) -> Vec<usize> {
-    let present = values.iter().flatten();
-    if present.clone().count() < 2 {
-        return Vec::new();
+impl Kind {
+    /// The value as text; a dash where there is none.
+    pub fn text(self, value: Option<f64>) -> String {
+        match (self, value) {
+            (_, None) => "–".to_owned(),
+            (Self::Error, Some(value)) => significant(value, DIGITS),
+            (Self::Share, Some(value)) => format!("{value:.3}"),
+        }
     }
-    let best = match better {
-        Better::Smaller => present.copied().fold(f64::INFINITY, f64::min),
-        Better::Larger => present.copied().fold(f64::NEG_INFINITY, f64::max),
-    };
-    let printed = significant(best, DIGITS);
-    let is_best = |value: &Option<f64>| value.is_some_and(|value| significant(value, DIGITS) == printed);
-    values.iter().enumerate().filter(|(_, value)| is_best(value)).map(|(index, _)| index).collect()
+
+    /// The indices of the best values; more than one on a tie of the printed text, none with fewer than two values.
+    pub fn best(self, values: &[Option<f64>]) -> Vec<usize> {
+        let present = values.iter().flatten().copied();
+        if present.clone().count() < 2 {
+            return Vec::new();
+        }
+        let printed = self.text(match self {
+            Self::Error => present.reduce(f64::min),
+            Self::Share => present.reduce(f64::max),
+        });
+        let is_best = |value: &Option<f64>| value.is_some() && self.text(*value) == printed;
+        values.iter().enumerate().filter(|(_, value)| is_best(value)).map(|(index, _)| index).collect()
+    }
 }
 
 /// A measure with its title and where to find it.
-type Measure = (&'static str, &'static str, Better, fn(&ModelError) -> PerChannel);
+type Measure = (&'static str, &'static str, Kind, fn(&ModelError) -> PerChannel);
 
-/// The four measures in the order in which they are shown: short title, explanation, direction, value.
+/// The four measures in the order in which they are shown: short title, explanation, kind, value.
 pub const MEASURES: [Measure; 4] = [
-    ("RMSE", "root mean square error", Better::Smaller, |model| model.rmse),
-    ("MAE", "mean absolute error", Better::Smaller, |model| model.mae),
-    ("MaxAE", "largest absolute error", Better::Smaller, |model| model.max_abs),
-    ("R²", "share of the variance predicted", Better::Larger, |model| model.r2),
+    ("RMSE", "root mean square error", Kind::Error, |model| model.rmse),
+    ("MAE", "mean absolute error", Kind::Error, |model| model.mae),
+    ("MaxAE", "largest absolute error", Kind::Error, |model| model.max_abs),
+    ("R²", "share of the variance predicted", Kind::Share, |model| model.r2),
 ];
 
 impl Comparison {
@@ -86,9 +91,9 @@ impl fmt::Display for Comparison {
         let names: Vec<String> = self.models.iter().map(|model| model.name.clone()).collect();
         let channels: Vec<(String, String)> =
             Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect();
-        for (title, words, better, measure) in MEASURES {
+        for (title, words, kind, measure) in MEASURES {
             let mut columns = channels.clone();
-            if better == Better::Larger {
+            if kind == Kind::Share {
                 columns.iter_mut().for_each(|(_, unit)| *unit = "1".to_owned());
             }
             columns.push(("mean".to_owned(), String::new()));
@@ -97,7 +102,7 @@ impl fmt::Display for Comparison {
                 found.channels().into_iter().chain([found.mean]).collect()
             });
             writeln!(f)?;
-            grid(f, &format!("{title}, {words}"), &columns, &names, &values.collect::<Vec<_>>(), Some(better))?;
+            grid(f, &format!("{title}, {words}"), &columns, &names, &values.collect::<Vec<_>>(), Some(kind))?;
         }
         let columns: Vec<(String, String)> = [("windows".to_owned(), String::new())]
             .into_iter()
@@ -134,7 +139,7 @@ impl fmt::Display for Comparison {
     }
 }
 
-/// Writes one table. With `better`, the best of each column is marked; without, the first column is a count and the best
+/// Writes one table. With a `kind`, the best of each column is marked; without, the first column is a count and the best
 /// (smallest) of the others is marked in each row.
 fn grid(
     f: &mut fmt::Formatter<'_>,
@@ -142,18 +147,19 @@ fn grid(
     columns: &[(String, String)],
     names: &[String],
     values: &[Vec<Option<f64>>],
-    better: Option<Better>,
+    kind: Option<Kind>,
 ) -> fmt::Result {
-    let mut text: Vec<Vec<String>> = values.iter().map(|row| row.iter().map(|value| cell(*value)).collect()).collect();
+    let mut text: Vec<Vec<String>> =
+        values.iter().map(|row| row.iter().map(|value| kind.unwrap_or(Kind::Error).text(*value)).collect()).collect();
     let mut marks: Vec<Vec<bool>> = values.iter().map(|row| vec![false; row.len()]).collect();
-    if let Some(better) = better {
+    if let Some(kind) = kind {
         for column in 0..columns.len() {
             let one: Vec<Option<f64>> = values.iter().map(|row| row.get(column).copied().flatten()).collect();
-            best(&one, better).into_iter().for_each(|row| marks[row][column] = true);
+            kind.best(&one).into_iter().for_each(|row| marks[row][column] = true);
         }
     } else {
         for (row, of_row) in values.iter().enumerate() {
-            best(of_row.get(1..).unwrap_or_default(), Better::Smaller).into_iter().for_each(|column| marks[row][column + 1] = true);
+            Kind::Error.best(of_row.get(1..).unwrap_or_default()).into_iter().for_each(|column| marks[row][column + 1] = true);
             if let (Some(count), Some(Some(windows))) = (text[row].first_mut(), of_row.first()) {
                 *count = format!("{windows:.0}");
             }
@@ -200,7 +206,8 @@ mod tests {
     fn numbers_keep_their_significant_digits() {
         let cases = [(0.812_34, "0.812"), (12.345, "12.3"), (1_234.5, "1234"), (-0.000_512_3, "-0.000512"), (3.2e-7, "3.20e-7")];
         assert!(cases.iter().all(|(value, text)| significant(*value, 3) == *text));
-        assert_eq!(cell(None), "–");
+        assert_eq!(Kind::Error.text(None), "–");
+        assert_eq!(Kind::Share.text(Some(-0.000_618)), "-0.001");
     }
 
     #[test]
