@@ -2,6 +2,7 @@
 
 pub mod blocks;
 pub mod compare;
+pub mod locate;
 pub mod regime;
 pub mod table;
 

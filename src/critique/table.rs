@@ -153,10 +153,10 @@ fn grid(
         values.iter().map(|row| row.iter().map(|value| kind.unwrap_or(Kind::Error).text(*value)).collect()).collect();
     let mut marks: Vec<Vec<bool>> = values.iter().map(|row| vec![false; row.len()]).collect();
     if let Some(kind) = kind {
-        for column in 0..columns.len() {
+        (0..columns.len()).for_each(|column| {
             let one: Vec<Option<f64>> = values.iter().map(|row| row.get(column).copied().flatten()).collect();
             kind.best(&one).into_iter().for_each(|row| marks[row][column] = true);
-        }
+        });
     } else {
         for (row, of_row) in values.iter().enumerate() {
             Kind::Error.best(of_row.get(1..).unwrap_or_default()).into_iter().for_each(|column| marks[row][column + 1] = true);
