@@ -191,6 +191,17 @@ pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f6
     windows.iter().map(|window| target(window).ok_or_else(|| fault(window))).collect()
 }
 
+/// Standard deviation of the measured accelerations over the windows, m/s² and rad/s²: what makes errors of different channels
+/// comparable. `None` for a channel that does not vary.
+///
+/// # Errors
+/// [`Error::Shape`] if a window lies outside its flight.
+pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<PerChannel> {
+    let measured = measured(flights, windows)?;
+    let one = |channel| Some((variation(&measured, channel)? / measured.len() as f64).sqrt());
+    Ok(PerChannel::new(std::array::from_fn(one)))
+}
+
 /// Refuses a row that has not one prediction a window.
 pub(super) fn check_row(row: &Row, windows: &[Window]) -> Result<()> {
     if row.predicted.len() == windows.len() {

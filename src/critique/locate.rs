@@ -42,18 +42,20 @@ pub fn stretches(flights: &[Flight], windows: &[Window], row: &Row) -> Result<Op
     let channels = scale.iter().flatten().count() as f64;
     let blocks = Blocks::new(flights, windows);
     let mut sums = vec![BlockSum::default(); blocks.len()];
-    let mut ranges: Vec<Range<usize>> = vec![usize::MAX..0; blocks.len()];
+    let mut ranges: Vec<Option<Range<usize>>> = vec![None; blocks.len()];
     for (((block, window), y), p) in blocks.of_window.iter().zip(windows).zip(&measured).zip(&row.predicted) {
         let squares = y.iter().zip(p).zip(&scale).filter_map(|((y, p), scale)| Some((y - p).powi(2) / (*scale)?));
         sums[*block].samples += 1.0;
         sums[*block].sum += squares.sum::<f64>() / channels;
         let range = &mut ranges[*block];
-        *range = range.start.min(window.last)..range.end.max(window.last + 1);
+        let (start, end) = range.as_ref().map_or((window.last, window.last), |range| (range.start, range.end));
+        *range = Some(start.min(window.last)..end.max(window.last + 1));
     }
     let fullest = sums.iter().map(|block| block.samples).fold(0.0, f64::max);
     let stretch = |(number, sum): (usize, &BlockSum)| {
         let error = (sum.sum / sum.samples).sqrt();
-        let span = Span { flight: blocks.keys[number].0, start: ranges[number].start, end: ranges[number].end };
+        let Range { start, end } = ranges[number].clone()?;
+        let span = Span { flight: blocks.keys[number].0, start, end };
         (2.0 * sum.samples >= fullest && error.is_finite()).then_some(Stretch { span, error })
     };
     let mut found: Vec<Stretch> = sums.iter().enumerate().filter_map(stretch).collect();
