@@ -94,7 +94,7 @@ impl fmt::Display for Comparison {
         for (title, words, kind, measure) in MEASURES {
             let mut columns = channels.clone();
             if kind == Kind::Share {
-                columns.iter_mut().for_each(|(_, unit)| *unit = "1".to_owned());
+                columns.iter_mut().for_each(|(_, unit)| unit.clear());
             }
             columns.push(("mean".to_owned(), String::new()));
             let values = self.models.iter().map(|model| {

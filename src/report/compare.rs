@@ -2,7 +2,7 @@
 //!
 //! Arranges the numbers of [`Comparison`] and of `critique::locate` on a [`Page`]; computes none of its own but percentages.
 
-use super::figures::{self, LineData, PANELS};
+use super::figures::{self, BinnedPanel, LineData, PANELS};
 use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
 use crate::critique::compare::deviation;
 use crate::critique::locate::{Dependence, Stretch, Variable, dependence, stretches};
@@ -44,7 +44,9 @@ pub fn compare_page(report: &CompareReport<'_>) -> Result<Page> {
     sections.push(maps(model, &deviation));
     let mut traces = Vec::new();
     if let Some(found) = located {
-        traces.push(Part::Text("Drag to zoom: all panels follow; double-click to go back; click a name to hide its line.".into()));
+        traces.push(Part::Text(
+            "Drag to zoom: all panels follow; double-click to go back; click a name to hide or show its line.".into(),
+        ));
         for (title, stretch) in [("Worst ten seconds", found.worst), ("Typical ten seconds", found.typical)] {
             traces.push(Part::Figure(trace_figure(title, report, &stretch)));
         }
@@ -118,7 +120,7 @@ fn normalised(part: &PartError, deviation: &PerChannel) -> [Option<f64>; 6] {
 }
 
 fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, String)> {
-    let unit = |column: &Column| if share { "1" } else { column.unit() }.to_owned();
+    let unit = |column: &Column| if share { "" } else { column.unit() }.to_owned();
     let channels = Column::TARGETS.iter().map(|column| (column.name().to_owned(), unit(column)));
     let last = mean.then(|| ("mean".to_owned(), String::new()));
     [(first.to_owned(), String::new())].into_iter().chain(channels).chain(last).collect()
@@ -212,14 +214,16 @@ fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &Stretch) -> f
         name: "measured".into(),
         x: time(&mut (span.start..span.end)),
         y: Column::TARGETS.iter().map(|column| flight.column(*column)[span.start..span.end].to_vec()).collect(),
+        hidden: false,
     };
     // The model in focus first, so that it has the same look on every page.
     let others = (0..report.rows.len()).filter(|index| *index != report.focus);
-    let order = [report.focus].into_iter().chain(others).filter_map(|index| report.rows.get(index));
-    let predicted = order.map(|row| LineData {
+    let order = [report.focus].into_iter().chain(others).filter_map(|index| Some((index, report.rows.get(index)?)));
+    let predicted = order.map(|(index, row)| LineData {
         name: row.name.clone(),
         x: time(&mut at.iter().map(|(sample, _)| *sample)),
         y: (0..6).map(|channel| at.iter().map(|(_, index)| row.predicted[*index][channel]).collect()).collect(),
+        hidden: report.yardstick == Some(index) && index != report.focus,
     });
     let caption = format!(
         "Flight {}, manoeuvre {}, {:.1} s to {:.1} s. Normalised error {:.2} (1 is as bad as predicting the mean).",
@@ -232,6 +236,9 @@ fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &Stretch) -> f
     let data: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
     figures::lines(title, &caption, "time, s", &channel_panels(), &data)
 }
+
+/// Share of a residual below which no variable is drawn: 14 bins of pure noise reach it in a few minutes of flight.
+const SHARE_SHOWN: f64 = 0.01;
 
 /// Which variables the residual goes with, and how.
 fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
@@ -249,7 +256,7 @@ fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
             detail: String::new(),
             value: Some(one.share),
         });
-        (variable.name().to_owned(), variable.unit().to_owned(), cells.collect())
+        (figures::with_unit(variable.name(), variable.unit()), String::new(), cells.collect())
     });
     let mut parts = vec![
         Part::Text(
@@ -263,10 +270,23 @@ fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
         }),
     ];
     for (channel, column) in Column::TARGETS.iter().enumerate() {
-        let mut panels: Vec<(String, String, &Dependence)> =
-            found.iter().map(|(variable, of)| (variable.name().to_owned(), variable.unit().to_owned(), &of[channel])).collect();
-        panels.sort_by(|a, b| b.2.share.total_cmp(&a.2.share));
-        panels.truncate(PANELS);
+        let panel = |(variable, of): &'_ (Variable, [Dependence; 6])| (*variable, of[channel].share);
+        let mut order: Vec<(usize, (Variable, f64))> = found.iter().map(panel).enumerate().collect();
+        order.sort_by(|a, b| b.1.1.total_cmp(&a.1.1));
+        let largest = order.first().map_or(0.0, |(_, (_, share))| *share);
+        if largest < SHARE_SHOWN {
+            let text = "no variable accounts for 1 % of it; there is nothing to show";
+            parts.push(Part::Text(format!("Residual of {}: {text}.", column.name())));
+            continue;
+        }
+        let panels: Vec<BinnedPanel<'_>> = order
+            .iter()
+            .take(PANELS)
+            .filter_map(|(index, (variable, _))| {
+                let dependence = &found.get(*index)?.1[channel];
+                Some(BinnedPanel { variable: variable.name(), unit: variable.unit(), dependence, curve: None })
+            })
+            .collect();
         let caption = "The variables it goes with most, share of the residual's variance in brackets.";
         parts.push(Part::Figure(figures::binned(&format!("Residual of {}", column.name()), caption, column.unit(), &panels)));
     }

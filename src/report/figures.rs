@@ -5,9 +5,9 @@
 
 use super::colour;
 use super::page::escape;
-use crate::critique::locate::Dependence;
-use plotly::common::{Anchor, DashType, ErrorData, ErrorType, Font, Line, Marker, MarkerSymbol, Mode, Orientation};
-use plotly::layout::{Annotation, Axis, AxisType, BarMode, HoverMode, Legend, Margin, SpikeMode, SpikeSnap, TicksDirection};
+use crate::critique::locate::{Bin, Dependence};
+use plotly::common::{Anchor, DashType, ErrorData, ErrorType, Font, Line, Marker, MarkerSymbol, Mode, Orientation, TextAnchor, Visible};
+use plotly::layout::{Annotation, Axis, AxisType, BarMode, HoverMode, Legend, Margin, SpikeMode, SpikeSnap, TicksDirection, TraceOrder};
 use plotly::{Bar, Layout, Scatter, Traces};
 
 /// Points of one line that a figure draws at most; more are thinned with [`thin`].
@@ -15,6 +15,9 @@ pub const POINTS: usize = 1000;
 
 /// Panels of one figure at most.
 pub const PANELS: usize = 6;
+
+/// Intervals of bins that rest on few blocks.
+const FAINT: &str = "#b5cfe0";
 
 /// An interactive figure, ready for a page.
 #[derive(Clone)]
@@ -51,30 +54,37 @@ pub struct LineData {
     pub x: Vec<f64>,
     /// Vertical values of each panel, each as long as `x`.
     pub y: Vec<Vec<f64>>,
+    /// Whether the line is drawn only once its name in the legend is clicked.
+    pub hidden: bool,
 }
 
-/// Lines in panels with linked horizontal axes and one legend: measured against predicted. The first line is what was measured
-/// and drawn in black; `panels` are (title, unit of the vertical axis).
+/// Lines in panels with linked horizontal axes and one legend: measured against predicted. The first line is what was measured,
+/// thin and black on top of all; the second, wide, the model in focus. `panels` are (title, unit of the vertical axis).
 pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
     let grid = Grid::new(panels.len(), 2, 150, 34).by_column();
     let mut traces = Traces::new();
-    for (number, line) in data.iter().enumerate() {
+    // Drawn in this order: other models, the first model, and on top what was measured.
+    for (number, line) in data.iter().enumerate().rev() {
         for (panel, y) in line.y.iter().enumerate().take(grid.panels) {
             let (x, y) = thin(&line.x, y);
             let style = match number {
-                0 => Line::new().color(colour::MEASURED).width(1.6),
-                n => Line::new().color(colour::line(n - 1)).dash(colour::dash(n)).width(1.6),
+                0 => Line::new().color(colour::MEASURED).width(1.2),
+                1 => Line::new().color(colour::line(0)).width(3.0),
+                n => Line::new().color(colour::line(n - 1)).dash(colour::dash(n - 1)).width(1.6),
             };
+            let shown = if line.hidden { Visible::LegendOnly } else { Visible::True };
             let trace = Scatter::new(rounded(&x), rounded(&y))
                 .mode(Mode::Lines)
                 .name(escape(&line.name))
                 .legend_group(number.to_string())
                 .show_legend(panel == 0)
+                .visible(shown)
                 .line(style);
             traces.push(trace.x_axis(axis_name('x', grid.column(panel))).y_axis(axis_name('y', panel)));
         }
     }
-    let mut layout = grid.layout().hover_mode(HoverMode::XUnified).annotations(grid.titles(panels.iter().map(|(title, _)| title)));
+    let layout = grid.layout().legend(grid.legend().trace_order(TraceOrder::Reversed));
+    let mut layout = layout.hover_mode(HoverMode::XUnified).annotations(grid.titles(panels.iter().map(|(title, _)| title)));
     for (panel, (_, unit)) in panels.iter().enumerate().take(grid.panels) {
         let y = grid.y(panel).title(escape(unit)).anchor(axis_name('x', grid.column(panel)));
         layout = set_y(layout, panel, y);
@@ -88,17 +98,30 @@ pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, Strin
     figure(title, caption, traces, layout, grid.height_px())
 }
 
+/// One panel of a [`binned`] figure.
+#[derive(Clone, Debug)]
+pub struct BinnedPanel<'a> {
+    /// Name of the variable.
+    pub variable: &'a str,
+    /// Unit of the variable.
+    pub unit: &'a str,
+    /// The residual against it.
+    pub dependence: &'a Dependence,
+    /// A curve through the bins, such as an effect that would explain them: its name, the variable, the residual.
+    pub curve: Option<(String, Vec<f64>, Vec<f64>)>,
+}
+
 /// Mean residual of one channel in bins of several variables, one panel each, with 95 % intervals. Bins on few blocks are hollow.
-///
-/// `panels` are (name of the variable, its unit, the residual against it); `unit` is that of the residual.
-pub fn binned(title: &str, caption: &str, unit: &str, panels: &[(String, String, &Dependence)]) -> Figure {
+/// `unit` is that of the residual.
+pub fn binned(title: &str, caption: &str, unit: &str, panels: &[BinnedPanel<'_>]) -> Figure {
     let grid = Grid::new(panels.len(), 3, 190, 92);
     let mut traces = Traces::new();
-    for (panel, (.., dependence)) in panels.iter().enumerate().take(grid.panels) {
+    let first = |thin: bool| panels.iter().position(|panel| panel.dependence.bins.iter().any(|bin| bin.is_thin() == thin));
+    for (number, panel) in panels.iter().enumerate().take(grid.panels) {
         for thin in [false, true] {
-            let bins: Vec<_> = dependence.bins.iter().filter(|bin| bin.is_thin() == thin).collect();
+            let bins: Vec<&Bin> = panel.dependence.bins.iter().filter(|bin| bin.is_thin() == thin).collect();
             let half = |side: usize, sign: f64| {
-                let of = |bin: &&crate::critique::locate::Bin| bin.ci95.map_or(0.0, |ci95| sign * (ci95[side] - bin.mean));
+                let of = |bin: &&Bin| bin.ci95.map_or(0.0, |ci95| sign * (ci95[side] - bin.mean));
                 rounded(&bins.iter().map(of).collect::<Vec<_>>())
             };
             let error = ErrorData::new(ErrorType::Data).symmetric(false).array(half(1, 1.0)).array_minus(half(0, -1.0));
@@ -108,25 +131,35 @@ pub fn binned(title: &str, caption: &str, unit: &str, panels: &[(String, String,
             let mean: Vec<f64> = bins.iter().map(|bin| bin.mean).collect();
             let trace = Scatter::new(rounded(&at), rounded(&mean))
                 .mode(Mode::Markers)
-                .name(if thin { "fewer than 5 blocks" } else { "mean residual, 95 % interval" })
+                .name(if thin { "on fewer than 5 blocks" } else { "mean residual, 95 % interval" })
                 .legend_group(thin.to_string())
-                .show_legend(panel == 0)
+                .show_legend(first(thin) == Some(number))
                 .text_array(hover)
                 .marker(Marker::new().color(colour::line(0)).size(7).symbol(symbol))
-                .error_y(error.color(if thin { "#b5cfe0" } else { colour::line(0) }).thickness(1.4).width(3));
-            traces.push(trace.x_axis(axis_name('x', panel)).y_axis(axis_name('y', panel)));
+                .error_y(error.color(if thin { FAINT } else { colour::line(0) }).thickness(1.4).width(3));
+            traces.push(trace.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
+        }
+        if let Some((name, x, y)) = &panel.curve {
+            let (x, y) = thin(x, y);
+            let curve = Scatter::new(rounded(&x), rounded(&y)).mode(Mode::Lines).name(escape(name));
+            let curve = curve.line(Line::new().color(colour::line(1)).dash(DashType::Dash).width(2.0));
+            traces.push(curve.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
         }
     }
-    let titles: Vec<String> = panels.iter().map(|(name, _, found)| format!("{name} ({:.0} %)", 100.0 * found.share)).collect();
+    let titles: Vec<String> =
+        panels.iter().map(|panel| format!("{} ({:.0} %)", panel.variable, 100.0 * panel.dependence.share)).collect();
     let mut layout = grid.layout().annotations(grid.titles(titles.iter()));
-    let range = bin_range(panels.iter().map(|(.., dependence)| *dependence));
-    for (panel, (name, variable_unit, _)) in panels.iter().enumerate().take(grid.panels) {
-        let x = grid.x(grid.column(panel)).anchor(axis_name('y', panel)).title(escape(&format!("{name}, {variable_unit}")));
-        let mut y = grid.y(panel).anchor(axis_name('x', panel)).title(escape(unit)).zero_line(true).zero_line_color("#595959");
+    let range = bin_range(panels.iter().map(|panel| panel.dependence));
+    for (number, panel) in panels.iter().enumerate().take(grid.panels) {
+        let x = grid
+            .x(grid.column(number))
+            .anchor(axis_name('y', number))
+            .title(escape(&with_unit(panel.variable, panel.unit)));
+        let mut y = grid.y(number).anchor(axis_name('x', number)).title(escape(unit)).zero_line(true).zero_line_color("#595959");
         if let Some(range) = range {
             y = y.range(range.to_vec());
         }
-        layout = set_y(set_x(layout, panel, x), panel, y);
+        layout = set_y(set_x(layout, number, x), number, y);
     }
     figure(title, caption, traces, layout, grid.height_px())
 }
@@ -176,10 +209,10 @@ pub fn shares(title: &str, caption: &str, rows: &[String], parts: &[(String, Vec
         let percent: Vec<f64> = values.iter().rev().map(|value| round(100.0 * value)).collect();
         let text = percent.iter().map(|value| if *value >= 3.0 { format!("{value:.0} %") } else { String::new() }).collect();
         let bar = Bar::new(percent, labels.clone()).orientation(Orientation::Horizontal).name(escape(name)).text_array(text);
-        traces.push(bar.marker(Marker::new().color(colour::line(number))));
+        traces.push(bar.marker(Marker::new().color(colour::line(number))).inside_text_anchor(TextAnchor::Middle));
     }
     let grid = Grid::new(1, 1, 34 * rows.len().max(1), 0);
-    let layout = grid.layout().bar_mode(BarMode::Stack);
+    let layout = grid.layout().legend(grid.legend().trace_order(TraceOrder::Normal)).bar_mode(BarMode::Stack);
     let layout = set_x(layout, 0, grid.x(0).title("share of the variance, %").range(vec![0.0, 100.0]));
     let layout = set_y(layout, 0, grid.y(0).auto_margin(true));
     figure(title, caption, traces, layout, grid.height_px())
@@ -197,7 +230,11 @@ pub fn training(title: &str, caption: &str, curves: &[(String, Vec<f64>)]) -> Fi
     let grid = Grid::new(1, 1, 220, 0);
     let layout = grid.layout().hover_mode(HoverMode::XUnified);
     let layout = set_x(layout, 0, grid.x(0).title("epoch"));
-    let layout = set_y(layout, 0, grid.y(0).type_(AxisType::Log).title("loss"));
+    // Labels at whole decades once there are some: those between would stand on top of each other.
+    let loss = curves.iter().flat_map(|(_, loss)| loss).filter(|loss| **loss > 0.0);
+    let (low, high) = loss.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(*value), high.max(*value)));
+    let y = grid.y(0).type_(AxisType::Log).title("loss");
+    let layout = set_y(layout, 0, if high > 10.0 * low { y.dtick(1.0) } else { y.n_ticks(6) });
     figure(title, caption, traces, layout, grid.height_px())
 }
 
@@ -217,6 +254,11 @@ pub fn thin(x: &[f64], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         kept.into_iter().filter_map(|index| stretch.get(index).copied()).collect::<Vec<_>>()
     };
     pairs.chunks(stretch).flat_map(ends).unzip()
+}
+
+/// `vx, m/s`; the name alone for a quantity without a unit.
+pub(super) fn with_unit(name: &str, unit: &str) -> String {
+    if unit == "1" { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 /// Five significant digits: more than a screen shows, and half the size of the page.
@@ -319,9 +361,13 @@ impl Grid {
         titles.take(self.panels).enumerate().map(title).collect()
     }
 
-    fn layout(&self) -> Layout {
+    /// In one line above the panels.
+    fn legend(&self) -> Legend {
         let legend = Legend::new().orientation(Orientation::Horizontal).x(0.0).x_anchor(Anchor::Left);
-        let legend = legend.y(1.0 + 26.0 / self.plot_px() as f64).y_anchor(Anchor::Bottom);
+        legend.y(1.0 + 26.0 / self.plot_px() as f64).y_anchor(Anchor::Bottom)
+    }
+
+    fn layout(&self) -> Layout {
         Layout::new()
             .auto_size(true)
             .height(self.height_px())
@@ -329,7 +375,7 @@ impl Grid {
             .font(Font::new().family(FONT).size(12).color("#1b1b1b"))
             .paper_background_color("#ffffff")
             .plot_background_color("#ffffff")
-            .legend(legend)
+            .legend(self.legend())
     }
 }
 
@@ -369,7 +415,6 @@ fn set_y(layout: Layout, number: usize, axis: Axis) -> Layout {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::critique::locate::Bin;
     use proptest::prelude::*;
 
     fn json(figure: &Figure) -> serde_json::Value {
@@ -383,14 +428,20 @@ mod tests {
     #[test]
     fn lines_share_their_horizontal_axes() {
         let x: Vec<f64> = (0..50).map(f64::from).collect();
-        let data = ["measured", "<model>"].map(|name| LineData { name: name.into(), x: x.clone(), y: vec![x.clone(); 6] });
+        let data = ["measured", "<model>"].map(|name| LineData {
+            name: name.into(),
+            x: x.clone(),
+            y: vec![x.clone(); 6],
+            hidden: name != "measured",
+        });
         let found = json(&lines("t", "c", "time, s", &panels(6), &data));
         assert_eq!(found["data"].as_array().map(Vec::len), Some(12));
-        assert_eq!((&found["data"][0]["line"]["color"], &found["data"][6]["name"]), (&"#000000".into(), &"&lt;model&gt;".into()));
+        assert_eq!((&found["data"][6]["line"]["color"], &found["data"][0]["name"]), (&"#000000".into(), &"&lt;model&gt;".into()));
         assert_eq!(found["layout"]["xaxis2"]["matches"], "x");
         assert_eq!((&found["data"][5]["xaxis"], &found["data"][5]["yaxis"]), (&"x2".into(), &"y6".into()));
         assert!(found["layout"]["yaxis6"]["title"]["text"] == "m/s²" && found["layout"]["xaxis"]["title"]["text"] == "time, s");
-        assert!(found["data"][6]["line"]["dash"].is_string(), "lines differ by more than colour");
+        assert_eq!((&found["data"][0]["visible"], &found["data"][6]["visible"]), (&"legendonly".into(), &true.into()));
+        assert_ne!(found["data"][0]["line"]["width"], found["data"][6]["line"]["width"], "lines differ by more than colour");
     }
 
     #[test]
@@ -398,10 +449,13 @@ mod tests {
         let bin = |at: f64, mean: f64, blocks: usize| Bin { at, mean, ci95: Some([mean - 1.0, mean + 2.0]), n: 10, blocks };
         let wide = Bin { ci95: Some([-900.0, 900.0]), ..bin(2.0, 0.5, 2) };
         let dependence = Dependence { bins: vec![bin(0.0, 1.0, 9), bin(1.0, -1.0, 9), wide], share: 0.25 };
-        let found = json(&binned("t", "c", "m/s²", &[("vx".into(), "m/s".into(), &dependence)]));
+        let curve = Some(("drag".to_owned(), vec![0.0, 1.0], vec![1.0, -1.0]));
+        let panel = BinnedPanel { variable: "vx", unit: "m/s", dependence: &dependence, curve };
+        let found = json(&binned("t", "c", "m/s²", &[panel]));
         assert_eq!(found["data"][0]["error_y"]["array"], serde_json::json!([2.0, 2.0]));
         assert_eq!(found["data"][0]["error_y"]["arrayminus"], serde_json::json!([1.0, 1.0]));
         assert_eq!(found["data"][1]["marker"]["symbol"], "circle-open");
+        assert_eq!((&found["data"][2]["name"], &found["data"][2]["y"]), (&"drag".into(), &serde_json::json!([1.0, -1.0])));
         let high = found["layout"]["yaxis"]["range"][1].as_f64();
         assert!(high.is_some_and(|high| high > 3.0 && high < 4.0), "{high:?}");
         assert!(found["layout"]["annotations"][0]["text"].as_str().is_some_and(|text| text.contains("25 %")));

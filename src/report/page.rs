@@ -110,7 +110,10 @@ pub fn escape(text: &str) -> String {
 pub fn page(page: &Page) -> String {
     let mut body = String::new();
     let mut figures = 0;
-    let summary: String = page.summary.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect();
+    let mut summary: String = page.summary.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect();
+    if !summary.is_empty() {
+        summary = format!("<div class=\"summary\">\n{summary}</div>\n");
+    }
     let mut contents = String::new();
     for (number, section) in page.sections.iter().enumerate() {
         let title = escape(&section.title);
@@ -135,7 +138,7 @@ pub fn page(page: &Page) -> String {
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\
-         </head>\n<body>\n<header>\n<h1>{title}</h1>\n<div class=\"summary\">\n{summary}</div>\n<nav aria-label=\"Sections\"><ol>\n{contents}</ol></nav>\n\
+         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{summary}<nav aria-label=\"Sections\"><ol>\n{contents}</ol></nav>\n\
          <noscript><p>The figures need JavaScript; text, tables and maps do not.</p></noscript>\n</header>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n"
     )
 }
@@ -246,10 +249,10 @@ nav a { color: #005a8c; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .95rem; }
 caption { text-align: left; font-weight: 600; padding-bottom: .4rem; }
 th, td { padding: .3rem .7rem; text-align: right; vertical-align: top; border-bottom: 1px solid var(--rule); white-space: nowrap; }
-thead th { border-bottom: 2px solid var(--ink); vertical-align: bottom; font-weight: 600; }
+thead th { border-bottom: 2px solid var(--ink); font-weight: 600; }
 th:first-child { text-align: left; }
 tbody th { font-weight: 500; }
-small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem; line-height: 1.25; min-height: 1em; }
+small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem; line-height: 1.25; }
 .star { display: inline-block; width: .6em; text-align: left; font-weight: 700; }
 .map td { min-width: 6.2rem; border: 2px solid #fff; }
 .map td small { color: inherit; }
