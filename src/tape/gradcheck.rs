@@ -404,8 +404,9 @@ mod tests {
             | Fault::Offset(at)) = self.fault;
             let Some(target) = dx[at].take() else { return };
             let mut own = vec![T::ZERO; target.values.len()];
-            dx[at] = Some(Gradient { values: &mut own, write: Write::Set });
-            inner.backward(Backward { x, y, dy, workspace, dx, scratch, shapes, level, stream });
+            let mut slots: [Option<Gradient<'_, T>>; MAX_OPERANDS] = dx;
+            slots[at] = Some(Gradient { values: &mut own, write: Write::Set });
+            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, shapes, level, stream });
             let write = match self.fault {
                 Fault::Dropped(_) => return,
                 Fault::NeverSets(_) => Write::Add,

@@ -3,6 +3,7 @@
 //! [`Graph`] records operations ([`ops`]) on copyable handles; a plan gives every buffer its place; [`Session`] replays it one
 //! sample at a time and gives the loss, the outputs and the gradients. The tape knows operations, not networks.
 
+#[macro_use]
 pub mod gradcheck;
 pub mod op;
 pub mod ops;

@@ -152,7 +152,7 @@ impl<T: Real> Session<T> {
         let losses = &mut losses[..samples];
         let replay = Replay { plan, level, poison, slabs, parameters, dropout, fill, samples, result_len, shards: count };
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
-        let work = || {
+        let mut work = || {
             replay.work(shards, 0, losses_mut, results);
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);

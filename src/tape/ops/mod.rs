@@ -40,8 +40,9 @@ pub use squared_error::SquaredError;
 pub use sum::{Add, Subtract};
 pub use temporal::Temporal;
 
+use super::op::Gradient;
 use super::shape::Shape;
-use phyture_kernels::{Rows, RowsMut};
+use phyture_kernels::{Rows, RowsMut, Write};
 
 /// A value as packed rows of its last axis.
 fn rows<'a, T>(values: &'a [T], shape: &Shape) -> Rows<'a, T> {
@@ -53,4 +54,13 @@ fn rows<'a, T>(values: &'a [T], shape: &Shape) -> Rows<'a, T> {
 fn rows_mut<'a, T>(values: &'a mut [T], shape: &Shape) -> RowsMut<'a, T> {
     let (rows, columns) = shape.rows();
     RowsMut::packed(values, rows, columns)
+}
+
+/// A gradient, or, where nobody asks for it, a place for it in the scratch.
+fn or_scratch<'a, T>(gradient: Option<Gradient<'a, T>>, scratch: &mut &'a mut [T], len: usize) -> Gradient<'a, T> {
+    gradient.unwrap_or_else(|| {
+        let (values, rest) = std::mem::take(scratch).split_at_mut(len);
+        *scratch = rest;
+        Gradient { values, write: Write::Set }
+    })
 }
