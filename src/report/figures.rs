@@ -6,8 +6,12 @@
 use super::colour;
 use super::page::escape;
 use crate::critique::locate::{Bin, Dependence};
-use plotly::common::{Anchor, DashType, ErrorData, ErrorType, Font, Line, Marker, MarkerSymbol, Mode, Orientation, TextAnchor, Visible};
-use plotly::layout::{Annotation, Axis, AxisType, BarMode, HoverMode, Legend, Margin, SpikeMode, SpikeSnap, TicksDirection, TraceOrder};
+use plotly::common::{
+    Anchor, DashType, ErrorData, ErrorType, Font, Line, Marker, MarkerSymbol, Mode, Orientation, TextAnchor, Visible,
+};
+use plotly::layout::{
+    Annotation, Axis, AxisType, BarMode, HoverMode, Legend, Margin, SpikeMode, SpikeSnap, TicksDirection, TraceOrder,
+};
 use plotly::{Bar, Layout, Scatter, Traces};
 
 /// Points of one line that a figure draws at most; more are thinned with [`thin`].
@@ -151,10 +155,7 @@ pub fn binned(title: &str, caption: &str, unit: &str, panels: &[BinnedPanel<'_>]
     let mut layout = grid.layout().annotations(grid.titles(titles.iter()));
     let range = bin_range(panels.iter().map(|panel| panel.dependence));
     for (number, panel) in panels.iter().enumerate().take(grid.panels) {
-        let x = grid
-            .x(grid.column(number))
-            .anchor(axis_name('y', number))
-            .title(escape(&with_unit(panel.variable, panel.unit)));
+        let x = grid.x(grid.column(number)).anchor(axis_name('y', number)).title(escape(&with_unit(panel.variable, panel.unit)));
         let mut y = grid.y(number).anchor(axis_name('x', number)).title(escape(unit)).zero_line(true).zero_line_color("#595959");
         if let Some(range) = range {
             y = y.range(range.to_vec());
