@@ -210,6 +210,7 @@ fn the_verdict_finds_what_was_put_there() -> Result<()> {
     let share = |name: &str| model.by_manoeuvre.get(name).and_then(|part| part.rmse.vx_dot).unwrap_or(f64::NAN);
     assert!(share("forward_sweep") > 2.0 * share("hover"), "{:?}", model.by_manoeuvre);
     assert!(own.contains("The largest error of any channel lies in manoeuvre forward_sweep"));
+    assert!(own.contains("Of the models here, paper + ground effect has the smallest mean RMSE"));
     assert!(own.contains("Residual of vx_dot"));
     Ok(())
 }

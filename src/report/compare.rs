@@ -5,7 +5,7 @@
 use super::figures::{self, BinnedPanel, LineData, PANELS};
 use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
 use crate::critique::compare::deviation;
-use crate::critique::locate::{Dependence, Stretch, Variable, dependence, stretches};
+use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
 use crate::critique::table::{Kind, MEASURES, significant};
 use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row};
 use crate::error::{Error, Result};
@@ -81,6 +81,15 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
             format!("{} (RMSE {rmse} {unit}, {:.0} % of the channel's standard deviation)", name(*channel), 100.0 * share)
         };
         out.push(format!("{} predicts {} best and {} worst.", model.name, says(finest), says(worst)));
+    }
+    let mean = |model: &ModelError| model.rmse.mean;
+    let judged = report.comparison.models.iter().enumerate().filter(|(index, _)| report.yardstick != Some(*index));
+    let best = judged.filter_map(|(index, model)| Some((index, model, mean(model)?))).min_by(|a, b| a.2.total_cmp(&b.2));
+    if let (Some((index, best, error)), Some(own)) = (best, mean(model))
+        && index != report.focus
+    {
+        let [error, own] = [error, own].map(|value| significant(value, 3));
+        out.push(format!("Of the models here, {} has the smallest mean RMSE ({error}; {} {own}).", best.name, model.name));
     }
     if let Some(other) =
         report.yardstick.filter(|index| *index != report.focus).and_then(|index| report.comparison.models.get(index))
@@ -242,10 +251,7 @@ const SHARE_SHOWN: f64 = 0.01;
 
 /// Which variables the residual goes with, and how.
 fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
-    let mut found: Vec<(Variable, [Dependence; 6])> = Vec::new();
-    for variable in Variable::ALL {
-        found.extend(dependence(report.flights, report.windows, row, variable)?.map(|of| (variable, of)));
-    }
+    let found = dependences(report.flights, report.windows, row, &Variable::ALL)?;
     let title = "Residual against variables".to_owned();
     if found.is_empty() {
         return Ok(Section { title, parts: vec![Part::Text("No recorded variable varies in these windows.".into())] });

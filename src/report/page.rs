@@ -235,10 +235,10 @@ for (const event of ["beforeprint", "afterprint"]) {
 "#;
 
 const STYLE: &str = r#"
-:root { color-scheme: light; --ink: #1b1b1b; --soft: #595959; --rule: #d4d4d4; }
+:root { color-scheme: light; font-size: 16px; --ink: #1b1b1b; --soft: #595959; --rule: #d4d4d4; }
 * { box-sizing: border-box; }
 body { margin: 0 auto; padding: 2rem 1.5rem 4rem; max-width: 72rem; background: #fff; color: var(--ink);
-  font: 16px/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif; }
+  font: 1rem/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif; }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 1rem; }
 h2 { font-size: 1.35rem; margin: 2.8rem 0 .6rem; padding-top: .8rem; border-top: 2px solid var(--ink); }
 p { max-width: 46rem; margin: .6rem 0; }
@@ -262,12 +262,15 @@ small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem;
 figure { margin: 1.6rem 0; }
 figcaption { max-width: 46rem; }
 .figure { width: 100%; }
+@page { margin: 14mm 12mm; }
 @media print {
-  body { font-size: 11px; padding: 0; max-width: none; }
-  nav { display: none; }
-  section { break-inside: auto; } h2, caption, figcaption { break-after: avoid; } tr, figure { break-inside: avoid; }
+  :root { font-size: 10.5px; }
+  body { padding: 0; max-width: none; }
+  p, figcaption { max-width: none; }
+  .wide { overflow: visible; break-inside: avoid; }
+  h2, caption, figcaption { break-after: avoid; } tr, figure { break-inside: avoid; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-  .modebar { display: none; }
+  nav, .modebar { display: none !important; }
 }
 "#;
 
