@@ -52,3 +52,16 @@ impl Stream {
         (mix64(self.sub(index).key) >> 11) as f64 * STEP
     }
 }
+
+/// A random order of `0..count`, another for each `round` of a run (Fisher & Yates 1938; Durstenfeld 1964).
+pub fn permutation(count: usize, seed: u64, round: u64) -> Vec<u32> {
+    /// A site no dropout has: sites count from 0.
+    const ORDER: u64 = u64::MAX;
+    let stream = Stream::new(seed, round, ORDER, 0);
+    let mut order: Vec<u32> = (0..u32::try_from(count).unwrap_or(u32::MAX)).collect();
+    for last in (1..order.len()).rev() {
+        let chosen = (stream.uniform(last as u64) * (last + 1) as f64) as usize;
+        order.swap(last, chosen.min(last));
+    }
+    order
+}

@@ -7,7 +7,7 @@ use super::model::Model;
 use crate::error::{Error, Result};
 use crate::flight::attitude::gravity_body;
 use crate::flight::{Accelerations, Column, Flight};
-use crate::formula::StreamingFormula;
+use crate::formula::{Formula, StreamingFormula, Value};
 use std::ops::Range;
 
 /// Samples of a flight evaluated at once.
@@ -75,6 +75,21 @@ pub fn quantity(flight: &Flight, name: &str) -> Option<Vec<f64>> {
         derived.value(flight.time_s(sample), &|column| flight.column(column).get(sample).copied().unwrap_or_default())
     };
     Some((0..flight.len()).map(value).collect())
+}
+
+/// A standard quantity of one sample by name, for streams; `state` in the order of [`Column::STATE`].
+pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
+    let of_state = |column: Column| state.get(column as usize).copied().unwrap_or_default();
+    let column = Column::STATE.iter().find(|column| column.name() == name).map(|column| of_state(*column));
+    column.or_else(|| DERIVED.iter().find(|entry| entry.0 == name).map(|entry| entry.1.value(time_s, &of_state)))
+}
+
+/// A formula of standard quantities on a whole flight.
+///
+/// # Errors
+/// [`Error::Formula`] pointing at a name that the flight lacks.
+pub fn evaluate(formula: &Formula, flight: &Flight) -> Result<Vec<f64>> {
+    formula.evaluate(flight.len(), flight.step_s, &|name| quantity(flight, name).map(Value::from))
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

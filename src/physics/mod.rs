@@ -10,5 +10,5 @@ mod model;
 
 pub use baseline::{PAPER, built_in, kinds};
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
-pub use evaluate::{StreamingModel, quantity, standard_names};
+pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};
 pub use model::{Entry, Model, ModelData};

@@ -125,6 +125,11 @@ impl<T: Real> Session<T> {
         self.poison = poison;
     }
 
+    /// The instruction-set level it runs at.
+    pub const fn level(&self) -> Level {
+        self.level
+    }
+
     /// Numbers in the slab of one worker: the memory of one sample in flight.
     pub fn slab_len(&self) -> usize {
         self.plan.slab_len
@@ -177,7 +182,13 @@ impl<T: Real> Session<T> {
     ///
     /// # Errors
     /// As [`Session::step`].
-    pub fn predict(&mut self, parameters: &[T], samples: usize, fill: Fill<'_, T>, each: &mut dyn FnMut(usize, &[T])) -> Result<()> {
+    pub fn predict(
+        &mut self,
+        parameters: &[T],
+        samples: usize,
+        fill: Fill<'_, T>,
+        each: &mut dyn FnMut(usize, &[T]),
+    ) -> Result<()> {
         self.step(parameters, samples, None, fill)?;
         let output_len = self.plan.outputs.iter().map(ExactSizeIterator::len).sum();
         let result_len = self.result_len();
