@@ -110,13 +110,11 @@ pub(super) fn encode(table: &Table) -> ParquetResult<Vec<u8>> {
     }
     let schema = Arc::new(Type::group_type_builder("schema").with_fields(fields).build()?);
     // Noise does not repeat: a dictionary of doubles costs time and makes the file larger.
-    let properties =
-        WriterProperties::builder().set_compression(Compression::SNAPPY).set_dictionary_enabled(false).build();
+    let properties = WriterProperties::builder().set_compression(Compression::SNAPPY).set_dictionary_enabled(false).build();
     let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties))?;
     let mut group = writer.next_row_group()?;
     for (_, values) in table {
-        let mut column =
-            group.next_column()?.ok_or_else(|| ParquetError::General("fewer columns than the schema has".into()))?;
+        let mut column = group.next_column()?.ok_or_else(|| ParquetError::General("fewer columns than the schema has".into()))?;
         match values {
             Values::Numbers(values) => {
                 column.typed::<DoubleType>().write_batch(values, None, None)?;

@@ -22,7 +22,6 @@
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::Axes;
-use super::differentiate::DEFAULT_CUTOFF_HZ;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
@@ -85,7 +84,8 @@ pub(super) struct Schema {
     pub rows: Vec<Formula>,
     pub minimum_length_s: f64,
     pub resample_hz: Option<f64>,
-    pub cutoff_hz: f64,
+    /// −3 dB frequency of the differentiator; `None` for its default, lowered where the rate demands it.
+    pub cutoff_hz: Option<f64>,
     pub manoeuvre: Manoeuvre,
     pub exclude: Vec<String>,
     pub ignore: Vec<String>,
@@ -107,7 +107,7 @@ impl Default for Schema {
             rows: Vec::new(),
             minimum_length_s: 0.0,
             resample_hz: None,
-            cutoff_hz: DEFAULT_CUTOFF_HZ,
+            cutoff_hz: None,
             manoeuvre: Manoeuvre::Folder,
             exclude: Vec::new(),
             ignore: Vec::new(),
@@ -153,7 +153,7 @@ impl Schema {
             rows: formulas(keys.texts("use")?.unwrap_or_default())?,
             minimum_length_s: keys.number("minimum_length_s", 0.0)?.unwrap_or(0.0),
             resample_hz: keys.number("resample_hz", f64::MIN_POSITIVE)?,
-            cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?.unwrap_or(DEFAULT_CUTOFF_HZ),
+            cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?,
             exclude: keys.texts("exclude")?.unwrap_or_default(),
             ignore: keys.texts("ignore")?.unwrap_or_default(),
             extra: keys.texts("extra")?,
@@ -217,6 +217,7 @@ impl Schema {
             || units::column_names().any(|canonical| canonical == name)
             || self.columns.values().flatten().any(|source| source == name || Formula::parse(source).is_ok_and(|f| names(&f)))
             || self.rows.iter().any(names)
+            || self.repairs.iter().any(|rule| rule.columns.iter().any(|column| column == name))
     }
 }
 
@@ -294,18 +295,16 @@ impl Keys {
     }
 
     fn texts(&mut self, key: &'static str) -> Result<Option<Vec<String>>> {
+        let value = self.take(key);
         let one = |value| match value {
             Value::String(text) => Ok(text),
             other => Err(self.fault(key, other.to_string(), "a text in quotes, or a list of such".into())),
         };
-        let value = self.table.remove(key);
-        let texts = match value {
-            None => None,
-            Some(Value::Array(values)) => Some(values.into_iter().map(one).collect::<Result<_>>()?),
-            Some(value) => Some(vec![one(value)?]),
-        };
-        self.known.push(key);
-        Ok(texts)
+        match value {
+            None => Ok(None),
+            Some(Value::Array(values)) => values.into_iter().map(one).collect::<Result<_>>().map(Some),
+            Some(value) => Ok(Some(vec![one(value)?])),
+        }
     }
 
     fn number(&mut self, key: &'static str, least: f64) -> Result<Option<f64>> {
@@ -347,21 +346,13 @@ impl Keys {
 
     /// `[[key]]`, any number of times, or `[key]` once.
     fn sections(&mut self, key: &'static str) -> Result<Vec<Self>> {
-        match self.table.remove(key) {
-            Some(Value::Array(values)) => {
-                let single = |value| Self::new(&self.place, "", Table::from_iter([(key.to_owned(), value)])).section(key);
-                self.known.push(key);
-                values.into_iter().filter_map(|value| single(value).transpose()).collect()
-            }
-            Some(value) => {
-                self.table.insert(key.into(), value);
-                Ok(self.section(key)?.into_iter().collect())
-            }
-            None => {
-                self.known.push(key);
-                Ok(Vec::new())
-            }
-        }
+        let values = match self.take(key) {
+            None => Vec::new(),
+            Some(Value::Array(values)) => values,
+            Some(value) => vec![value],
+        };
+        let single = |value| Self::new(&self.place, "", Table::from_iter([(key.to_owned(), value)])).section(key);
+        values.into_iter().filter_map(|value| single(value).transpose()).collect()
     }
 
     fn finish(self) -> Result<()> {

@@ -46,6 +46,11 @@ impl RawTable {
         }
     }
 
+    /// An [`Error::Cell`] at the header.
+    pub fn cell_of_header(&self, column: &str, found: impl Into<String>, expected: impl Into<String>) -> Error {
+        Error::Cell { path: self.path.clone(), line: 1, column: column.into(), found: found.into(), expected: expected.into() }
+    }
+
     /// An [`Error::Log`] about this file as a whole.
     pub fn fault(&self, found: impl Into<String>, expected: impl Into<String>) -> Error {
         fault(&self.path, found, expected)
@@ -147,12 +152,20 @@ fn header(path: &Path, record: &csv::ByteRecord) -> Result<Vec<String>> {
     let names: Vec<String> = record.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
         let expected = "a header line with the columns' names";
-        return Err(fault(path, format!("numbers in the first line (`{}`, …)", names.first().map_or("", String::as_str)), expected));
+        return Err(fault(
+            path,
+            format!("numbers in the first line (`{}`, …)", names.first().map_or("", String::as_str)),
+            expected,
+        ));
     }
     if let [only] = names.as_slice()
         && only.contains([';', '\t'])
     {
-        return Err(fault(path, "a header separated by semicolons or tabs", "commas between the columns and points in the numbers"));
+        return Err(fault(
+            path,
+            "a header separated by semicolons or tabs",
+            "commas between the columns and points in the numbers",
+        ));
     }
     Ok(names)
 }

@@ -12,8 +12,7 @@ const DEGREE_RAD: f64 = PI / 180.0;
 const TIME: Units = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0)];
 const LENGTH: Units = &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km", 1e3), ("ft", FOOT_M)];
 const ANGLE: Units = &[("rad", 1.0), ("deg", DEGREE_RAD)];
-const VELOCITY: Units =
-    &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("km/h", 1.0 / 3.6), ("ft/s", FOOT_M), ("kt", KNOT_M_S)];
+const VELOCITY: Units = &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("km/h", 1.0 / 3.6), ("ft/s", FOOT_M), ("kt", KNOT_M_S)];
 const RATE: Units = &[("rad/s", 1.0), ("deg/s", DEGREE_RAD), ("rpm", PI / 30.0)];
 const ACCELERATION: Units =
     &[("m/s^2", 1.0), ("m/s²", 1.0), ("g", super::GRAVITY_M_S2), ("mg", super::GRAVITY_M_S2 * 1e-3), ("ft/s^2", FOOT_M)];
@@ -55,11 +54,6 @@ impl Group {
     }
 }
 
-/// The group of a column.
-pub(super) fn group_of(column: &str) -> Option<&'static Group> {
-    GROUPS.iter().find(|group| group.columns.contains(&column))
-}
-
 /// All column names a log can give: `t`, the canonical columns, the quaternion.
 pub(super) fn column_names() -> impl Iterator<Item = &'static str> {
     GROUPS.iter().flat_map(|group| group.columns.iter().copied())
@@ -74,7 +68,8 @@ mod tests {
     fn every_column_is_in_one_group_and_si_has_factor_one() {
         for column in Column::ALL {
             assert_eq!(GROUPS.iter().filter(|group| group.columns.contains(&column.name())).count(), 1);
-            assert_eq!(group_of(column.name()).and_then(|group| group.factor(column.unit())), Some(1.0), "{column:?}");
+            let group = GROUPS.iter().find(|group| group.columns.contains(&column.name()));
+            assert_eq!(group.and_then(|group| group.factor(column.unit())), Some(1.0), "{column:?}");
         }
         assert_eq!(column_names().count(), Column::COUNT + 5);
     }
