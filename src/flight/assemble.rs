@@ -81,7 +81,10 @@ fn too_short(rows: usize, step_s: f64, schema: &Schema, cuts: Cuts) -> bool {
 
 fn left_out(name: &str, rows: usize, start_s: f64, step_s: f64) -> String {
     let length_s = rows as f64 * step_s;
-    format!("`{name}`: the piece of {length_s:.2} s ({rows} samples) from t = {start_s:.2} s on is left out as too short")
+    format!(
+        "`{name}`: the piece of {length_s:.2} s ({rows} sample{}) from t = {start_s:.2} s on is left out as too short",
+        if rows == 1 { "" } else { "s" }
+    )
 }
 
 /// The flights of a part without jumps, numbered on from those made before.
@@ -94,9 +97,9 @@ fn of_part(
     cuts: Cuts,
     done: &mut Assembled,
 ) -> Result<Vec<Flight>> {
-    let mut repairs = Vec::new();
-    repair::repair(&mut table, &schema.repairs, part.step_s, &mut repairs)?;
-    done.own_notes.extend(repairs.into_iter().map(|note| format!("`{name}`: {note}")));
+    if let Some(note) = repair::repair(&mut table, &schema.repairs, part.step_s)? {
+        done.own_notes.push(format!("`{name}`: {note}"));
+    }
     let mut columns = convert(&table, schema, part.step_s)?;
 
     let (mut start_s, mut step_s) = (part.start_s, part.step_s);
@@ -120,7 +123,11 @@ fn of_part(
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();
-        done.own_notes.push(format!("`{name}`: `use` keeps {kept} of {samples} samples, in {} pieces", runs.len()));
+        done.own_notes.push(format!(
+            "`{name}`: `use` keeps {kept} of {samples} samples, in {} piece{}",
+            runs.len(),
+            if runs.len() == 1 { "" } else { "s" }
+        ));
     }
     let mut flights = Vec::new();
     let whole = runs.len() == 1 && runs[0].len() == samples;

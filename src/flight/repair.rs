@@ -4,17 +4,16 @@ use super::schema::Repair;
 use super::table::RawTable;
 use crate::error::Result;
 use crate::formula::Value;
-use std::collections::BTreeSet;
 
 /// Applies the rules: runs of bad cells up to the rule's length are interpolated linearly between their good neighbours; bad
 /// cells that cannot be (longer runs, ends of the record) become NaN, to be refused if a row in use holds them.
 ///
-/// Returns the names of the columns that rules cover. `notes` gets one sentence a column that had bad cells.
+/// Returns what was found and done, in words; `None` if no cell was bad.
 ///
 /// # Errors
 /// [`Error::Cell`](crate::Error::Cell) if a rule's column is not in the file.
-pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64, notes: &mut Vec<String>) -> Result<BTreeSet<String>> {
-    let mut covered = BTreeSet::new();
+pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Result<Option<String>> {
+    let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
     for rule in rules {
         for name in &rule.columns {
             let Some(index) = table.index(name) else {
@@ -30,13 +29,28 @@ pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64, notes:
                 bad.iter_mut().zip(holds).for_each(|(bad, holds)| *bad |= holds != 1.0);
             }
             let count = bridge(values, &bad, rule.max_gap_s / step_s);
-            if count.found > 0 {
-                notes.push(sentence(name, &count, step_s));
+            found += count.found;
+            longest = longest.max(count.longest_bridged);
+            if count.bridged > 0 {
+                bridged.push(format!("{} of `{name}`", count.bridged));
             }
-            covered.insert(name.clone());
+            if count.found > count.bridged {
+                left.push(format!("{} of `{name}`", count.found - count.bridged));
+            }
         }
     }
-    Ok(covered)
+    if found == 0 {
+        return Ok(None);
+    }
+    let mut sentences = Vec::new();
+    if !bridged.is_empty() {
+        let longest_s = longest as f64 * step_s;
+        sentences.push(format!("bad cells interpolated linearly, longest run {longest_s:.3} s: {}", bridged.join(", ")));
+    }
+    if !left.is_empty() {
+        sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
+    }
+    Ok(Some(sentences.join("; ")))
 }
 
 #[derive(Default)]
@@ -44,13 +58,6 @@ struct Count {
     found: usize,
     bridged: usize,
     longest_bridged: usize,
-}
-
-fn sentence(name: &str, count: &Count, step_s: f64) -> String {
-    let left = count.found - count.bridged;
-    let longest_s = count.longest_bridged as f64 * step_s;
-    let bridged = format!("{} bad cells of `{name}` interpolated linearly (longest run {longest_s:.3} s)", count.bridged);
-    if left == 0 { bridged } else { format!("{bridged}, {left} left without a value") }
 }
 
 fn bridge(values: &mut [f64], bad: &[bool], longest: f64) -> Count {
@@ -89,12 +96,12 @@ mod tests {
         let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
         let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
         let rule = Repair { columns: vec!["m1".into()], valid, max_gap_s: 0.02 };
-        let mut notes = Vec::new();
-        repair(&mut table, &[rule], 0.01, &mut notes)?;
+        let note = repair(&mut table, &[rule], 0.01)?;
         let found = &table.columns[0];
         assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert!(found[0].is_nan() && found[6..9].iter().all(|value| value.is_nan()));
-        assert_eq!(notes, ["2 bad cells of `m1` interpolated linearly (longest run 0.020 s), 4 left without a value"]);
+        let expected = "bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`; bad cells left without a value: 4 of `m1`";
+        assert_eq!(note.as_deref(), Some(expected));
         Ok(())
     }
 }
