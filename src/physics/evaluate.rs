@@ -77,6 +77,9 @@ pub fn quantity(flight: &Flight, name: &str) -> Option<Vec<f64>> {
     Some((0..flight.len()).map(value).collect())
 }
 
+/// What is done with a block: its range of samples, and one column a term.
+pub(super) type Visit<'a> = dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()> + 'a;
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
     State(Column),
@@ -189,12 +192,7 @@ impl Program {
     }
 
     /// Runs from the flight's first sample to `end`, and hands over each block's range and its values, one column a term.
-    pub(super) fn run(
-        &mut self,
-        flight: &Flight,
-        end: usize,
-        visit: &mut dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()>,
-    ) -> Result<()> {
+    pub(super) fn run(&mut self, flight: &Flight, end: usize, visit: &mut Visit<'_>) -> Result<()> {
         let end = end.min(flight.len());
         let Self { sources, extras, terms, .. } = self;
         let whole: Vec<&[f64]> = sources
