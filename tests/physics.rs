@@ -88,6 +88,7 @@ fn the_baseline_is_equations_14_and_15_by_hand() -> Result<()> {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn turning_axes_do_no_work_and_gravity_keeps_its_length(state in prop::array::uniform16(-3.0..3.0f64)) {
         let v: [f64; 3] = [state[6], state[7], state[8]];
