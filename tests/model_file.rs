@@ -112,6 +112,14 @@ fn faults_are_refused_with_line_found_and_expected() -> Result<()> {
         (effect("kind = \"linear_drag\"\ncoefficients = { a_w = 1.0 }"), vec!["`effect.coefficients.a_w`", "did you mean `a_x`?"]),
         (effect("kind = \"linear_drag\"\ncoefficient = 1.0"), vec!["`effect.coefficient`", "did you mean `coefficients`?"]),
         (effect("kind = \"linear_drag\"\nci95 = { a_x = [2.0, 1.0] }"), vec!["`effect.ci95.a_x`", "the lower end first"]),
+        (
+            effect("kind = \"formula\"\nname = \"gravity\"\nchannel = \"vx_dot\"\nformula = \"vx\""),
+            vec!["line 6", "the name of an effect of the baseline"],
+        ),
+        (
+            effect("kind = \"formula\"\nname = \"f\"\nchannel = \"vx_dot\"\nformula = \"vx\"\nparameters = { vy = 1.0 }"),
+            vec!["`f.vy`", "a parameter with the name of a column"],
+        ),
         (effect("kind = \"gravity\"\n[[effect]]\nkind = \"gravity\""), vec!["a second effect `gravity`"]),
         (
             effect("kind = \"formula\"\nname = \"f\"\nchannel = \"wx_dott\"\nformula = \"vx\""),

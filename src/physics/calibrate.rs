@@ -284,6 +284,10 @@ impl Layout {
                 let (name, regressor) = describe(*index);
                 format!("the flights do not determine {name}: its regressor {regressor} is zero in every row; {advice}")
             }
+            Failure::Overflow(index) => {
+                let (name, regressor) = describe(*index);
+                format!("the regressor {regressor} behind {name} reaches numbers too large to square; scale the formula down")
+            }
             Failure::TooFewRows(rows) => {
                 format!("{rows} rows cannot determine {} coefficients; give longer flights", members.len())
             }

@@ -110,6 +110,8 @@ pub(super) enum Failure {
     Zero(usize),
     /// These coefficients' columns are linearly dependent, to the given condition number.
     Dependent(Vec<usize>, f64),
+    /// Some number behind this coefficient's column is too large to square.
+    Overflow(usize),
     /// Fewer rows than coefficients, or no more.
     TooFewRows(usize),
 }
@@ -206,7 +208,11 @@ impl Fit {
         let triangle = stacked.finish().0;
         let design = triangle.view((0, 0), (wanted, wanted));
         let norms: Vec<f64> = design.column_iter().map(|column| column.norm()).collect();
-        if let Some(index) = norms.iter().position(|norm| *norm == 0.0) {
+        // Not-a-number must not reach the iterations below. It spreads to the right, so the first column is the culprit.
+        if let Some(index) = triangle.column_iter().position(|column| !column.norm_squared().is_finite()) {
+            return Err(Failure::Overflow(index.min(wanted - 1)));
+        }
+        if let Some(index) = norms.iter().position(|norm| *norm < f64::MIN_POSITIVE / f64::EPSILON) {
             return Err(Failure::Zero(index));
         }
         let scale = DMatrix::from_diagonal(&DVector::from_iterator(wanted, norms.iter().map(|norm| 1.0 / norm)));
@@ -299,4 +305,117 @@ fn jackknife(fit: &Fit, clusters: &[Information]) -> Vec<f64> {
         }
     }
     variances
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+
+    /// Rows `[x1, x2, y]` of a wobbly plane, in clusters of unequal length, two to the first flight.
+    fn rows() -> Vec<Vec<[f64; 3]>> {
+        let wobble = |k: usize, a: f64| ((k as f64 * a).sin() * 43.7).fract();
+        let mut next = 0;
+        [300, 420, 700, 90, 511]
+            .map(|length| {
+                next += length;
+                (next - length..next)
+                    .map(|k| [wobble(k, 0.7), 0.3 + wobble(k, 1.3), 2.0 * wobble(k, 0.7) + wobble(k / 40, 2.1)])
+                    .collect()
+            })
+            .to_vec()
+    }
+
+    fn clusters(rows: &[Vec<[f64; 3]>], flights: &[usize]) -> Vec<Cluster> {
+        rows.iter()
+            .zip(flights)
+            .map(|(rows, &flight)| {
+                let mut factor = Factor::new(3);
+                let columns: Vec<Vec<f64>> = (0..3).map(|column| rows.iter().map(|row| row[column]).collect()).collect();
+                // Added in pieces of a length that fits no block.
+                for start in (0..rows.len()).step_by(77) {
+                    let end = (start + 77).min(rows.len());
+                    factor.add(&columns.iter().map(|column| &column[start..end]).collect::<Vec<_>>());
+                }
+                Cluster { flight, factors: vec![factor] }
+            })
+            .collect()
+    }
+
+    fn by_normal_equations<'a>(rows: impl Iterator<Item = &'a [f64; 3]>) -> [f64; 2] {
+        let (mut a, mut b, mut c, mut d, mut e) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for [x1, x2, y] in rows {
+            (a, b, c, d, e) = (a + x1 * x1, b + x1 * x2, c + x2 * x2, d + x1 * y, e + x2 * y);
+        }
+        let determinant = a * c - b * b;
+        [(c * d - b * e) / determinant, (a * e - b * d) / determinant]
+    }
+
+    fn problem() -> Problem {
+        Problem { coefficients: 2, channels: vec![(0, vec![0, 1])] }
+    }
+
+    #[test]
+    fn estimate_and_jackknife_are_those_of_refitting() -> Result<(), Failure> {
+        let rows = rows();
+        let mut clusters = clusters(&rows, &[0, 0, 1, 2, 3]);
+        let solution = solve(&problem(), &mut clusters)?;
+        let expected = by_normal_equations(rows.iter().flatten());
+        let (wide, count) = (embed(&total(&clusters, 0, 3).0, &[0, 1], 2), 2021);
+        let fit = Fit::new(&[(wide, count)], &[1.0], 2)?;
+        let information: Vec<Information> =
+            clusters.iter().map(|cluster| Information::of(cluster, &problem(), &[1.0], &fit)).collect();
+        let variances = jackknife(&fit, &information);
+        for index in 0..2 {
+            assert!((solution.values[index] - expected[index]).abs() < Tolerance::Close.relative_f64());
+            let refitted: f64 = (0..5)
+                .map(|left_out| {
+                    let others = rows.iter().enumerate().filter(|(cluster, _)| *cluster != left_out).flat_map(|(_, rows)| rows);
+                    (by_normal_equations(others)[index] - expected[index]).powi(2) * 4.0 / 5.0
+                })
+                .sum();
+            assert!((variances[index] - refitted).abs() < Tolerance::Close.relative_f64() * refitted, "{variances:?} {refitted}");
+            assert!(fit.effective_clusters(&information, index) <= 5.0);
+        }
+        assert_eq!(merge_neighbours(&information).len(), 4);
+        Ok(())
+    }
+
+    #[test]
+    fn shared_coefficients_trust_the_quieter_channel() -> Result<(), Failure> {
+        // y = 2 x exactly in one channel, y = 5 x plus a lot of noise in the other.
+        let noise = |k: usize| 100.0 * (k as f64 * 12.9898).sin();
+        let x: Vec<f64> = (0..4000).map(|k| (k as f64 * 0.37).cos()).collect();
+        let quiet: Vec<f64> = x.iter().enumerate().map(|(k, x)| 2.0 * x + 1e-3 * noise(k)).collect();
+        let loud: Vec<f64> = x.iter().enumerate().map(|(k, x)| 5.0 * x + noise(k)).collect();
+        let mut clusters: Vec<Cluster> = (0..8)
+            .map(|index| {
+                let part = index * 500..(index + 1) * 500;
+                let mut factors = vec![Factor::new(2), Factor::new(2)];
+                factors[0].add(&[&x[part.clone()], &quiet[part.clone()]]);
+                factors[1].add(&[&x[part.clone()], &loud[part]]);
+                Cluster { flight: 0, factors }
+            })
+            .collect();
+        let problem = Problem { coefficients: 1, channels: vec![(0, vec![0]), (1, vec![0])] };
+        let found = solve(&problem, &mut clusters)?.values[0];
+        // The loud channel's variance is 1e6 times the quiet one's, and pulls by 3 / 1e6 at most; its noise by about as much.
+        assert!((found - 2.0).abs() < 1e-2, "{found}");
+        Ok(())
+    }
+
+    #[test]
+    fn columns_that_cannot_be_told_apart_or_squared_are_reported() {
+        let case = |f: &dyn Fn(f64) -> [f64; 2]| {
+            let x: Vec<f64> = (0..600).map(|k| 1.0 + (f64::from(k) * 0.1).sin()).collect();
+            let columns: [Vec<f64>; 2] = [x.iter().map(|x| f(*x)[0]).collect(), x.iter().map(|x| f(*x)[1]).collect()];
+            let mut factor = Factor::new(3);
+            factor.add(&[&columns[0], &columns[1], &x]);
+            solve(&problem(), &mut [Cluster { flight: 0, factors: vec![factor] }]).map(|solution| solution.values)
+        };
+        assert_eq!(case(&|x| [x, 0.0]), Err(Failure::Zero(1)));
+        assert!(matches!(case(&|x| [x, 3.0 * x]), Err(Failure::Dependent(both, _)) if both == [0, 1]));
+        assert_eq!(case(&|x| [x, 1e300 * x]), Err(Failure::Overflow(1)));
+        assert_eq!(case(&|x| [x, 1e-310 * x]), Err(Failure::Zero(1)));
+    }
 }

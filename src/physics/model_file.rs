@@ -65,6 +65,10 @@ impl Model {
             }
             listed.push(effect.name.clone());
             match effects.iter_mut().find(|known| known.name == effect.name) {
+                Some(known) if known.kind != effect.kind => {
+                    let found = format!("`{}`, the name of an effect of the baseline", effect.name);
+                    return Err(section.fault("name", found, "another name"));
+                }
                 Some(known) => *known = effect,
                 None => effects.push(effect),
             }

@@ -217,7 +217,9 @@ fn jacobian(trial: &Trial<'_, f64>) -> Checked {
             let off = distance(&analytic, &expected);
             if !(off <= Tolerance::Approximate.relative_f64()) {
                 let kind = if full { "Jacobian row" } else { "directional derivative" };
-                return Err(trial.fault(format!("operand {operand}, {kind} {row}: off by {off:e}: {analytic:?} against {expected:?}")));
+                return Err(
+                    trial.fault(format!("operand {operand}, {kind} {row}: off by {off:e}: {analytic:?} against {expected:?}"))
+                );
             }
         }
     }
@@ -255,7 +257,11 @@ fn precision(double: &Trial<'_, f64>, single: &Trial<'_, f32>) -> Checked {
     let dx_single = single.backward(&x_single, &numbers(weights, single.result.len()), None)?;
     let forward = distance(&single.forward(&x_single).0, &double.forward(&x).0);
     let worst = dx_single.iter().zip(&dx).map(|(single, double)| distance(single, double)).fold(forward, f64::max);
-    if worst <= Tolerance::Approximate.relative_f32() { Ok(()) } else { Err(double.fault(format!("f32 against f64: off by {worst:e}"))) }
+    if worst <= Tolerance::Approximate.relative_f32() {
+        Ok(())
+    } else {
+        Err(double.fault(format!("f32 against f64: off by {worst:e}")))
+    }
 }
 
 /// Gradients of a whole graph's mean loss: directional derivatives along each parameter tensor, and along all at once.
