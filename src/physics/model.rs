@@ -57,7 +57,7 @@ pub struct Model {
 
 impl Model {
     /// Names of the model's own numbers, usable in every formula: `mass_kg`, `ix iy iz` (kg m²), `rotor_radius_m`,
-    /// `control_delay_s`.
+    /// `control_delay_s`. They come before a further column of the log of the same name.
     pub const CONSTANTS: [&'static str; 6] = ["mass_kg", "ix", "iy", "iz", "rotor_radius_m", "control_delay_s"];
 
     /// The paper's baseline (eqs. 14-15) with all coefficients zero and no control delay.
