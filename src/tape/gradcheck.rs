@@ -17,6 +17,15 @@ use std::fmt;
 /// Step of the central difference for operands of order one: truncation h⁴/30·f⁽⁵⁾ and rounding ε·f/h are both near 1e-13.
 const STEP: f64 = 1e-3;
 
+/// Step for a whole graph along a direction of unit length: small, because thousands of rectifiers have their kinks somewhere.
+const GRAPH_STEP: f64 = 3e-5;
+
+/// Draws at ever smaller steps: the step is divided by three up to this many times, then starts again.
+const STEP_SIZES: u64 = 3;
+
+/// Smallest gradient norm that the derivative along a tensor is measured in: below it, rounding of the loss would show.
+const SMALLEST_NORM: f64 = 1e-3;
+
 /// Points drawn before giving up on finding one away from every kink.
 const ATTEMPTS: u64 = 8;
 
@@ -148,14 +157,14 @@ impl<'a, T: Real> Trial<'a, T> {
 }
 
 /// Four-point central difference of a vector function along the line ε ↦ f(ε); `None` where two steps disagree.
-fn derivative(f: &mut dyn FnMut(f64) -> Vec<f64>) -> Option<Vec<f64>> {
+fn derivative(step: f64, f: &mut dyn FnMut(f64) -> Vec<f64>) -> Option<Vec<f64>> {
     let mut at = |h: f64| -> Vec<f64> {
         let (near, far) = ([f(h), f(-h)], [f(2.0 * h), f(-2.0 * h)]);
         let [plus, minus] = &near;
         let [far_plus, far_minus] = &far;
         (0..plus.len()).map(|i| (8.0 * (plus[i] - minus[i]) - (far_plus[i] - far_minus[i])) / (12.0 * h)).collect()
     };
-    let (coarse, fine) = (at(STEP), at(STEP / 2.0));
+    let (coarse, fine) = (at(step), at(step / 2.0));
     // Half the bound of the comparison is left to the backward pass.
     (distance(&fine, &coarse) < Tolerance::Approximate.relative_f64() / 2.0).then_some(fine)
 }
@@ -194,7 +203,7 @@ fn jacobian(trial: &Trial<'_, f64>) -> Checked {
         let found = (0..ATTEMPTS).find_map(|attempt| {
             let x = trial.operands(attempt);
             let along = |direction: &Vec<f64>| {
-                derivative(&mut |step| {
+                derivative(STEP, &mut |step| {
                     let mut moved = x.clone();
                     moved[operand].iter_mut().zip(direction).for_each(|(x, direction)| *x += step * direction);
                     trial.forward(&moved).0
@@ -278,6 +287,9 @@ pub fn graph(
     session.set_poison(true);
     session.step(parameters, samples, dropout, fill)?;
     let gradients = session.gradients().to_vec();
+    // The loss is computed by the other plan, which keeps nothing for a backward pass.
+    let mut values = Session::infer(graph, &[loss], Threads(1))?;
+    values.set_poison(true);
     let mut moved = parameters.to_vec();
     let tensors = graph.parameters().iter().map(|parameter| (parameter.name.as_str(), parameter.range()));
     for (index, (name, range)) in tensors.chain([("all parameters", 0..parameters.len())]).enumerate() {
@@ -287,32 +299,36 @@ pub fn graph(
         if own.iter().any(|value| !value.is_finite()) || is_zero != zero.contains(&name) {
             return Err(fault("the gradient is not finite, or is zero where it must not be (or the reverse)".into()));
         }
-        // Scaled to unit length, so that tensors of any size move the loss by the same order.
+        // Half along the gradient, so that the derivative is of its order, half at random; of unit length.
+        let norm = if is_zero { 1.0 } else { dot(own, own).sqrt().max(SMALLEST_NORM) };
         let direction = |attempt: u64| {
-            let raw: Vec<f64> = numbers(Stream::new(seed, index as u64, attempt, 0), range.len());
-            let length = dot(&raw, &raw).sqrt();
-            raw.into_iter().map(|value| value / length).collect::<Vec<f64>>()
+            let random: Vec<f64> = numbers(Stream::new(seed, index as u64, attempt, 0), range.len());
+            let length = dot(&random, &random).sqrt();
+            let mixed: Vec<f64> = own.iter().zip(&random).map(|(own, random)| own / norm + random / length).collect();
+            let length = dot(&mixed, &mixed).sqrt();
+            mixed.into_iter().map(|value| value / length).collect::<Vec<f64>>()
         };
         let mut result = None;
         for attempt in 0..ATTEMPTS {
             let direction = direction(attempt);
             let mut failure = None;
-            let numeric = derivative(&mut |step| {
+            let step = GRAPH_STEP / 3_f64.powi((attempt % STEP_SIZES) as i32);
+            let numeric = derivative(step, &mut |step| {
                 for ((to, from), direction) in moved[range.clone()].iter_mut().zip(&parameters[range.clone()]).zip(&direction) {
                     *to = from + step * direction;
                 }
-                let loss = session.step(&moved, samples, dropout, fill);
-                vec![loss.unwrap_or_else(|error| {
+                if let Err(error) = values.step(&moved, samples, dropout, fill) {
                     failure = Some(error);
-                    f64::NAN
-                })]
+                }
+                let sum: f64 = (0..samples).flat_map(|sample| values.output(0, sample)).sum();
+                vec![sum / (samples as f64 * norm)]
             });
             moved[range.clone()].copy_from_slice(&parameters[range.clone()]);
             if let Some(error) = failure {
                 return Err(error.into());
             }
             if let Some(numeric) = numeric {
-                result = Some((dot(own, &direction), numeric));
+                result = Some((dot(own, &direction) / norm, numeric));
                 break;
             }
         }
