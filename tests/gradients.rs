@@ -30,19 +30,26 @@ fn fill<T: Real>(sample: usize, inputs: &mut [&mut [T]]) {
 fn check(config: &PhyTureConfig, samples: usize, dropout: Option<DropoutKey>) -> Result<()> {
     let network = Network::<f64>::new(config, &scale())?;
     let parameters = network.initial(1);
-    // Softmax does not see a constant added to all keys.
-    let zero: &[&str] = if network.parameters().iter().any(|parameter| parameter.name == "paf.key.bias") { &["paf.key.bias"] } else { &[] };
-    gradcheck::graph(network.graph(), network.loss(), &parameters, samples, dropout, &fill, zero, 1)
+    let last = format!("mstfe.{}.", config.stacks - 1);
+    let zero = |name: &str| {
+        // Softmax does not see a constant added to all keys.
+        if name == "paf.key.bias" {
+            return true;
+        }
+        // The last rows alone are read: row 15 is in the odd half of the odd half, rows 13 and 14 in the even half of the odd
+        // and in the odd half of the even half. What only updates other halves of the last tree has no gradient.
+        let Some(node) = name.strip_prefix(&last).filter(|_| config.variant == Variant::WithoutTsdpLastRow) else { return false };
+        let unread: &[&str] = if config.horizon == 1 { &["root.eta", "o.eta", "e."] } else { &["e.eta"] };
+        unread.iter().any(|prefix| node.starts_with(prefix))
+    };
+    gradcheck::graph(network.graph(), network.loss(), &parameters, samples, dropout, &fill, &zero, 1)
         .map_err(|disagreement| Error::Undetermined(format!("{:?}, {dropout:?}: {disagreement}", config.variant)))
 }
 
 #[test]
 fn every_variant_has_the_gradients_of_its_loss() -> Result<()> {
-    for variant in Variant::ALL {
-        check(&small(variant), 2, None)?;
-        check(&small(variant), 2, Some(KEY))?;
-    }
-    Ok(())
+    check(&small(Variant::PhyTure), 2, None)?;
+    Variant::ALL.into_iter().try_for_each(|variant| check(&small(variant), 2, Some(KEY)))
 }
 
 #[test]

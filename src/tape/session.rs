@@ -494,7 +494,7 @@ mod tests {
         assert!((whole - sum / 5.0).abs() < Tolerance::Close.relative_f64());
         assert!(gradients.iter().zip(&sums).all(|(whole, sum)| (whole - sum / 5.0).abs() < Tolerance::Close.relative_f64()));
         assert_eq!(gradients[..3], [0.0; 3], "a parameter that nothing reads has gradient zero");
-        gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &["unused"], 3)
+        gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &|name| name == "unused", 3)
             .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
     }
 
@@ -546,8 +546,10 @@ mod tests {
             let mut lean = Session::train(&graph, loss, &[], Threads(1))?;
             lean.step(&parameters, 3, None, &fill)?;
             prop_assert_eq!(lean.gradients(), plain.gradients());
-            let zero: Vec<&str> = graph.parameters().iter().filter(|parameter| plain.gradients()[parameter.range()].iter().all(|value| *value == 0.0)).map(|parameter| parameter.name.as_str()).collect();
-            if zero.len() < graph.parameters().len() {
+            // A parameter whose value nothing reads on has no gradient; that the others have the right one is checked.
+            let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(|value| *value == 0.0);
+            let zero = |name: &str| graph.parameters().iter().any(|parameter| parameter.name == name && still(parameter));
+            if !graph.parameters().iter().all(still) {
                 let checked = gradcheck::graph(&graph, loss, &parameters, 2, None, &fill, &zero, 5);
                 prop_assert!(checked.is_ok(), "{:?}", checked);
             }
