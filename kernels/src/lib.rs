@@ -26,6 +26,7 @@ pub mod reference;
 pub mod rows;
 pub mod sci;
 pub mod temporal;
+mod tile;
 pub mod tolerance;
 
 pub use level::Level;
