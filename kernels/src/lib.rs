@@ -13,6 +13,7 @@ pub mod adam;
 pub mod attention;
 pub mod conv1d;
 pub mod dropout;
+pub mod elementary;
 pub mod encoding;
 pub mod gemm;
 pub mod layer_norm;

@@ -4,12 +4,14 @@ use std::fmt::{Debug, Display};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+use crate::elementary::Elementary;
+
 /// f32 or f64: one generic source, two instantiations.
 #[rustfmt::skip]
 pub trait Real:
     Copy + Default + Debug + Display + PartialOrd + Send + Sync + 'static + Sum
     + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-    + AddAssign + SubAssign + MulAssign + DivAssign
+    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary
 {
     /// 0
     const ZERO: Self;

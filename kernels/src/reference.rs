@@ -78,10 +78,14 @@ pub fn activation_derivative(kind: Activation, x: f64) -> f64 {
     }
 }
 
-/// erf x = 2/√π · e^(−x²) · Σₙ 2ⁿ x²ⁿ⁺¹ / (2n+1)!!, all terms of one sign (Abramowitz & Stegun 7.1.6).
+/// erf x: below 1 the series 2/√π · e^(−x²) · Σₙ 2ⁿ x²ⁿ⁺¹ / (2n+1)!!, all terms of one sign; above, 1 − erfc x by Laplace's
+/// continued fraction (Abramowitz & Stegun 7.1.6 and 7.1.14).
 pub fn erf(x: f64) -> f64 {
-    if x.abs() > 6.5 {
-        return x.signum();
+    if x.abs() >= 1.0 {
+        const LEVELS: u32 = 200;
+        let z = x.abs();
+        let fraction = (1..=LEVELS).rev().fold(z, |below, n| z + 0.5 * f64::from(n) / below);
+        return (1.0 - (-z * z).exp() / (fraction * std::f64::consts::PI.sqrt())).copysign(x);
     }
     let (mut term, mut total, mut n) = (x, x, 1.0);
     while term.abs() > total.abs() * f64::EPSILON / 16.0 {
