@@ -37,6 +37,7 @@ pub trait Elementary: Sized + 'static {
     fn times_power_of_two(self, rounded: Self) -> Self;
 }
 
+#[expect(clippy::excessive_precision, reason = "decimal digits enough for the exact binary value")]
 impl Elementary for f32 {
     const EXP: &'static [Self] = &[0.5, 0.166665768, 0.0416665544, 0.00836320297, 0.00139262135];
     const TANH: &'static [Self] = &[-0.333333284, 0.133327188, -0.0538432632, 0.0209613291, -0.0060451651];
@@ -57,6 +58,7 @@ impl Elementary for f32 {
     }
 }
 
+#[expect(clippy::excessive_precision, reason = "decimal digits enough for the exact binary value")]
 impl Elementary for f64 {
     const EXP: &'static [Self] = &[
         0.5000000000000001,

@@ -133,3 +133,83 @@ impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::reference;
+    use crate::testing::{Matrix, check_writes};
+    use crate::tolerance::Tolerance;
+
+    fn check<T: Real>(m: usize, k: usize, n: usize, seed: u64) {
+        let (a, b) = (Matrix::<T>::random(seed, (m, k)), Matrix::<T>::random(seed + 1, (k, n)));
+        let (at, bt) = (Matrix::<T>::random(seed, (k, m)), Matrix::<T>::random(seed + 1, (n, k)));
+        let mut expected = [(); 3].map(|()| Matrix::<T>::poisoned(seed, (m, n)));
+        reference::gemm_ab(a.view(), b.view(), expected[0].view_mut());
+        reference::gemm_atb(at.view(), b.view(), expected[1].view_mut());
+        reference::gemm_abt(a.view(), bt.view(), expected[2].view_mut());
+        for level in Level::available() {
+            let mut scratch = vec![T::NAN; scratch_len(m, k, n)];
+            let what = |form: &str| format!("{form} {m} x {k} x {n} at level {level}");
+            check_writes(&what("ab"), &expected[0], Tolerance::Close, |c, write| {
+                ab(level, a.view(), b.view(), c, write, &mut scratch)
+            });
+            check_writes(&what("atb"), &expected[1], Tolerance::Close, |c, write| {
+                atb(level, at.view(), b.view(), c, write, &mut scratch)
+            });
+            check_writes(&what("abt"), &expected[2], Tolerance::Close, |c, write| {
+                abt(level, a.view(), bt.view(), c, write, &mut scratch)
+            });
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn equal_the_triple_loop(m in 0_usize..70, k in 0_usize..70, n in 0_usize..70, seed in 0_u64..1000) {
+            check::<f32>(m, k, n, seed);
+            check::<f64>(m, k, n, seed);
+        }
+    }
+
+    #[test]
+    fn sizes_of_the_networks_and_around_the_blocks() {
+        for (m, k, n) in
+            [(500, 64, 64), (251, 320, 64), (64, 1000, 64), (1, 1000, 64), (1000, 1, 64), (64, 513, 16), (241, 256, 257)]
+        {
+            check::<f32>(m, k, n, 3);
+            check::<f64>(m, k, n, 3);
+        }
+    }
+
+    #[test]
+    fn equal_matrixmultiply() {
+        let (m, k, n) = (123, 320, 64);
+        let (a, b) = (crate::testing::numbers::<f32>(1, m * k), crate::testing::numbers::<f32>(2, k * n));
+        let mut expected = vec![0.0_f32; m * n];
+        // SAFETY: the three pointers cover m x k, k x n and m x n numbers at the row strides given.
+        unsafe {
+            let (row_a, row_b) = (k as isize, n as isize);
+            matrixmultiply::sgemm(m, k, n, 1.0, a.as_ptr(), row_a, 1, b.as_ptr(), row_b, 1, 0.0, expected.as_mut_ptr(), row_b, 1);
+        }
+        for level in Level::available() {
+            let (mut c, mut scratch) = (vec![f32::NAN; m * n], vec![f32::NAN; scratch_len(m, k, n)]);
+            ab(level, Rows::packed(&a, m, k), Rows::packed(&b, k, n), RowsMut::packed(&mut c, m, n), Write::Set, &mut scratch);
+            crate::testing::assert_near("ab against matrixmultiply", &c, &expected, Tolerance::Close);
+        }
+    }
+
+    #[test]
+    fn overlapping_rows_may_be_read() {
+        let a = crate::testing::numbers::<f64>(1, 30);
+        let b = Matrix::<f64>::random(2, (6, 4));
+        let (mut c, mut expected) = (Matrix::<f64>::poisoned(0, (9, 4)), Matrix::<f64>::poisoned(0, (9, 4)));
+        let hankel = Rows::new(&a, 9, 6, 3);
+        reference::gemm_ab(hankel, b.view(), expected.view_mut());
+        let mut scratch = vec![0.0; scratch_len(9, 6, 4)];
+        ab(Level::PLAIN, hankel, b.view(), c.view_mut(), Write::Set, &mut scratch);
+        crate::testing::assert_near("hankel", &c.to_vec(), &expected.to_vec(), Tolerance::Close);
+    }
+}

@@ -27,6 +27,8 @@ pub mod reference;
 pub mod rows;
 pub mod sci;
 pub mod temporal;
+#[cfg(test)]
+mod testing;
 mod tile;
 pub mod tolerance;
 

@@ -37,6 +37,8 @@ pub trait Real:
     fn abs(self) -> Self;
     /// self·a + b, rounded once
     fn mul_add(self, a: Self, b: Self) -> Self;
+    /// Sign bit set: negative, or −0.
+    fn is_sign_negative(self) -> bool;
     /// Neither NaN nor infinite.
     fn is_finite(self) -> bool;
 }
@@ -79,6 +81,10 @@ macro_rules! real {
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
                 $t::mul_add(self, a, b)
+            }
+            #[inline(always)]
+            fn is_sign_negative(self) -> bool {
+                $t::is_sign_negative(self)
             }
             #[inline(always)]
             fn is_finite(self) -> bool {

@@ -161,14 +161,14 @@ pub fn attention_backward<T: Real>(
         let at = |m: &Rows<'_, T>, i: usize, c: usize| m.row(i)[h * size + c].f64();
         // dS = P∘(dP − Σ_j P∘dP), where dP holds the dropout factor of each element.
         let mut d_scores = vec![vec![0.0; k.rows()]; q.rows()];
-        for i in 0..q.rows() {
+        for (i, d_scores) in d_scores.iter_mut().enumerate() {
             let d_probability = |j: usize| {
                 let factor = dropout.map_or(1.0, |mask| if mask.keeps(h * q.rows() + i, j) { mask.scale() } else { 0.0 });
                 factor * (0..size).map(|c| at(&d_o, i, c) * at(&v, j, c)).sum::<f64>()
             };
             let mean: f64 = (0..k.rows()).map(|j| map[i][j].0 * d_probability(j)).sum();
             for j in 0..k.rows() {
-                d_scores[i][j] = map[i][j].0 * (d_probability(j) - mean) * scale;
+                d_scores[j] = map[i][j].0 * (d_probability(j) - mean) * scale;
             }
         }
         for c in 0..size {

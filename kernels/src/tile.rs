@@ -124,9 +124,7 @@ pub(crate) fn pack_transposed<'b, T: Real, const NR: usize>(
 #[inline(always)]
 fn spill<T: Real, const MR: usize, const NR: usize>(acc: &[[T; NR]; MR]) -> [[T; NR]; MR] {
     let mut copy = [[T::ZERO; NR]; MR];
-    for i in 0..MR {
-        copy[i] = acc[i];
-    }
+    copy.iter_mut().zip(acc).for_each(|(copy, acc)| *copy = *acc);
     copy
 }
 
@@ -233,7 +231,14 @@ pub(crate) fn columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR
                     }
                 }
             } else {
-                narrow_columns::<T, I, S, MR, NR>(depth, (i, MR.min(m - i)), (j, NR.min(n - j)), &left, &right, sink);
+                narrow_columns::<T, I, S, MR, NR>(
+                    depth,
+                    (i_wanted, MR.min(m - i_wanted)),
+                    (j_wanted, NR.min(n - j_wanted)),
+                    &left,
+                    &right,
+                    sink,
+                );
             }
         }
     }
