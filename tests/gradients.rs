@@ -10,7 +10,16 @@ use phyture_kernels::{Real, Tolerance};
 const KEY: DropoutKey = DropoutKey { seed: 11, step: 7 };
 
 fn small(variant: Variant) -> PhyTureConfig {
-    PhyTureConfig { history: 16, d_model: 8, heads: 2, levels: 2, stacks: 2, moving_average: 5, variant, ..PhyTureConfig::default() }
+    PhyTureConfig {
+        history: 16,
+        d_model: 8,
+        heads: 2,
+        levels: 2,
+        stacks: 2,
+        moving_average: 5,
+        variant,
+        ..PhyTureConfig::default()
+    }
 }
 
 fn scale() -> OutputScale {
@@ -66,7 +75,12 @@ fn unusual_sizes_have_the_gradients_of_their_loss() -> Result<()> {
     Ok(())
 }
 
-fn gradients<T: Real>(config: &PhyTureConfig, parameters: &[T], threads: usize, dropout: Option<DropoutKey>) -> Result<(f64, Vec<T>)> {
+fn gradients<T: Real>(
+    config: &PhyTureConfig,
+    parameters: &[T],
+    threads: usize,
+    dropout: Option<DropoutKey>,
+) -> Result<(f64, Vec<T>)> {
     let network = Network::<T>::new(config, &scale())?;
     let mut session = Session::train(network.graph(), network.loss(), &[], Threads(threads))?;
     let loss = session.step(parameters, 9, dropout, &fill)?;

@@ -47,8 +47,10 @@ pub struct Worst {
 pub fn compare(path: &Path, threads: Threads) -> Result<Parity> {
     let file = SafeTensors::read(path)?;
     let fault = |message: String| Error::File { path: path.into(), message };
-    let config = file.metadata.get("config").ok_or_else(|| fault("no `config` in the metadata; export it with the weights".into()))?;
-    let config: PhyTureConfig = serde_json::from_str(config).map_err(|error| fault(format!("`config` in the metadata: {error}")))?;
+    let config =
+        file.metadata.get("config").ok_or_else(|| fault("no `config` in the metadata; export it with the weights".into()))?;
+    let config: PhyTureConfig =
+        serde_json::from_str(config).map_err(|error| fault(format!("`config` in the metadata: {error}")))?;
     let run = match file.tensors.get("input.state").map(|tensor| &tensor.numbers) {
         Some(Numbers::F32(_)) => run::<f32>,
         Some(Numbers::F64(_)) => run::<f64>,
@@ -245,7 +247,10 @@ mod tests {
         for variant in Variant::ALL {
             let parity = compared(&own_file(variant)?)?;
             assert!(parity.relative_error.values().all(|&error| error == 0.0), "{variant:?}: {:?}", parity.worst);
-            assert_eq!(parity.relative_error.contains_key("grad.param.paf.query.weight"), variant == Variant::PhyTure || variant.reads_physics() && variant.predicts_residual());
+            assert_eq!(
+                parity.relative_error.contains_key("grad.param.paf.query.weight"),
+                variant == Variant::PhyTure || variant.reads_physics() && variant.predicts_residual()
+            );
             assert!(!parity.relative_error.contains_key("grad.param.paf.key.bias"));
         }
         Ok(())

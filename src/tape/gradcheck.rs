@@ -68,7 +68,7 @@ fn numbers<T: Real>(stream: Stream, count: usize) -> Vec<T> {
     (0..count as u64).map(|index| T::of(f64::from(number(index) as f32))).collect()
 }
 
-/// Largest difference over the largest reference magnitude, never below one unit; infinite for NaN or other lengths.
+/// Largest difference over the largest reference magnitude, never below one unit; infinite, never NaN, for numbers that are not finite or other lengths.
 fn distance<A: Real, B: Real>(found: &[A], expected: &[B]) -> f64 {
     if found.len() != expected.len() {
         return f64::INFINITY;
@@ -78,7 +78,8 @@ fn distance<A: Real, B: Real>(found: &[A], expected: &[B]) -> f64 {
         let difference = (a.f64() - b.f64()).abs();
         if difference.is_nan() { f64::INFINITY } else { worst.max(difference) }
     };
-    found.iter().zip(expected).fold(0.0, worst) / scale
+    let relative = found.iter().zip(expected).fold(0.0, worst) / scale;
+    if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
 /// One operation at fixed shapes: plain calls without graph or session.
@@ -224,9 +225,11 @@ fn jacobian(trial: &Trial<'_, f64>) -> Checked {
             let analytic: Vec<f64> = directions.iter().map(|direction| dot(&dx[operand], direction)).collect();
             let expected: Vec<f64> = numeric.iter().map(|column| dot(column, dy)).collect();
             let off = distance(&analytic, &expected);
-            if !(off <= Tolerance::Approximate.relative_f64()) {
+            if off > Tolerance::Approximate.relative_f64() {
                 let kind = if full { "Jacobian row" } else { "directional derivative" };
-                return Err(trial.fault(format!("operand {operand}, {kind} {row}: off by {off:e}: {analytic:?} against {expected:?}")));
+                return Err(
+                    trial.fault(format!("operand {operand}, {kind} {row}: off by {off:e}: {analytic:?} against {expected:?}"))
+                );
             }
         }
     }
@@ -248,7 +251,7 @@ fn rules(trial: &Trial<'_, f64>) -> Checked {
         let combined: Vec<f64> = set.iter().zip(&other[operand]).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
         for (rule, found, expected) in [("set, then add", &twice[operand], double), ("linear in dy", &mixed[operand], combined)] {
             let off = distance(found, &expected);
-            if !(off <= Tolerance::Close.relative_f64()) {
+            if off > Tolerance::Close.relative_f64() {
                 return Err(trial.fault(format!("operand {operand}: {rule}: off by {off:e}")));
             }
         }
@@ -264,7 +267,11 @@ fn precision(double: &Trial<'_, f64>, single: &Trial<'_, f32>) -> Checked {
     let dx_single = single.backward(&x_single, &numbers(weights, single.result.len()), None)?;
     let forward = distance(&single.forward(&x_single).0, &double.forward(&x).0);
     let worst = dx_single.iter().zip(&dx).map(|(single, double)| distance(single, double)).fold(forward, f64::max);
-    if worst <= Tolerance::Approximate.relative_f32() { Ok(()) } else { Err(double.fault(format!("f32 against f64: off by {worst:e}"))) }
+    if worst <= Tolerance::Approximate.relative_f32() {
+        Ok(())
+    } else {
+        Err(double.fault(format!("f32 against f64: off by {worst:e}")))
+    }
 }
 
 /// Gradients of a whole graph's mean loss: directional derivatives along each parameter tensor, and along all at once.
@@ -336,7 +343,7 @@ pub fn graph(
             return Err(fault(format!("no smooth direction in {ATTEMPTS} draws")));
         };
         let off = distance(&[analytic], &numeric);
-        if !(off <= Tolerance::Approximate.relative_f64()) {
+        if off > Tolerance::Approximate.relative_f64() {
             return Err(fault(format!("directional derivative off by {off:e}: {analytic:e} against {numeric:?}")));
         }
     }

@@ -1,8 +1,10 @@
 //! Planning: from a graph to two flat lists of steps and one slab in which every buffer has a fixed place.
 //!
-//! 1. Keep what the loss and the outputs need. 2. Derive the backward list: the operations on a path from a parameter (or an
-//! input whose gradient is asked for) to the loss, in reverse. 3. The first writer of each gradient sets, later ones add: no
-//! pass fills zeros. 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
+//! 1. Keep what the loss and the outputs need.
+//! 2. Derive the backward list: the operations on a path from a parameter (or an input whose gradient is asked for) to the loss,
+//!    in reverse.
+//! 3. The first writer of each gradient sets, later ones add: no pass fills zeros.
+//! 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
 //!
 //! A plan holds no numbers; `session` replays it.
 

@@ -177,7 +177,13 @@ impl<T: Real> Session<T> {
     ///
     /// # Errors
     /// As [`Session::step`].
-    pub fn predict(&mut self, parameters: &[T], samples: usize, fill: Fill<'_, T>, each: &mut dyn FnMut(usize, &[T])) -> Result<()> {
+    pub fn predict(
+        &mut self,
+        parameters: &[T],
+        samples: usize,
+        fill: Fill<'_, T>,
+        each: &mut dyn FnMut(usize, &[T]),
+    ) -> Result<()> {
         self.step(parameters, samples, None, fill)?;
         let output_len = self.plan.outputs.iter().map(ExactSizeIterator::len).sum();
         let result_len = self.result_len();
