@@ -3,6 +3,8 @@
 //! This file holds the plain types. Reading files, checking them, deriving accelerations, cutting into blocks and windows
 //! are in the sibling files. No physics here: a [`Flight`] knows what was recorded, not why.
 
+pub mod atomic;
+pub mod attitude;
 mod column;
 
 pub use column::Column;
