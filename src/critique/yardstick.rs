@@ -5,17 +5,15 @@
 //! here: errors and tables are made by whoever gets the [`Row`]s.
 
 use super::Row;
+use super::blocks::{BLOCK_S, Blocks};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, GRAVITY_M_S2, Window};
+use crate::flight::attitude::{cross, gravity_body};
+use crate::flight::{Column, Flight, Window};
 use nalgebra::{Cholesky, DMatrix};
 use ndarray::{Array1, Array2};
 
 /// v and ω, whose differences are the targets in the order of [`Column::TARGETS`].
 const VELOCITIES: [Column; 6] = [Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
-
-/// Length of the blocks that cross-validation keeps together, s. Neighbouring rows share gusts and history; blocks of this
-/// length are about independent.
-const BLOCK_S: f64 = 10.0;
 
 /// Folds of the cross-validation over blocks.
 const FOLDS: usize = 5;
@@ -133,18 +131,13 @@ impl RidgeInput {
                 None => fault(format!("`{name}`"), "a column that every flight has"),
             },
             Self::Gravity(axis) if *axis < 3 => {
-                let (roll, pitch) = (flight.column(Column::Roll), flight.column(Column::Pitch));
-                let at = |(&roll, &pitch): (&f64, &f64)| {
-                    GRAVITY_M_S2 * [-pitch.sin(), roll.sin() * pitch.cos(), roll.cos() * pitch.cos()][*axis]
-                };
-                Ok(roll.iter().zip(pitch).map(at).collect())
+                let angles = flight.column(Column::Roll).iter().zip(flight.column(Column::Pitch));
+                Ok(angles.map(|(&roll, &pitch)| gravity_body(roll, pitch)[*axis]).collect())
             }
             Self::Coriolis(axis) if *axis < 3 => {
-                let (next, after) = ((axis + 1) % 3, (axis + 2) % 3);
+                let at = |columns: [Column; 3], row: usize| columns.map(|column| flight.column(column)[row]);
                 let (v, w) = ([Column::Vx, Column::Vy, Column::Vz], [Column::Wx, Column::Wy, Column::Wz]);
-                let (v_next, v_after) = (flight.column(v[next]), flight.column(v[after]));
-                let (w_next, w_after) = (flight.column(w[next]), flight.column(w[after]));
-                Ok((0..flight.len()).map(|k| w_after[k] * v_next[k] - w_next[k] * v_after[k]).collect())
+                Ok((0..flight.len()).map(|row| cross(at(v, row), at(w, row))[*axis]).collect())
             }
             Self::Gravity(axis) | Self::Coriolis(axis) => fault(format!("axis {axis}"), "axis 0, 1 or 2"),
         }
@@ -264,15 +257,9 @@ impl Ridge {
     }
 }
 
-/// The fold of each window: 10-s blocks of each flight in turn go to fold 0, 1, … .
+/// The fold of each window: blocks in turn go to fold 0, 1, … .
 fn folds(flights: &[Flight], windows: &[Window]) -> Result<Vec<usize>> {
-    let block_of = |window: &Window| {
-        let step_s = flights.get(window.flight).map_or(BLOCK_S, |flight| flight.step_s);
-        (window.flight, (window.last as f64 * step_s / BLOCK_S) as usize)
-    };
-    let mut blocks: Vec<(usize, usize)> = windows.iter().map(block_of).collect();
-    blocks.sort_unstable();
-    blocks.dedup();
+    let blocks = Blocks::new(flights, windows);
     if blocks.len() < 2 {
         return Err(Error::Undetermined(format!(
             "ridge regression chooses its penalty by leaving out blocks of {BLOCK_S} s, and the {} training windows fill {}; \
@@ -281,7 +268,7 @@ fn folds(flights: &[Flight], windows: &[Window]) -> Result<Vec<usize>> {
             blocks.len()
         )));
     }
-    Ok(windows.iter().map(|window| blocks.binary_search(&block_of(window)).unwrap_or_default() % FOLDS).collect())
+    Ok(blocks.of_window.into_iter().map(|block| block % FOLDS).collect())
 }
 
 /// The inputs of every flight that a window needs, row-major `[sample, input]`.
@@ -531,10 +518,10 @@ mod tests {
         });
         let other = [Flight::new("cut", "cut", 0.0, 0.01, cut, Targets::Recorded).unwrap()];
         let one = ridge.predict(&flights, &windows(0, 10..200)).unwrap();
-        assert_eq!(one, ridge.predict(&other, &windows(0, 10..200)).unwrap());
+        assert_eq!(one.predicted, ridge.predict(&other, &windows(0, 10..200)).unwrap().predicted);
         assert_eq!(
-            finite_difference(&flights, &windows(0, 1..200)).unwrap(),
-            finite_difference(&other, &windows(0, 1..200)).unwrap()
+            finite_difference(&flights, &windows(0, 1..200)).unwrap().predicted,
+            finite_difference(&other, &windows(0, 1..200)).unwrap().predicted
         );
     }
 
