@@ -6,6 +6,8 @@
 pub mod atomic;
 pub mod attitude;
 mod column;
+pub mod split;
+pub mod windows;
 
 pub use column::Column;
 

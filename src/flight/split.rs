@@ -5,7 +5,7 @@
 
 use super::{Flight, Span};
 use crate::error::{Error, Result};
-use phyture_kernels::random::shuffle;
+use phyture_kernels::random::permutation;
 use std::fmt;
 use std::str::FromStr;
 
@@ -64,7 +64,9 @@ impl FromStr for Protocol {
                 place: "split".into(),
                 field: "split".into(),
                 found: format!("`{text}`"),
-                expected: "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`".into(),
+                expected:
+                    "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`"
+                        .into(),
             }),
         }
     }
@@ -116,7 +118,8 @@ impl Split {
         let split = if locked.is_empty() { by_protocol(flights, protocol, seed) } else { by_name(flights, locked)? };
         for (spans, part) in [(&split.training, "train"), (&split.test, "test")] {
             if spans.is_empty() {
-                let rule = if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
+                let rule =
+                    if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
                 return Err(Error::Undetermined(format!(
                     "{rule} leaves no samples to {part} on, of {} flights and {:.0} s; give more or longer flights, or another split",
                     flights.len(),
@@ -159,8 +162,9 @@ fn by_protocol(flights: &[Flight], protocol: &Protocol, seed: u64) -> Split {
             }
         }
         Protocol::Segments => {
-            let mut segments: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
-            shuffle(&mut segments, seed);
+            let sorted: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
+            let mut segments: Vec<Span> =
+                permutation(sorted.len(), seed, 0).into_iter().map(|index| sorted[index as usize]).collect();
             let training = (segments.len() as f64 * TRAINING_SHARE).round() as usize;
             let validation = (segments.len() as f64 * VALIDATION_SHARE).round() as usize;
             // A test segment is worth more than a validation one when there are only a few.
@@ -207,7 +211,7 @@ pub fn class_folds(classes: &[&str], folds: usize) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::{Column, Targets};
+    use crate::flight::Targets;
     use proptest::prelude::*;
 
     fn flights(lengths: &[usize]) -> Vec<Flight> {
