@@ -1,6 +1,7 @@
 //! The critique: where a model fails against the measurements, and by how much.
 
 pub mod blocks;
+pub mod check;
 pub mod compare;
 pub mod locate;
 pub mod regime;
