@@ -79,8 +79,9 @@ pub(super) fn start_height(class: &str) -> f64 {
     match class {
         "hover_low" => 1.5,
         "hover" | "control_steps" | "pirouettes" => 8.0,
+        "descents" => 40.0,
         "vertical_sweeps" | "orientation_sweeps" | "turn_demos1" | "dodging_demos" | "stop_and_go" => 20.0,
-        _ => 45.0,
+        _ => 55.0,
     }
 }
 
@@ -102,15 +103,18 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
     let mut fly = |seconds: f64, height: f64, goal: Goal| segments.push(Segment { seconds, height, goal });
     let spread = |random: &mut Random, value: f64| value * random.between(0.75, 1.25);
     match class {
-        "hover" => fly(random.between(3.0, 6.0), random.between(4.0, 12.0), path(0.0, 0.0, 0.0)),
+        // Heights evenly spread in their logarithm, so that the ground is felt in half of them.
+        "hover" => fly(random.between(3.0, 6.0), 0.8 * random.between(0.0, 10.0_f64.ln()).exp(), path(0.0, 0.0, 0.0)),
         "hover_low" => {
             let (ahead, right) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
-            fly(random.between(2.5, 5.0), random.between(0.6, 3.0), path(ahead, right, random.between(-0.4, 0.4)));
+            fly(random.between(2.5, 5.0), random.between(0.8, 3.0), path(ahead, right, random.between(-0.4, 0.4)));
         }
         "vertical_sweeps" => {
             let periods = [random.between(5.0, 7.0), random.between(2.0, 3.5)];
-            let climb = random.between(2.0, 5.0);
-            fly(14.0, home, Goal::Sweep { ahead: 0.0, right: 0.0, climb, turn: 0.0, periods, inverted: false });
+            let (height, climb) =
+                if random.uniform() < 0.5 { (2.6, random.between(0.5, 1.0)) } else { (home, random.between(2.0, 5.0)) };
+            fly(3.0, height, path(0.0, 0.0, 0.0));
+            fly(14.0, height, Goal::Sweep { ahead: 0.0, right: 0.0, climb, turn: 0.0, periods, inverted: false });
         }
         "orientation_sweeps" => {
             let (bank, pitch) = ((random.between(0.3, 0.9)) * random.sign(), random.between(0.3, 0.8) * random.sign());
@@ -157,12 +161,20 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             fly(random.between(1.8, 2.6), home, path(ahead, 0.0, 0.0));
         }
         "descents" => {
+            // Down, round out, hover low, and back up.
             let (ahead, sink) = (random.between(0.0, 10.0), random.between(2.5, 7.5));
-            let down =
-                |climb| Goal::Path { ahead, right: 0.0, climb: Some(climb), nose_turn: 0.0, path_turn: 0.1, inverted: false };
-            fly(30.0 / sink, home, down(-sink));
-            fly(5.5, home, down(random.between(4.0, 5.5)));
-            fly(1.5, home, path(ahead, 0.0, 0.0));
+            let climb = |climb, ahead| Goal::Path {
+                ahead,
+                right: 0.0,
+                climb: Some(climb),
+                nose_turn: 0.0,
+                path_turn: 0.1,
+                inverted: false,
+            };
+            fly(34.0 / sink, home, climb(-sink, ahead));
+            fly(3.0, 5.0, path(0.0, 0.0, 0.0));
+            fly(random.between(3.0, 5.0), random.between(1.0, 3.0), path(0.0, 0.0, 0.0));
+            fly(6.5, home, climb(random.between(4.0, 5.5), ahead));
         }
         "loops" => {
             fly(3.0, home, path(12.0, 0.0, random.between(-0.3, 0.3)));
@@ -183,13 +195,13 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             fly(2.0, home, path(4.0, 0.0, 0.0));
         }
         "stall_turns" => {
+            // Pull up into a climb, coast, turn about the mast near the top, and dive out.
             fly(3.5, home, path(13.0, 0.0, 0.0));
-            fly(0.6, home, rates([0.0, 2.4, 0.0], 1.3, 0.3));
-            fly(random.between(0.6, 1.0), home, rates([0.0; 3], 0.15, 0.0));
-            let turn = random.sign() * random.between(3.0, 4.0);
+            fly(1.0, home, rates([0.0, 1.4, 0.0], 1.7, 0.3));
+            fly(random.between(0.1, 0.4), home, rates([0.0; 3], 0.15, 0.0));
+            let turn = random.sign() * random.between(3.5, 4.5);
             fly(PI / turn.abs(), home, rates([0.0, 0.0, turn], 0.1, 0.0));
-            fly(0.4, home, rates([0.0; 3], 0.1, 0.0));
-            fly(3.0, home, path(9.0, 0.0, 0.0));
+            fly(3.5, home, path(9.0, 0.0, 0.0));
         }
         "inverted_flight" => {
             let (ahead, right) = (random.between(-5.0, 7.0), random.between(-3.0, 3.0));

@@ -138,7 +138,7 @@ impl Mechanisms {
     }
 
     /// Largest scale: beyond it the pilot is not shown to keep the aircraft in the air.
-    pub const MAX_SCALE: f64 = 3.0;
+    pub const MAX_SCALE: f64 = 2.0;
 }
 
 impl Serialize for Mechanisms {

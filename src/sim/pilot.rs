@@ -18,8 +18,10 @@ const DITHER: [f64; 4] = [0.035, 0.035, 0.06, 0.035];
 const DITHER_TIME_S: f64 = 0.12;
 /// Velocity error to acceleration, 1/s, and its integral, 1/s².
 const VELOCITY_GAIN: [f64; 2] = [1.3, 0.3];
+/// The same for the vertical, where the stick acts on the acceleration itself.
+const CLIMB_GAIN: [f64; 2] = [2.2, 0.9];
 /// Height error to climb, 1/s.
-const HEIGHT_GAIN: f64 = 0.8;
+const HEIGHT_GAIN: f64 = 1.0;
 /// Attitude error to rate, 1/s.
 const ATTITUDE_GAIN: f64 = 3.5;
 /// Rate error to angular acceleration, 1/s, and its integral, 1/s².
@@ -32,7 +34,7 @@ const HORIZONTAL_M_S2: f64 = 9.8;
 const SLEW_M_S2: f64 = 8.0;
 /// Distance from home at which the pilot starts to bring the aircraft back, m.
 const LEASH_M: f64 = 60.0;
-/// Below this height (m), or faster than `FASTEST_M_S`, aerobatics are broken off.
+/// With less than this height in hand (m), or faster than `FASTEST_M_S`, aerobatics are broken off.
 const FLOOR_M: f64 = 15.0;
 const FASTEST_M_S: f64 = 22.0;
 /// Height at which a commanded descent ends, m.
@@ -93,7 +95,10 @@ impl Pilot {
         let Segment { seconds, height, mut goal } =
             segment.unwrap_or(Segment { seconds: f64::INFINITY, height: self.home, goal: hover });
         let speed = state.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-        if matches!(goal, Goal::Rates { .. }) && (self.broken_off || -state.position[2] < FLOOR_M || speed > FASTEST_M_S) {
+        // Height left if the fall is stopped at half a g.
+        let fall = to_local(&rotation, state.velocity)[2].max(0.0);
+        let margin = -state.position[2] - fall * fall / GRAVITY_M_S2;
+        if matches!(goal, Goal::Rates { .. }) && (self.broken_off || margin < FLOOR_M || speed > FASTEST_M_S) {
             self.broken_off = true;
             goal = hover;
         }
@@ -173,11 +178,14 @@ impl Pilot {
             self.velocity[axis] += (goal[axis] - self.velocity[axis]).clamp(-reach, reach);
             let error = self.velocity[axis] - achieved[axis];
             self.velocity_sum[axis] = (self.velocity_sum[axis] + error * self.step_s).clamp(-6.0, 6.0);
-            acceleration[axis] = VELOCITY_GAIN[0] * error + VELOCITY_GAIN[1] * self.velocity_sum[axis];
+            let gain = if axis == 2 { CLIMB_GAIN } else { VELOCITY_GAIN };
+            acceleration[axis] = gain[0] * error + gain[1] * self.velocity_sum[axis];
         }
+        // Falling fast: first stop that, then care for the rest.
+        let limit = HORIZONTAL_M_S2 / (1.0 + (achieved[2] - 5.0).max(0.0));
         let horizontal = acceleration[0].hypot(acceleration[1]);
-        let cut = (HORIZONTAL_M_S2 / horizontal.max(HORIZONTAL_M_S2)).min(1.0);
-        let vertical = acceleration[2].clamp(-7.0, 5.0);
+        let cut = (limit / horizontal.max(limit)).min(1.0);
+        let vertical = acceleration[2].clamp(-9.0, 5.0);
         let force = [cut * acceleration[0], cut * acceleration[1], vertical - GRAVITY_M_S2];
         let turn = to_body(rotation, [0.0, 0.0, nose_turn]);
         self.aim(rotation, force, turn, inverted)

@@ -42,7 +42,7 @@ pub(super) struct Atmosphere {
 impl Atmosphere {
     pub(super) fn new(level: &Level, mechanisms: &Mechanisms, step_s: f64, mut random: Random) -> Self {
         let from = TAU * random.uniform();
-        let speed = level.wind_m_s.max(WIND_M_S * mechanisms.scale(Mechanism::Wind));
+        let speed = WIND_M_S * mechanisms.scale(Mechanism::Wind);
         let turbulence = TURBULENCE_M_S * mechanisms.scale(Mechanism::Turbulence);
         let process = |rms, time_s, random: &mut Random| GaussMarkov::new(rms, time_s, step_s, random);
         Self {
