@@ -225,7 +225,7 @@ fn nothing_crashes_or_runs_away() -> Result<()> {
     }
     let classes = ["hover_low", "chaos", "freestyle_aggressive", "descents"].map(String::from).to_vec();
     for &mechanism in Mechanism::ALL {
-        let mechanisms = Mechanisms::none().with(mechanism, Mechanisms::MAX_SCALE);
+        let mechanisms = Mechanisms::none().with(mechanism, mechanism.largest_scale());
         let classes = Some(classes.clone());
         check(mechanism.id(), &Simulation { minutes: 2.0, mechanisms, level: QUIET_NOISE, classes, ..Simulation::default() })?;
     }

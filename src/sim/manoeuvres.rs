@@ -78,7 +78,8 @@ fn rates(rates: [f64; 3], constant: f64, upright: f64) -> Goal {
 pub(super) fn start_height(class: &str) -> f64 {
     match class {
         "hover_low" => 1.5,
-        "hover" | "control_steps" | "pirouettes" => 8.0,
+        "hover" | "control_steps" => 8.0,
+        "pirouettes" => 12.0,
         "descents" => 40.0,
         "vertical_sweeps" | "orientation_sweeps" | "turn_demos1" | "dodging_demos" | "stop_and_go" => 20.0,
         _ => 55.0,
@@ -148,7 +149,7 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             let nose_turn = random.sign() * random.between(1.2, 4.0);
             let (ahead, right) = (random.between(-4.0, 4.0), random.between(-4.0, 4.0));
             let goal = Goal::Path { ahead, right, climb: None, nose_turn, path_turn: 0.0, inverted: false };
-            fly(random.between(2.5, 5.0), random.between(5.0, 12.0), goal);
+            fly(random.between(2.5, 5.0), random.between(9.0, 15.0), goal);
         }
         "control_steps" => {
             let channel = random.below(4);
@@ -172,8 +173,8 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
                 inverted: false,
             };
             fly(34.0 / sink, home, climb(-sink, ahead));
-            fly(3.0, 5.0, path(0.0, 0.0, 0.0));
-            fly(random.between(3.0, 5.0), random.between(1.0, 3.0), path(0.0, 0.0, 0.0));
+            fly(4.0, 6.0, path(0.0, 0.0, 0.0));
+            fly(random.between(3.5, 5.5), random.between(1.2, 3.0), path(0.0, 0.0, 0.0));
             fly(6.5, home, climb(random.between(4.0, 5.5), ahead));
         }
         "loops" => {

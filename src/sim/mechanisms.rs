@@ -68,6 +68,15 @@ mechanisms! {
 }
 
 impl Mechanism {
+    /// Largest scale: beyond it the pilot is not shown to keep the aircraft in the air, in any of the classes.
+    pub const fn largest_scale(self) -> f64 {
+        match self {
+            Self::TranslLift => 1.25,
+            Self::VortexRing => 1.5,
+            _ => 2.0,
+        }
+    }
+
     /// The mechanism of this identifier.
     ///
     /// # Errors
@@ -121,24 +130,21 @@ impl Mechanisms {
         Mechanism::ALL.iter().map(|&mechanism| (mechanism, self.scale(mechanism))).filter(|(_, scale)| *scale != 0.0)
     }
 
-    /// Refuses scales that are negative, not finite or beyond `MAX_SCALE`.
+    /// Refuses scales that are negative, not finite or beyond [`Mechanism::largest_scale`].
     ///
     /// # Errors
     /// [`Error::Config`] naming the mechanism.
     pub fn check(&self) -> Result<()> {
-        match self.active().find(|(_, scale)| !(0.0..=Self::MAX_SCALE).contains(scale)) {
+        match self.active().find(|(mechanism, scale)| !(0.0..=mechanism.largest_scale()).contains(scale)) {
             None => Ok(()),
             Some((mechanism, scale)) => Err(Error::Config {
                 place: "simulation".into(),
                 field: mechanism.id().into(),
                 found: format!("scale {scale}"),
-                expected: format!("a number from 0 to {}; 1 is: {}", Self::MAX_SCALE, mechanism.summary()),
+                expected: format!("a number from 0 to {}; 1 is: {}", mechanism.largest_scale(), mechanism.summary()),
             }),
         }
     }
-
-    /// Largest scale: beyond it the pilot is not shown to keep the aircraft in the air.
-    pub const MAX_SCALE: f64 = 2.0;
 }
 
 impl Serialize for Mechanisms {

@@ -124,7 +124,7 @@ impl Simulation {
     /// Switches one mechanism on, by its identifier, at a scale.
     ///
     /// # Errors
-    /// [`Error::Config`] for an unknown identifier or a scale outside [0, [`Mechanisms::MAX_SCALE`]].
+    /// [`Error::Config`] for an unknown identifier or a scale outside 0 to [`Mechanism::largest_scale`].
     pub fn hide(mut self, id: &str, scale: f64) -> Result<Self> {
         self.mechanisms = self.mechanisms.with(Mechanism::from_id(id)?, scale);
         self.mechanisms.check()?;
@@ -225,10 +225,10 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
         let burnt = sample.saturating_sub(settling) as f64 / samples as f64;
         let disturbance = air.next();
         let state = State::from_flat(&flat);
-        actuators.push(pilot.fly(&state, sample >= settling));
         let mut controls = actuators.output();
+        let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, &disturbance, burnt);
+        actuators.push(pilot.fly(&state, state.felt(az), sample >= settling));
         if sample >= settling {
-            let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, &disturbance, burnt);
             motion.push(Instant {
                 position: state.position,
                 attitude: state.attitude,
