@@ -41,6 +41,20 @@ pub struct Calibration {
     pub clusters: usize,
 }
 
+impl std::fmt::Display for Calibration {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(f, "{:<20} {:<8} {:>12}   {:<27} unit", "effect", "name", "value", "95 % interval")?;
+        for Estimate { effect, name, value, ci95: [low, high], unit } in &self.coefficients {
+            writeln!(f, "{effect:<20} {name:<8} {value:>12.5}   [{low:>11.5}, {high:>11.5}]    {unit}")?;
+        }
+        write!(
+            f,
+            "{} rows; condition number {:.1}; intervals from {} stretches of consecutive rows",
+            self.rows, self.condition_number, self.clusters
+        )
+    }
+}
+
 /// One free coefficient: indices of its effect and of itself in the effect.
 type Free = (usize, usize);
 

@@ -5,6 +5,7 @@ use super::baseline;
 use super::effect::Effect;
 use super::evaluate::{self, StreamingModel};
 use crate::error::{Error, Result};
+use crate::flight::split::Protocol;
 use crate::flight::{Accelerations, Column, Flight};
 use crate::formula::Formula;
 use std::collections::BTreeMap;
@@ -34,6 +35,8 @@ pub struct ModelData {
     pub control_delay_s: f64,
     /// Manoeuvre classes or flights that no search may see.
     pub locked: Vec<String>,
+    /// How the flights are divided where none is locked.
+    pub split: Protocol,
 }
 
 /// A first-principles model of an unmanned helicopter: predicted acceleration = sum of the terms of its enabled effects.

@@ -75,10 +75,11 @@ impl Model {
         }
         let mut data = ModelData::default();
         if let Some(section) = file.section("data", "data")? {
-            section.allow(&["control_delay_s", "locked"])?;
+            section.allow(&["control_delay_s", "locked", "split"])?;
             data = ModelData {
                 control_delay_s: section.number("control_delay_s")?.unwrap_or_default(),
                 locked: section.texts("locked")?,
+                split: section.text("split")?.map(str::parse).transpose()?.unwrap_or_default(),
             };
         }
         let provenance = match file.section("provenance", "provenance")? {
@@ -120,6 +121,7 @@ impl Model {
         let _ = writeln!(text, "inertia = [{ix:?}, {iy:?}, {iz:?}]\nrotor_radius_m = {:?}", self.rotor_radius_m);
         let locked: Vec<String> = self.data.locked.iter().map(|name| quoted(name)).collect();
         let _ = writeln!(text, "\n[data]\ncontrol_delay_s = {:?}\nlocked = [{}]", self.data.control_delay_s, locked.join(", "));
+        let _ = writeln!(text, "split = {}", quoted(&self.data.split.to_string()));
         for effect in &self.effects {
             write_effect(&mut text, effect);
         }

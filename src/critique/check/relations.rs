@@ -43,7 +43,8 @@ const MATERIAL_SHARE: f64 = 0.02;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
-const TRANSPOSED: &str = "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
+const TRANSPOSED: &str =
+    "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
@@ -222,9 +223,8 @@ impl Relation {
             message: format!("{} holds", self.formula),
             set: None,
         };
-        let convincing = best.filter(|&index| {
-            nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index)
-        });
+        let convincing =
+            best.filter(|&index| nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index));
         if !nominal.is_finite() || blocks < FEW_BLOCKS {
             finding.verdict = Verdict::Undetermined;
             finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);
