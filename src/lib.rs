@@ -13,6 +13,7 @@ pub mod critique;
 pub mod error;
 pub mod flight;
 pub mod formula;
+pub mod hybrid;
 pub mod nn;
 pub mod physics;
 #[cfg(feature = "report")]

@@ -39,10 +39,14 @@ impl Stream {
     /// Word `index` of the stream, uniform on 0..2³².
     #[inline(always)]
     pub const fn word(self, index: u32) -> u32 {
-        let x = index ^ self.key as u32;
-        let x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
-        let x = (x ^ (x >> 13)).wrapping_add((self.key >> 32) as u32).wrapping_mul(0xc2b2_ae35);
-        x ^ (x >> 16)
+        let (low, high) = self.halves();
+        word(low, high, index)
+    }
+
+    /// The key as [`word`] takes it.
+    #[inline(always)]
+    pub(crate) const fn halves(self) -> (u32, u32) {
+        (self.key as u32, (self.key >> 32) as u32)
     }
 
     /// Uniform on [0, 1) with 53 bits, from a sub-stream of its own: for initial weights and shuffles.
@@ -51,4 +55,26 @@ impl Stream {
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (mix64(self.sub(index).key) >> 11) as f64 * STEP
     }
+}
+
+/// A random order of `0..count`, another for each `round` of a run (Fisher & Yates 1938; Durstenfeld 1964).
+pub fn permutation(count: usize, seed: u64, round: u64) -> Vec<u32> {
+    /// A site no dropout has: sites count from 0.
+    const ORDER: u64 = u64::MAX;
+    let stream = Stream::new(seed, round, ORDER, 0);
+    let mut order: Vec<u32> = (0..u32::try_from(count).unwrap_or(u32::MAX)).collect();
+    for last in (1..order.len()).rev() {
+        let chosen = (stream.uniform(last as u64) * (last + 1) as f64) as usize;
+        order.swap(last, chosen.min(last));
+    }
+    order
+}
+
+/// Word `index` of the stream whose key has these halves; apart from [`Stream`] so that a loop over streams vectorises.
+#[inline(always)]
+pub(crate) const fn word(low: u32, high: u32, index: u32) -> u32 {
+    let x = index ^ low;
+    let x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+    let x = (x ^ (x >> 13)).wrapping_add(high).wrapping_mul(0xc2b2_ae35);
+    x ^ (x >> 16)
 }

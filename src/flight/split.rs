@@ -5,7 +5,7 @@
 
 use super::{Flight, Span};
 use crate::error::{Error, Result};
-use phyture_kernels::random::shuffle;
+use phyture_kernels::random::permutation;
 use std::fmt;
 use std::str::FromStr;
 
@@ -20,11 +20,12 @@ const TRAINING_SHARE: f64 = 0.7;
 const VALIDATION_SHARE: f64 = 0.2;
 
 /// How samples are divided.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Protocol {
     /// Random 10-s segments, 70 % training, 20 % validation, 10 % test (paper section 4.1). Leftovers shorter than 10 s at the
     /// end of a flight belong to no partition. Written `segments`.
+    #[default]
     Segments,
     /// The first share of every flight trains, the rest tests; no validation. Written `first 0.75`.
     First(f64),
@@ -64,7 +65,9 @@ impl FromStr for Protocol {
                 place: "split".into(),
                 field: "split".into(),
                 found: format!("`{text}`"),
-                expected: "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`".into(),
+                expected:
+                    "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`"
+                        .into(),
             }),
         }
     }
@@ -82,13 +85,14 @@ pub enum Part {
     All,
 }
 
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl Part {
+    /// Name in files and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Locked => "locked",
             Self::Test => "test",
             Self::All => "all",
-        })
+        }
     }
 }
 
@@ -116,7 +120,8 @@ impl Split {
         let split = if locked.is_empty() { by_protocol(flights, protocol, seed) } else { by_name(flights, locked)? };
         for (spans, part) in [(&split.training, "train"), (&split.test, "test")] {
             if spans.is_empty() {
-                let rule = if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
+                let rule =
+                    if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
                 return Err(Error::Undetermined(format!(
                     "{rule} leaves no samples to {part} on, of {} flights and {:.0} s; give more or longer flights, or another split",
                     flights.len(),
@@ -159,8 +164,9 @@ fn by_protocol(flights: &[Flight], protocol: &Protocol, seed: u64) -> Split {
             }
         }
         Protocol::Segments => {
-            let mut segments: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
-            shuffle(&mut segments, seed);
+            let sorted: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
+            let mut segments: Vec<Span> =
+                permutation(sorted.len(), seed, 0).into_iter().map(|index| sorted[index as usize]).collect();
             let training = (segments.len() as f64 * TRAINING_SHARE).round() as usize;
             let validation = (segments.len() as f64 * VALIDATION_SHARE).round() as usize;
             // A test segment is worth more than a validation one when there are only a few.
@@ -207,7 +213,7 @@ pub fn class_folds(classes: &[&str], folds: usize) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::{Column, Targets};
+    use crate::flight::Targets;
     use proptest::prelude::*;
 
     fn flights(lengths: &[usize]) -> Vec<Flight> {

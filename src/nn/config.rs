@@ -163,11 +163,16 @@ impl PhyTureConfig {
             return refuse("history", self.history.to_string(), expected);
         }
         if self.moving_average.is_multiple_of(2) {
-            return refuse("moving_average", self.moving_average.to_string(), "an odd width, so that the average is centred".into());
+            return refuse(
+                "moving_average",
+                self.moving_average.to_string(),
+                "an odd width, so that the average is centred".into(),
+            );
         }
         let hidden = self.hidden * self.d_model as f64;
         if !(hidden >= 1.0 && hidden <= LARGEST_WIDTH as f64) {
-            let expected = format!("{} to {}: 1 to {LARGEST_WIDTH} channels", 1.0 / self.d_model as f64, LARGEST_WIDTH / self.d_model);
+            let expected =
+                format!("{} to {}: 1 to {LARGEST_WIDTH} channels", 1.0 / self.d_model as f64, LARGEST_WIDTH / self.d_model);
             return refuse("hidden", self.hidden.to_string(), expected);
         }
         let reals = [("leak", self.leak, 0.0, 1.0), ("norm_eps", self.norm_eps, 0.0, 1.0), ("dropout", self.dropout, 0.0, 0.95)];

@@ -6,7 +6,7 @@
 //! measures; what difference is too large is for the caller to say.
 
 use super::config::PhyTureConfig;
-use super::phyture::{Network, OutputScale};
+use super::phyture::{LossRule, Network, OutputScale};
 use super::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::error::{Error, Result};
 use crate::tape::{Session, Threads};
@@ -40,6 +40,20 @@ pub struct Worst {
     pub relative_error: f64,
 }
 
+impl std::fmt::Display for Parity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(f, "largest absolute difference over largest absolute reference value, computed in {}", self.precision)?;
+        for group in ["output", "loss", "grad.input.", "grad.param.", "adam1.param."] {
+            let errors = self.relative_error.iter().filter(|(tensor, _)| tensor.starts_with(group));
+            let (count, largest) = errors.fold((0, 0.0_f64), |(count, largest), (_, error)| (count + 1, largest.max(*error)));
+            if count > 0 {
+                writeln!(f, "  {:<14} {count:>4} tensors   largest {largest:.2e}", group.trim_end_matches('.'))?;
+            }
+        }
+        write!(f, "worst: {} {:.2e}", self.worst.tensor, self.worst.relative_error)
+    }
+}
+
 /// Computes everything in a parity file again and compares.
 ///
 /// # Errors
@@ -47,8 +61,10 @@ pub struct Worst {
 pub fn compare(path: &Path, threads: Threads) -> Result<Parity> {
     let file = SafeTensors::read(path)?;
     let fault = |message: String| Error::File { path: path.into(), message };
-    let config = file.metadata.get("config").ok_or_else(|| fault("no `config` in the metadata; export it with the weights".into()))?;
-    let config: PhyTureConfig = serde_json::from_str(config).map_err(|error| fault(format!("`config` in the metadata: {error}")))?;
+    let config =
+        file.metadata.get("config").ok_or_else(|| fault("no `config` in the metadata; export it with the weights".into()))?;
+    let config: PhyTureConfig =
+        serde_json::from_str(config).map_err(|error| fault(format!("`config` in the metadata: {error}")))?;
     let run = match file.tensors.get("input.state").map(|tensor| &tensor.numbers) {
         Some(Numbers::F32(_)) => run::<f32>,
         Some(Numbers::F64(_)) => run::<f64>,
@@ -106,7 +122,8 @@ type Compared<'a, T> = BTreeMap<String, (Vec<T>, &'a [T])>;
 
 fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Threads) -> Result<Parity, Problem> {
     let elements = config.horizon as f64 * config.outputs as f64;
-    let network = Network::<T>::record(config, &OutputScale::unit(config.outputs), 1.0 / elements, true)?;
+    let rule = LossRule { scale: 1.0 / elements, standardise: false, input_gradients: true };
+    let network = Network::<T>::record(config, &OutputScale::unit(config.outputs), rule)?;
     let samples = match file.tensors.get("input.state").map(|tensor| tensor.shape.as_slice()) {
         Some([samples, _, _]) if *samples > 0 => *samples,
         found => return Err(Problem::File(format!("`input.state` has shape {found:?}; expected [samples, history, channels]"))),
@@ -194,7 +211,11 @@ mod tests {
     /// A parity file whose references are this program's own, so that the reading and the bookkeeping are tested.
     fn own_file(variant: Variant) -> Result<SafeTensors> {
         let config = PhyTureConfig { variant, ..small() };
-        let network = Network::<f64>::record(&config, &OutputScale::unit(6), 1.0 / 6.0, true)?;
+        let network = Network::<f64>::record(
+            &config,
+            &OutputScale::unit(6),
+            LossRule { scale: 1.0 / 6.0, standardise: false, input_gradients: true },
+        )?;
         let parameters = network.initial(3);
         let (mut file, samples) = (SafeTensors::default(), 3);
         let mut put = |name: &str, shape: &[usize], numbers: Vec<f64>| {
@@ -245,7 +266,10 @@ mod tests {
         for variant in Variant::ALL {
             let parity = compared(&own_file(variant)?)?;
             assert!(parity.relative_error.values().all(|&error| error == 0.0), "{variant:?}: {:?}", parity.worst);
-            assert_eq!(parity.relative_error.contains_key("grad.param.paf.query.weight"), variant == Variant::PhyTure || variant.reads_physics() && variant.predicts_residual());
+            assert_eq!(
+                parity.relative_error.contains_key("grad.param.paf.query.weight"),
+                variant == Variant::PhyTure || variant.reads_physics() && variant.predicts_residual()
+            );
             assert!(!parity.relative_error.contains_key("grad.param.paf.key.bias"));
         }
         Ok(())

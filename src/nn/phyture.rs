@@ -35,6 +35,17 @@ impl OutputScale {
     }
 }
 
+/// How the loss of one sample is formed, and whether S and P get gradients.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LossRule {
+    /// Factor before the sum of squares.
+    pub scale: f64,
+    /// Divide errors by the output scale first.
+    pub standardise: bool,
+    /// Gradients of S and P.
+    pub input_gradients: bool,
+}
+
 /// A network of this file, recorded.
 pub struct Network<T> {
     config: PhyTureConfig,
@@ -50,12 +61,16 @@ impl<T: Real> Network<T> {
     ///
     /// # Errors
     /// [`Error::Config`] if the configuration or the length of the output scale is wrong.
-    pub fn new(config: &PhyTureConfig, output: &OutputScale) -> Result<Self> {
-        Self::record(config, output, 1.0 / config.horizon.max(1) as f64, false)
+    ///
+    /// With `standardise`, the errors of each channel are divided by its output scale first, so that channels of small and of
+    /// large magnitude count alike.
+    pub fn new(config: &PhyTureConfig, output: &OutputScale, standardise: bool) -> Result<Self> {
+        let loss = LossRule { scale: 1.0 / config.horizon.max(1) as f64, standardise, input_gradients: false };
+        Self::record(config, output, loss)
     }
 
     /// As [`Network::new`], with the factor before the sum of squares free, and gradients of S and P if asked for.
-    pub(crate) fn record(config: &PhyTureConfig, scale: &OutputScale, loss_scale: f64, input_gradients: bool) -> Result<Self> {
+    pub(crate) fn record(config: &PhyTureConfig, scale: &OutputScale, rule: LossRule) -> Result<Self> {
         config.check()?;
         if scale.scale.len() != config.outputs || scale.offset.len() != config.outputs {
             return Err(Error::Config {
@@ -66,7 +81,7 @@ impl<T: Real> Network<T> {
             });
         }
         let mut recorder = Recorder::<T>::default();
-        let mut input = |name: &str, lengths: &[usize]| match input_gradients {
+        let mut input = |name: &str, lengths: &[usize]| match rule.input_gradients {
             true => recorder.graph.input_with_gradient(name, lengths),
             false => recorder.graph.input(name, lengths),
         };
@@ -80,7 +95,13 @@ impl<T: Real> Network<T> {
         let predicted = builder.head(enhanced)?;
         let Recorder { mut graph, inits } = builder.recorder;
         let output = graph.apply(Affine { scale: scale.scale.clone(), offset: scale.offset.clone() }, &[predicted])?;
-        let loss = graph.apply(SquaredError { scale: loss_scale }, &[output, target])?;
+        let (mut judged, mut wanted) = (output, target);
+        if rule.standardise {
+            let unit = Affine { scale: scale.scale.iter().map(|scale| 1.0 / scale).collect(), offset: vec![0.0; config.outputs] };
+            judged = graph.apply(unit.clone(), &[output])?;
+            wanted = graph.apply(unit, &[target])?;
+        }
+        let loss = graph.apply(SquaredError { scale: rule.scale }, &[judged, wanted])?;
         Ok(Self { config: config.clone(), graph, inits, output, loss })
     }
 
@@ -228,7 +249,7 @@ mod tests {
     use super::*;
 
     fn count(config: PhyTureConfig) -> Result<usize> {
-        Ok(Network::<f32>::new(&config, &OutputScale::unit(6))?.graph().parameter_count())
+        Ok(Network::<f32>::new(&config, &OutputScale::unit(6), false)?.graph().parameter_count())
     }
 
     #[test]
@@ -249,7 +270,7 @@ mod tests {
     #[test]
     fn initial_parameters_follow_their_bounds_and_their_seed() -> Result<()> {
         let config = PhyTureConfig { history: 16, moving_average: 5, ..PhyTureConfig::default() };
-        let network = Network::<f64>::new(&config, &OutputScale::unit(6))?;
+        let network = Network::<f64>::new(&config, &OutputScale::unit(6), false)?;
         let (first, again, other) = (network.initial(1), network.initial(1), network.initial(2));
         assert_eq!(first, again);
         for parameter in network.parameters() {

@@ -132,14 +132,19 @@ impl SafeTensors {
         let header_len = u64::from_le_bytes(*prefix);
         let header_end = usize::try_from(header_len).ok().filter(|_| header_len <= LONGEST_HEADER);
         let Some((header, data)) = header_end.and_then(|end| rest.split_at_checked(end)) else {
-            return Err(format!("the header claims {header_len} bytes, {} are there; not a safetensors file, or cut short", rest.len()));
+            return Err(format!(
+                "the header claims {header_len} bytes, {} are there; not a safetensors file, or cut short",
+                rest.len()
+            ));
         };
-        let header: Map<String, Value> = serde_json::from_slice(header).map_err(|error| format!("the header is no JSON object: {error}"))?;
+        let header: Map<String, Value> =
+            serde_json::from_slice(header).map_err(|error| format!("the header is no JSON object: {error}"))?;
         let mut file = Self::default();
         let mut ranges = Vec::with_capacity(header.len());
         for (name, entry) in header {
             if name == METADATA {
-                file.metadata = serde_json::from_value(entry).map_err(|error| format!("`{METADATA}` is no map of texts: {error}"))?;
+                file.metadata =
+                    serde_json::from_value(entry).map_err(|error| format!("`{METADATA}` is no map of texts: {error}"))?;
                 continue;
             }
             let entry: Entry = serde_json::from_value(entry).map_err(|error| format!("tensor `{name}`: {error}"))?;
@@ -169,7 +174,8 @@ struct Entry {
 impl Entry {
     fn tensor(self, data: &[u8]) -> Result<Tensor, String> {
         let [start, end] = self.data_offsets;
-        let bytes = data.get(start..end).ok_or_else(|| format!("bytes {start} to {end} of {}; the file is cut short", data.len()))?;
+        let bytes =
+            data.get(start..end).ok_or_else(|| format!("bytes {start} to {end} of {}; the file is cut short", data.len()))?;
         let count = self.shape.iter().try_fold(1_usize, |product, &length| product.checked_mul(length));
         let expect = |size: usize| match count.and_then(|count| count.checked_mul(size)) {
             Some(expected) if expected == bytes.len() => Ok(()),

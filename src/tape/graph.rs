@@ -115,7 +115,10 @@ impl<T: Real> Graph<T> {
     pub fn parameter(&mut self, name: &str, lengths: &[usize]) -> Result<Var> {
         let shape = Shape::new("parameter", lengths)?;
         if self.parameters.iter().any(|taken| taken.name == name) {
-            return Err(Error::Shape { operation: "parameter", message: format!("`{name}` is already recorded; names are unique") });
+            return Err(Error::Shape {
+                operation: "parameter",
+                message: format!("`{name}` is already recorded; names are unique"),
+            });
         }
         let offset = self.parameter_count();
         self.parameters.push(Parameter { name: name.to_owned(), shape, offset });
@@ -133,7 +136,10 @@ impl<T: Real> Graph<T> {
         let mut shapes = Vec::with_capacity(operands.len());
         for var in operands {
             let Some(node) = self.nodes.get(var.0) else {
-                return Err(Error::Shape { operation, message: "an operand belongs to another graph; record it on this one".into() });
+                return Err(Error::Shape {
+                    operation,
+                    message: "an operand belongs to another graph; record it on this one".into(),
+                });
             };
             shapes.push(node.shape);
         }

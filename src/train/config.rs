@@ -79,14 +79,23 @@ impl TrainConfig {
             return Err(fault("checkpoint_s", self.checkpoint_s, "seconds, 0 or more"));
         }
         if self.inputs.len() != self.network.state_channels {
-            return Err(fault("network.state_channels", self.network.state_channels, &format!("the number of inputs, {}", self.inputs.len())));
+            return Err(fault(
+                "network.state_channels",
+                self.network.state_channels,
+                &format!("the number of inputs, {}", self.inputs.len()),
+            ));
         }
         self.network.check()
     }
 }
 
 fn fault(field: &str, found: impl std::fmt::Display, expected: &str) -> Error {
-    Error::Config { place: "training configuration".into(), field: field.into(), found: found.to_string(), expected: expected.into() }
+    Error::Config {
+        place: "training configuration".into(),
+        field: field.into(),
+        found: found.to_string(),
+        expected: expected.into(),
+    }
 }
 
 #[cfg(test)]

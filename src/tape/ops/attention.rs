@@ -6,10 +6,10 @@ use super::{or_scratch, rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
+use phyture_kernels::Real;
 use phyture_kernels::attention::{self, Gradients};
 use phyture_kernels::dropout::Mask;
 use phyture_kernels::random::Stream;
-use phyture_kernels::Real;
 
 /// Operands q, k, v.
 #[derive(Clone, Copy, Debug, PartialEq)]
