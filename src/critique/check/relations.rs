@@ -6,7 +6,7 @@
 
 use super::increments::{Instant, Motion, Vector};
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};
 use std::ops::Range;
