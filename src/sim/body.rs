@@ -58,12 +58,6 @@ impl State {
         [x, y, z, a, b, c, d, u, v, w, p, q, r, b1, a1, tail, collective, self.induced, self.rotor_speed]
     }
 
-    /// What an accelerometer along the mast shows, up, m/s², when the velocity down changes at this rate.
-    pub(super) fn felt(&self, down_rate: f64) -> f64 {
-        let gravity = to_body(&rotation(self.attitude), [0.0, 0.0, GRAVITY_M_S2]);
-        gravity[2] - cross(self.rate, self.velocity)[2] - down_rate
-    }
-
     pub(super) fn from_flat(flat: &Flat) -> Self {
         let [x, y, z, a, b, c, d, u, v, w, p, q, r, b1, a1, tail, collective, induced, rotor_speed] = *flat;
         Self {

@@ -227,7 +227,7 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
         let state = State::from_flat(&flat);
         let mut controls = actuators.output();
         let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, &disturbance, burnt);
-        actuators.push(pilot.fly(&state, state.felt(az), sample >= settling));
+        actuators.push(pilot.fly(&state, sample >= settling));
         if sample >= settling {
             motion.push(Instant {
                 position: state.position,
