@@ -23,7 +23,7 @@ const CLIMB_GAIN: [f64; 2] = [2.2, 0.9];
 /// Largest heave damping the hand allows for, m/s². Beyond, it would chase a fall with less and less collective.
 const FELT_DAMPING_M_S2: f64 = 6.0;
 /// Height error to climb, 1/s.
-const HEIGHT_GAIN: f64 = 1.0;
+const HEIGHT_GAIN: f64 = 1.3;
 /// Attitude error to rate, 1/s.
 const ATTITUDE_GAIN: f64 = 3.5;
 /// Rate error to angular acceleration, 1/s, and its integral, 1/s².
@@ -170,7 +170,8 @@ impl Pilot {
         let climb = match climb {
             // A commanded descent fades out well above the ground.
             Some(climb) => climb.max(HEIGHT_GAIN * (DESCENT_END_M + state.position[2])),
-            None => (HEIGHT_GAIN * (height + state.position[2])).clamp(-3.5, 4.5),
+            // Towards the ground ever more slowly.
+            None => (HEIGHT_GAIN * (height + state.position[2])).clamp((0.6 * state.position[2]).clamp(-3.5, 0.0), 4.5),
         };
         goal[2] = -climb;
         let achieved = to_local(rotation, state.velocity);
