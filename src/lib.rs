@@ -13,11 +13,13 @@ pub mod critique;
 pub mod error;
 pub mod flight;
 pub mod formula;
+pub mod hybrid;
 pub mod nn;
 pub mod physics;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;
+pub mod suggest;
 pub mod tape;
 pub mod train;
 

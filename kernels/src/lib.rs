@@ -6,10 +6,35 @@
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
 //! of a sequence are views; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
 
+#![expect(clippy::too_many_arguments, reason = "a kernel takes its sizes and buffers one by one, as BLAS does")]
+
+pub mod activation;
+pub mod adam;
+pub mod attention;
+pub mod conv1d;
+pub mod dropout;
+pub mod elementary;
+pub mod encoding;
+pub mod gemm;
+pub mod layer_norm;
+pub mod level;
+pub mod linear;
+pub mod loss;
+pub mod moving_average;
+pub mod random;
 pub mod real;
+pub mod reference;
+pub mod rows;
+pub mod sci;
+pub mod temporal;
+#[cfg(test)]
+mod testing;
+mod tile;
 pub mod tolerance;
 
+pub use level::Level;
 pub use real::Real;
+pub use rows::{Rows, RowsMut};
 pub use tolerance::Tolerance;
 
 /// How a kernel stores a gradient: the first writer of a buffer sets it, later ones add to it.

@@ -1,1 +1,18 @@
-//! Reverse mode: graph, plan, session, operations, gradient check.
+//! Reverse mode: record a graph, plan it once, replay it.
+//!
+//! [`Graph`] records operations ([`ops`]) on copyable handles; a plan gives every buffer its place; [`Session`] replays it one
+//! sample at a time and gives the loss, the outputs and the gradients. The tape knows operations, not networks.
+
+#[macro_use]
+pub mod gradcheck;
+pub mod op;
+pub mod ops;
+
+mod graph;
+mod plan;
+mod session;
+mod shape;
+
+pub use graph::{Graph, MAX_INPUTS, Parameter, Var};
+pub use session::{DropoutKey, Fill, SHARDS, Session, Threads};
+pub use shape::{MAX_RANK, Shape};

@@ -1,1 +1,14 @@
-//! Training: Adam, schedule, trainer, checkpoint.
+//! Training the residual network: configuration, schedule, trainer, checkpoint, and the run folder they live in.
+//!
+//! Everything random is a function of the seed and of where in the run it is drawn, so a run that was interrupted and resumed is
+//! bit for bit the run that was not, on any number of threads.
+
+pub mod config;
+pub mod container;
+pub mod run;
+pub mod schedule;
+pub mod trainer;
+
+pub use config::TrainConfig;
+pub use run::{Outcome, Report, RunFolder};
+pub use trainer::{State, StepReport, Trainer};

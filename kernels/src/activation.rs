@@ -1,0 +1,157 @@
+//! Activation functions, elementwise.
+//!
+//! | kind | y | dy/dx, from |
+//! | --- | --- | --- |
+//! | identity | x | 1 |
+//! | relu | max(x, 0) | 1 if y > 0 else 0 |
+//! | leaky relu | x if x > 0 else slope·x, slope ≥ 0 | 1 if y > 0 else slope |
+//! | tanh | tanh x | 1 − y² |
+//! | sigmoid | 1/(1 + e⁻ˣ) | y·(1 − y) |
+//! | gelu | x·Φ(x) = x/2·(1 + erf(x/√2)), the exact form | Φ(x) + x·φ(x), from x |
+//!
+//! All but gelu take their derivative from their own output, so that the input need not be kept.
+
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
+
+use crate::elementary::{erf, exp, sigmoid, tanh};
+use crate::level::{Isa, Kernel, Level};
+use crate::rows::same_shape;
+use crate::{Real, Rows, RowsMut, Write};
+
+/// Which function.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Activation {
+    /// x
+    Identity,
+    /// max(x, 0)
+    Relu,
+    /// x above 0, slope·x otherwise
+    LeakyRelu {
+        /// Slope below 0; not negative.
+        slope: f64,
+    },
+    /// tanh x
+    Tanh,
+    /// 1/(1 + e⁻ˣ)
+    Sigmoid,
+    /// x·Φ(x), erf form
+    Gelu,
+}
+
+/// What the backward pass of an activation reads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Saves {
+    /// The input x.
+    Input,
+    /// The output y.
+    Output,
+}
+
+impl Activation {
+    /// What [`backward`] has to be given as `saved`.
+    pub const fn saves(self) -> Saves {
+        match self {
+            Self::Gelu => Saves::Input,
+            _ => Saves::Output,
+        }
+    }
+}
+
+/// Replaces every number by f of it.
+#[inline(always)]
+pub(crate) fn map<T: Real, I: Isa>(kind: Activation, values: &mut [T]) {
+    let values = values.iter_mut();
+    let half = T::of(0.5);
+    match kind {
+        Activation::Identity => {}
+        Activation::Relu => values.for_each(|x| *x = if *x > T::ZERO { *x } else { T::ZERO }),
+        Activation::LeakyRelu { slope } => {
+            let slope = T::of(slope);
+            values.for_each(|x| *x = if *x > T::ZERO { *x } else { slope * *x });
+        }
+        Activation::Tanh => values.for_each(|x| *x = tanh::<T, I>(*x)),
+        Activation::Sigmoid => values.for_each(|x| *x = sigmoid::<T, I>(*x)),
+        Activation::Gelu => values.for_each(|x| *x = *x * half * (T::ONE + erf::<T, I>(*x * T::of(FRAC_1_SQRT_2)))),
+    }
+}
+
+/// f′ at one number, given x or y as [`Activation::saves`] says.
+#[inline(always)]
+fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
+    match kind {
+        Activation::Identity => T::ONE,
+        Activation::Relu => {
+            if saved > T::ZERO {
+                T::ONE
+            } else {
+                T::ZERO
+            }
+        }
+        Activation::LeakyRelu { slope } => {
+            if saved > T::ZERO {
+                T::ONE
+            } else {
+                T::of(slope)
+            }
+        }
+        Activation::Tanh => T::ONE - saved * saved,
+        Activation::Sigmoid => saved * (T::ONE - saved),
+        Activation::Gelu => {
+            let density = T::of(FRAC_1_SQRT_2 * 0.5 * FRAC_2_SQRT_PI) * exp::<T, I>(T::of(-0.5) * saved * saved);
+            T::of(0.5) * (T::ONE + erf::<T, I>(saved * T::of(FRAC_1_SQRT_2))) + saved * density
+        }
+    }
+}
+
+/// y = f(x), both [n, C].
+pub fn forward<T: Real>(level: Level, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
+    same_shape(&x, &y.view());
+    level.run(Forward { kind, x, y });
+}
+
+struct Forward<'a, T> {
+    kind: Activation,
+    x: Rows<'a, T>,
+    y: RowsMut<'a, T>,
+}
+
+impl<T: Real> Kernel for Forward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.x.rows() {
+            let y = self.y.row_mut(i);
+            y.copy_from_slice(self.x.row(i));
+            map::<T, I>(self.kind, y);
+        }
+    }
+}
+
+/// dx {=, +=} dy∘f′, all [n, C]; `saved` is x or y as [`Activation::saves`] says.
+pub fn backward<T: Real>(level: Level, kind: Activation, saved: Rows<'_, T>, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
+    same_shape(&saved, &dy);
+    same_shape(&dy, &dx.view());
+    level.run(Backward { kind, saved, dy, dx, write });
+}
+
+struct Backward<'a, T> {
+    kind: Activation,
+    saved: Rows<'a, T>,
+    dy: Rows<'a, T>,
+    dx: RowsMut<'a, T>,
+    write: Write,
+}
+
+impl<T: Real> Kernel for Backward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.dy.rows() {
+            let triples = self.dx.row_mut(i).iter_mut().zip(self.dy.row(i)).zip(self.saved.row(i));
+            match self.write {
+                Write::Set => triples.for_each(|((dx, dy), saved)| *dx = *dy * derivative::<T, I>(self.kind, *saved)),
+                Write::Add => triples.for_each(|((dx, dy), saved)| *dx += *dy * derivative::<T, I>(self.kind, *saved)),
+            }
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! One step of Adam (Kingma & Ba 2015) in PyTorch's form, over flat slices.
+//!
+//!   m ← β₁m + (1 − β₁)g,   v ← β₂v + (1 − β₂)g²,   θ ← θ − lr/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε)
+
+use crate::Real;
+use crate::level::{Isa, Kernel, Level};
+
+/// The constants of a step. The default is PyTorch's: 1e-3, 0.9, 0.999, 1e-8.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adam {
+    /// lr
+    pub learning_rate: f64,
+    /// β₁
+    pub beta1: f64,
+    /// β₂
+    pub beta2: f64,
+    /// ε, added after the bias-corrected root
+    pub epsilon: f64,
+}
+
+impl Default for Adam {
+    fn default() -> Self {
+        Self { learning_rate: 1e-3, beta1: 0.9, beta2: 0.999, epsilon: 1e-8 }
+    }
+}
+
+/// Step number `step` (1 is the first). `gradient` is multiplied by `scale` on reading (1, or one over a number of samples).
+pub fn step<T: Real>(
+    level: Level,
+    adam: &Adam,
+    step: u64,
+    scale: f64,
+    gradient: &[T],
+    parameters: &mut [T],
+    first: &mut [T],
+    second: &mut [T],
+) {
+    let n = parameters.len();
+    assert!(gradient.len() == n && first.len() == n && second.len() == n, "adam: {n} parameters, other slices differ");
+    // powi takes i32; powf keeps every step number.
+    let correction1 = 1.0 - adam.beta1.powf(step as f64);
+    let correction2 = 1.0 - adam.beta2.powf(step as f64);
+    level.run(Step {
+        scale: T::of(scale),
+        beta1: T::of(adam.beta1),
+        beta2: T::of(adam.beta2),
+        rest1: T::of(1.0 - adam.beta1),
+        rest2: T::of(1.0 - adam.beta2),
+        rate: T::of(adam.learning_rate / correction1),
+        root: T::of(1.0 / correction2.sqrt()),
+        epsilon: T::of(adam.epsilon),
+        gradient,
+        parameters,
+        first,
+        second,
+    });
+}
+
+struct Step<'a, T> {
+    scale: T,
+    beta1: T,
+    beta2: T,
+    rest1: T,
+    rest2: T,
+    rate: T,
+    root: T,
+    epsilon: T,
+    gradient: &'a [T],
+    parameters: &'a mut [T],
+    first: &'a mut [T],
+    second: &'a mut [T],
+}
+
+impl<T: Real> Kernel for Step<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        for (((theta, g), m), v) in self.parameters.iter_mut().zip(self.gradient).zip(self.first).zip(self.second) {
+            let g = *g * self.scale;
+            *m = self.beta1 * *m + self.rest1 * g;
+            *v = self.beta2 * *v + self.rest2 * g * g;
+            *theta -= self.rate * *m / (v.sqrt() * self.root + self.epsilon);
+        }
+    }
+}

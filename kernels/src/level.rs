@@ -1,0 +1,264 @@
+//! The instruction-set level a kernel runs at, chosen at run time.
+//!
+//! A kernel is one generic body in plain Rust ([`Kernel::run`]); it is compiled once a level, each time inside a function that
+//! has that level's instructions enabled, so that the compiler turns the same loops into wider registers. This file is the only
+//! place that calls such a function, and so the only place where the choice has to be argued to be safe.
+//!
+//! Not here: any arithmetic.
+
+use std::fmt;
+use std::sync::OnceLock;
+
+use crate::Real;
+
+/// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
+pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
+
+/// A level this processor is known to have. Values other than [`Level::PLAIN`] exist only after the processor was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Level(Kind);
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    Plain,
+    Avx2,
+    Avx512,
+    Neon,
+}
+
+const NAMES: [(&str, Kind); 4] = [("plain", Kind::Plain), ("avx2", Kind::Avx2), ("avx512", Kind::Avx512), ("neon", Kind::Neon)];
+
+/// A level was asked for that cannot be had.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum LevelError {
+    /// The name is none of the known ones.
+    Unknown(String),
+    /// The processor, or the architecture this was compiled for, does not have it.
+    Unavailable(&'static str),
+}
+
+impl fmt::Display for LevelError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let available: Vec<_> = Level::available().iter().map(|level| level.name()).collect();
+        let available = available.join(", ");
+        match self {
+            Self::Unknown(name) => {
+                write!(f, "{ENVIRONMENT_VARIABLE}: no instruction-set level is named '{name}'; here one of: {available}")
+            }
+            Self::Unavailable(name) => {
+                write!(
+                    f,
+                    "{ENVIRONMENT_VARIABLE}: this processor does not have the level '{name}'; use one of: {available}, or unset it"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for LevelError {}
+
+impl Level {
+    /// What every processor of the architecture has.
+    pub const PLAIN: Self = Self(Kind::Plain);
+
+    /// The level named in `PHYTURE_ISA`, otherwise the best one of this processor. Decided once a process.
+    ///
+    /// # Errors
+    /// If `PHYTURE_ISA` names a level that is unknown or not available; nothing else is silently used in its place.
+    pub fn detect() -> Result<Self, LevelError> {
+        static CHOSEN: OnceLock<Result<Level, LevelError>> = OnceLock::new();
+        CHOSEN
+            .get_or_init(|| match std::env::var_os(ENVIRONMENT_VARIABLE) {
+                Some(name) if !name.is_empty() => Self::named(&name.to_string_lossy()),
+                _ => Ok(Self::available().last().copied().unwrap_or(Self::PLAIN)),
+            })
+            .clone()
+    }
+
+    /// The level of this name.
+    ///
+    /// # Errors
+    /// If the name is unknown or this processor does not have the level.
+    pub fn named(name: &str) -> Result<Self, LevelError> {
+        let (name, kind) = *NAMES.iter().find(|(known, _)| *known == name).ok_or_else(|| LevelError::Unknown(name.to_owned()))?;
+        if kind.is_available() { Ok(Self(kind)) } else { Err(LevelError::Unavailable(name)) }
+    }
+
+    /// All levels of this processor, slowest first.
+    pub fn available() -> Vec<Self> {
+        NAMES.iter().filter(|(_, kind)| kind.is_available()).map(|&(_, kind)| Self(kind)).collect()
+    }
+
+    /// `plain`, `avx2`, `avx512` or `neon`.
+    pub fn name(self) -> &'static str {
+        NAMES.iter().find(|(_, kind)| *kind == self.0).map_or("plain", |(name, _)| name)
+    }
+
+    /// Runs a kernel compiled for this level.
+    #[inline]
+    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: a Level of this kind is made only by `named` and `available`, after the processor reported avx2 and fma.
+            Kind::Avx2 => unsafe { avx2(kernel) },
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: as above, for avx512f, avx512bw, avx512dq, avx512vl, avx2 and fma.
+            Kind::Avx512 => unsafe { avx512(kernel) },
+            #[cfg(target_arch = "aarch64")]
+            // SAFETY: as above, for neon.
+            Kind::Neon => unsafe { neon(kernel) },
+            _ => kernel.run::<Plain>(),
+        }
+    }
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Kind {
+    fn is_available(self) -> bool {
+        match self {
+            Self::Plain => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+                    && Self::Avx2.is_available()
+            }
+            #[cfg(target_arch = "aarch64")]
+            Self::Neon => std::arch::is_aarch64_feature_detected!("neon"),
+            _ => false,
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx2>()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+fn avx512<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Avx512>()
+}
+
+#[cfg(target_arch = "aarch64")]
+#[target_feature(enable = "neon")]
+fn neon<K: Kernel>(kernel: K) -> K::Output {
+    kernel.run::<Neon>()
+}
+
+/// A kernel with its operands, ready to run. Implementations mark `run` and all they call `#[inline(always)]`: only then is the
+/// body compiled with the level's instructions.
+pub(crate) trait Kernel {
+    /// What it returns.
+    type Output;
+    /// The one body.
+    fn run<I: Isa>(self) -> Self::Output;
+}
+
+/// A kernel whose body is written for a tile of MR x NR accumulators; see [`Isa::tiled`].
+pub(crate) trait Tiled<T> {
+    /// The one body.
+    fn run<I: Isa, const MR: usize, const NR: usize>(self);
+}
+
+/// What a body may know about the level it is compiled for.
+pub(crate) trait Isa {
+    /// Multiply-add is one instruction; where it is not, `mul_add` would be a call of the maths library.
+    const FMA: bool;
+
+    /// Runs a body with the accumulator tile that fills this level's registers: two registers wide, as tall as leaves room for
+    /// two of the right operand and one of the left.
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K);
+
+    /// a·b + c, rounded once where the level can.
+    #[inline(always)]
+    fn mul_add<T: Real>(a: T, b: T, c: T) -> T {
+        if Self::FMA { a.mul_add(b, c) } else { a * b + c }
+    }
+}
+
+pub(crate) struct Plain;
+impl Isa for Plain {
+    const FMA: bool = false;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 4, 8>() } else { kernel.run::<Self, 4, 4>() }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Avx2;
+#[cfg(target_arch = "x86_64")]
+impl Isa for Avx2 {
+    const FMA: bool = true;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 6, 16>() } else { kernel.run::<Self, 6, 8>() }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+struct Avx512;
+#[cfg(target_arch = "x86_64")]
+impl Isa for Avx512 {
+    const FMA: bool = true;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 12, 32>() } else { kernel.run::<Self, 12, 16>() }
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+struct Neon;
+#[cfg(target_arch = "aarch64")]
+impl Isa for Neon {
+    const FMA: bool = true;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 8, 8>() } else { kernel.run::<Self, 8, 4>() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plain_is_always_there_and_names_round_trip() {
+        let available = Level::available();
+        assert_eq!(available.first(), Some(&Level::PLAIN));
+        for level in available {
+            assert_eq!(Level::named(level.name()), Ok(level));
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_is_refused_and_told_what_there_is() {
+        let error = Level::named("sse9").unwrap_err();
+        assert_eq!(error, LevelError::Unknown("sse9".to_owned()));
+        assert!(error.to_string().contains("plain"));
+        let missing = NAMES.iter().find(|(_, kind)| !kind.is_available()).map(|(name, _)| *name);
+        let missing = missing.expect("no processor has both avx512 and neon");
+        assert_eq!(Level::named(missing), Err(LevelError::Unavailable(missing)));
+    }
+
+    #[test]
+    fn the_environment_variable_decides() {
+        let expected = match std::env::var(ENVIRONMENT_VARIABLE) {
+            Ok(name) if !name.is_empty() => Level::named(&name),
+            _ => Ok(*Level::available().last().expect("plain is always there")),
+        };
+        assert_eq!(Level::detect(), expected);
+    }
+}

@@ -1,0 +1,53 @@
+//! Squared error: L = weight·Σ (y − target)², dL/dy = 2·weight·(y − target).
+//!
+//! With weight = 1/B it is the mean over samples of the squared norm over channels (paper eq. 13); with one over the number of
+//! elements, PyTorch's mean squared error. y, target [n, C].
+
+use crate::level::{Isa, Kernel, Level};
+use crate::rows::same_shape;
+use crate::{Real, Rows, RowsMut, Write};
+
+/// weight·Σ (y − target)², summed in f64.
+pub fn squared_error<T: Real>(y: Rows<'_, T>, target: Rows<'_, T>, weight: f64) -> f64 {
+    same_shape(&y, &target);
+    let row = |i: usize| y.row(i).iter().zip(target.row(i)).map(|(y, t)| (y.f64() - t.f64()).powi(2)).sum::<f64>();
+    weight * (0..y.rows()).map(row).sum::<f64>()
+}
+
+/// dy {=, +=} 2·weight·(y − target).
+pub fn squared_error_gradient<T: Real>(
+    level: Level,
+    y: Rows<'_, T>,
+    target: Rows<'_, T>,
+    weight: f64,
+    dy: RowsMut<'_, T>,
+    write: Write,
+) {
+    same_shape(&y, &target);
+    same_shape(&y, &dy.view());
+    level.run(Gradient { y, target, factor: T::of(2.0 * weight), dy, write });
+}
+
+struct Gradient<'a, T> {
+    y: Rows<'a, T>,
+    target: Rows<'a, T>,
+    factor: T,
+    dy: RowsMut<'a, T>,
+    write: Write,
+}
+
+impl<T: Real> Kernel for Gradient<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.y.rows() {
+            for ((dy, y), target) in self.dy.row_mut(i).iter_mut().zip(self.y.row(i)).zip(self.target.row(i)) {
+                let value = self.factor * (*y - *target);
+                match self.write {
+                    Write::Set => *dy = value,
+                    Write::Add => *dy += value,
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Views of a matrix or of a sequence: rows of equal length at a fixed distance; and the moves between such views.
+//!
+//! A sequence is `[time, channel]`, row-major. Because the distance between rows (`stride`) is free, the even rows, the odd
+//! rows, a range of columns (an attention head) are views of the same numbers and cost nothing. A read-only view may even
+//! overlap itself (`stride < cols`). This file holds no arithmetic but sum and difference of two views.
+
+use crate::level::{Isa, Kernel, Level};
+use crate::{Real, Write};
+
+/// Read-only rows: element (i, j) is `data[i·stride + j]`.
+#[derive(Clone, Copy, Debug)]
+pub struct Rows<'a, T> {
+    data: &'a [T],
+    rows: usize,
+    cols: usize,
+    stride: usize,
+}
+
+/// Writable rows: element (i, j) is `data[i·stride + j]`, `stride ≥ cols`.
+#[derive(Debug)]
+pub struct RowsMut<'a, T> {
+    data: &'a mut [T],
+    rows: usize,
+    cols: usize,
+    stride: usize,
+}
+
+/// Numbers that a view of this shape reaches: (rows − 1)·stride + cols, or 0 when it is empty.
+const fn reach(rows: usize, cols: usize, stride: usize) -> usize {
+    if rows == 0 || cols == 0 { 0 } else { (rows - 1) * stride + cols }
+}
+
+impl<'a, T> Rows<'a, T> {
+    /// A view of `rows` rows of `cols` numbers, `stride` apart.
+    ///
+    /// # Panics
+    /// If the slice is shorter than the view reaches: a mistake in a plan, not in data.
+    pub fn new(data: &'a [T], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(data.len() >= reach(rows, cols, stride), "{} numbers hold no {rows} x {cols} view of stride {stride}", data.len());
+        Self { data, rows, cols, stride }
+    }
+
+    /// Rows without a gap between them.
+    ///
+    /// # Panics
+    /// If the slice is shorter than `rows·cols`.
+    pub fn packed(data: &'a [T], rows: usize, cols: usize) -> Self {
+        Self::new(data, rows, cols, cols)
+    }
+
+    /// Number of rows.
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub const fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// Distance between the first elements of two neighbouring rows.
+    pub const fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Row `i`.
+    ///
+    /// # Panics
+    /// If `i` is out of range.
+    #[inline(always)]
+    pub fn row(&self, i: usize) -> &'a [T] {
+        &self.data[i * self.stride..][..self.cols]
+    }
+
+    /// Rows `start..end`.
+    pub fn range(self, start: usize, end: usize) -> Self {
+        assert!(start <= end && end <= self.rows, "rows {start}..{end} of {}", self.rows);
+        Self { data: self.data.get(start * self.stride..).unwrap_or(&[]), rows: end - start, ..self }
+    }
+
+    /// Rows `first`, `first + step`, `first + 2·step`, …
+    pub fn every(self, first: usize, step: usize) -> Self {
+        let rows = self.rows.saturating_sub(first).div_ceil(step);
+        Self { data: self.data.get(first * self.stride..).unwrap_or(&[]), rows, stride: self.stride * step, ..self }
+    }
+
+    /// Rows 0, 2, 4, …
+    pub fn even(self) -> Self {
+        self.every(0, 2)
+    }
+
+    /// Rows 1, 3, 5, …
+    pub fn odd(self) -> Self {
+        self.every(1, 2)
+    }
+
+    /// Columns `start..start + count` of every row.
+    pub fn columns(self, start: usize, count: usize) -> Self {
+        assert!(start + count <= self.cols, "columns {start}..{} of {}", start + count, self.cols);
+        Self { data: self.data.get(start..).unwrap_or(&[]), cols: count, ..self }
+    }
+}
+
+impl<'a, T> RowsMut<'a, T> {
+    /// A view of `rows` rows of `cols` numbers, `stride` apart.
+    ///
+    /// # Panics
+    /// If the slice is shorter than the view reaches, or rows would overlap.
+    pub fn new(data: &'a mut [T], rows: usize, cols: usize, stride: usize) -> Self {
+        assert!(data.len() >= reach(rows, cols, stride), "{} numbers hold no {rows} x {cols} view of stride {stride}", data.len());
+        assert!(stride >= cols || rows <= 1, "writable rows of {cols} overlap at stride {stride}");
+        Self { data, rows, cols, stride }
+    }
+
+    /// Rows without a gap between them.
+    ///
+    /// # Panics
+    /// If the slice is shorter than `rows·cols`.
+    pub fn packed(data: &'a mut [T], rows: usize, cols: usize) -> Self {
+        Self::new(data, rows, cols, cols)
+    }
+
+    /// Number of rows.
+    pub const fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Number of columns.
+    pub const fn cols(&self) -> usize {
+        self.cols
+    }
+
+    /// Distance between the first elements of two neighbouring rows.
+    pub const fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Row `i`, to be written.
+    ///
+    /// # Panics
+    /// If `i` is out of range.
+    #[inline(always)]
+    pub fn row_mut(&mut self, i: usize) -> &mut [T] {
+        &mut self.data[i * self.stride..][..self.cols]
+    }
+
+    /// The same rows, to be read.
+    #[inline(always)]
+    pub fn view(&self) -> Rows<'_, T> {
+        Rows { data: self.data, rows: self.rows, cols: self.cols, stride: self.stride }
+    }
+
+    /// The same rows under a shorter borrow.
+    #[inline(always)]
+    pub fn reborrow(&mut self) -> RowsMut<'_, T> {
+        RowsMut { data: self.data, rows: self.rows, cols: self.cols, stride: self.stride }
+    }
+
+    /// Rows `start..end`.
+    pub fn range(self, start: usize, end: usize) -> Self {
+        assert!(start <= end && end <= self.rows, "rows {start}..{end} of {}", self.rows);
+        Self { data: self.data.get_mut(start * self.stride..).unwrap_or(&mut []), rows: end - start, ..self }
+    }
+
+    /// Rows `first`, `first + step`, `first + 2·step`, …
+    pub fn every(self, first: usize, step: usize) -> Self {
+        let rows = self.rows.saturating_sub(first).div_ceil(step);
+        Self { data: self.data.get_mut(first * self.stride..).unwrap_or(&mut []), rows, stride: self.stride * step, ..self }
+    }
+
+    /// Rows 0, 2, 4, …
+    pub fn even(self) -> Self {
+        self.every(0, 2)
+    }
+
+    /// Rows 1, 3, 5, …
+    pub fn odd(self) -> Self {
+        self.every(1, 2)
+    }
+
+    /// Columns `start..start + count` of every row.
+    pub fn columns(self, start: usize, count: usize) -> Self {
+        assert!(start + count <= self.cols, "columns {start}..{} of {}", start + count, self.cols);
+        Self { data: self.data.get_mut(start..).unwrap_or(&mut []), cols: count, ..self }
+    }
+}
+
+/// Panics unless two shapes agree.
+#[inline(always)]
+pub(crate) fn same_shape<T, U>(x: &Rows<'_, T>, y: &Rows<'_, U>) {
+    assert!(x.rows == y.rows && x.cols == y.cols, "shapes {} x {} and {} x {} differ", x.rows, x.cols, y.rows, y.cols);
+}
+
+/// y {=, +=} factor·x.
+struct Scale<'a, T> {
+    factor: T,
+    x: Rows<'a, T>,
+    y: RowsMut<'a, T>,
+    write: Write,
+}
+
+impl<T: Real> Kernel for Scale<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.x.rows {
+            let pairs = self.y.row_mut(i).iter_mut().zip(self.x.row(i));
+            match self.write {
+                Write::Set => pairs.for_each(|(y, x)| *y = self.factor * *x),
+                Write::Add => pairs.for_each(|(y, x)| *y += self.factor * *x),
+            }
+        }
+    }
+}
+
+/// y {=, +=} x, both [n, C].
+pub fn copy<T: Real>(level: Level, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
+    scale(level, T::ONE, x, y, write);
+}
+
+/// y {=, +=} factor·x, both [n, C].
+pub fn scale<T: Real>(level: Level, factor: T, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
+    same_shape(&x, &y.view());
+    level.run(Scale { factor, x, y, write });
+}
+
+/// y = a + sign·b.
+struct Combine<'a, T> {
+    a: Rows<'a, T>,
+    b: Rows<'a, T>,
+    sign: T,
+    y: RowsMut<'a, T>,
+}
+
+impl<T: Real> Kernel for Combine<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.a.rows {
+            for ((y, a), b) in self.y.row_mut(i).iter_mut().zip(self.a.row(i)).zip(self.b.row(i)) {
+                *y = *a + self.sign * *b;
+            }
+        }
+    }
+}
+
+/// y = a + b, all [n, C].
+pub fn add<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
+    same_shape(&a, &b);
+    same_shape(&a, &y.view());
+    level.run(Combine { a, b, sign: T::ONE, y });
+}
+
+/// y = a − b, all [n, C].
+pub fn subtract<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
+    same_shape(&a, &b);
+    same_shape(&a, &y.view());
+    level.run(Combine { a, b, sign: -T::ONE, y });
+}
+
+/// Splits a sequence x [n, C] into its even rows [⌈n/2⌉, C] and odd rows [⌊n/2⌋, C]. Exact.
+pub fn split<T: Real>(level: Level, x: Rows<'_, T>, even: RowsMut<'_, T>, odd: RowsMut<'_, T>) {
+    copy(level, x.even(), even, Write::Set);
+    copy(level, x.odd(), odd, Write::Set);
+}
+
+/// The inverse of [`split`], and with `Write::Add` its adjoint's accumulating form: y[2i] {=, +=} even[i], y[2i+1] {=, +=} odd[i].
+pub fn interleave<T: Real>(level: Level, even: Rows<'_, T>, odd: Rows<'_, T>, mut y: RowsMut<'_, T>, write: Write) {
+    copy(level, even, y.reborrow().even(), write);
+    copy(level, odd, y.odd(), write);
+}
+
+/// Every element of y becomes `value`.
+pub fn fill<T: Real>(mut y: RowsMut<'_, T>, value: T) {
+    for i in 0..y.rows {
+        y.row_mut(i).fill(value);
+    }
+}

@@ -1,0 +1,196 @@
+//! The commands and their options, as `phyture <command> --help` shows them.
+
+use clap::{Args, Parser, Subcommand};
+use phyture::flight::split::Protocol;
+use std::path::PathBuf;
+
+/// Calibrate a first-principles model of an unmanned helicopter on recorded flights, see where it fails, and learn the rest.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 110, after_help = "Start with: phyture demo")]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Options of every command.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// Options of every command.
+#[derive(Args)]
+pub struct Common {
+    /// Write the machine-readable result to FILE, `-` for standard output
+    #[arg(long, global = true, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Seed of everything random
+    #[arg(long, global = true)]
+    pub seed: Option<u64>,
+    /// Threads to work on [default: all cores]
+    #[arg(long, global = true)]
+    pub threads: Option<usize>,
+}
+
+/// Where the flights are and how to read them.
+#[derive(Args)]
+pub struct Data {
+    /// Data folder, DATA/<manoeuvre>/<flight>.csv; or one CSV or Parquet file
+    pub data: PathBuf,
+    /// Description of logs that differ from the canonical form [default: DATA/dataset.toml if there is one]
+    #[arg(long, value_name = "FILE")]
+    pub dataset: Option<PathBuf>,
+    /// Turn a flight with gaps in its time into several flights
+    #[arg(long)]
+    pub split_at_gaps: bool,
+}
+
+/// What trains and what tests.
+#[derive(Args)]
+pub struct Division {
+    /// Manoeuvre class or flight that is never trained on; repeatable; adds to `locked` of the model file
+    #[arg(long, value_name = "NAME")]
+    pub lock: Vec<String>,
+    /// Without locked flights: `segments` (random 10-s segments, 70/20/10) or `first SHARE` [default: the model file's, or segments]
+    #[arg(long)]
+    pub split: Option<Protocol>,
+}
+
+/// The commands.
+#[derive(Subcommand)]
+pub enum Command {
+    /// The whole story on built-in data: simulate, check, calibrate, train, compare on flights that nothing saw
+    #[command(after_help = "Example:\n  phyture demo --out demo\n  phyture demo --quick        # a minute, a smaller network")]
+    Demo {
+        /// Folder for data, models and the report
+        #[arg(long, default_value = "phyture-demo")]
+        out: PathBuf,
+        /// A smaller data set and a shorter training
+        #[arg(long)]
+        quick: bool,
+    },
+    /// Flights of the built-in truth helicopter
+    #[command(
+        after_help = "Examples:\n  phyture simulate flights --minutes 30 --seed 7\n  phyture simulate flights --baseline --hide ground_effect --hide cyclic_lag=0.5\n  phyture simulate flights --like stanford"
+    )]
+    Simulate {
+        /// Folder to write
+        dir: PathBuf,
+        /// Flight time, minutes
+        #[arg(long, default_value_t = 30.0)]
+        minutes: f64,
+        /// Switch one effect on in the truth that the model file beside the data does not list; EFFECT or EFFECT=SCALE; repeatable
+        #[arg(long, value_name = "EFFECT[=SCALE]")]
+        hide: Vec<String>,
+        /// Switch every mechanism off but those of --hide: the truth is then the paper's baseline, gusts and noise
+        #[arg(long)]
+        baseline: bool,
+        /// `stanford`: 20 manoeuvre classes and 7376 s, as the paper's data
+        #[arg(long, value_name = "SET", value_parser = ["stanford"])]
+        like: Option<String>,
+        /// Layout of the files: canonical CSV or the Stanford set's own
+        #[arg(long, default_value = "csv", value_parser = ["csv", "stanford"])]
+        layout: String,
+    },
+    /// Conventions, timing and excitation of a data set; exit code 3 on a convention fault
+    #[command(after_help = "Example:\n  phyture check flights --json check.json")]
+    Check {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+    },
+    /// Least squares of the model's coefficients on the training part
+    #[command(after_help = "Example:\n  phyture calibrate flights -m n9.toml -o n9-calibrated.toml")]
+    Calibrate {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file [default: the paper's baseline]
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+        /// Calibrated model file to write
+        #[arg(short, long)]
+        output: PathBuf,
+        /// What trains and what tests.
+        #[command(flatten)]
+        division: Division,
+    },
+    /// Measured against predicted for each model given, per channel, manoeuvre and regime
+    #[command(after_help = "Example:\n  phyture compare flights -m n9-calibrated.toml -n run --report report")]
+    Compare {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file; repeatable
+        #[arg(short, long, required_unless_present = "network")]
+        model: Vec<PathBuf>,
+        /// Trained network: a run folder; repeatable
+        #[arg(short, long)]
+        network: Vec<PathBuf>,
+        /// Folder for the HTML page
+        #[arg(long, value_name = "DIR")]
+        report: Option<PathBuf>,
+        /// Samples between evaluated windows [default: 100 with a network, 1 without]
+        #[arg(long)]
+        stride: Option<usize>,
+        /// Evaluate every flight, also those that were trained on
+        #[arg(long)]
+        all: bool,
+        /// Add a ridge regression on so many lags, fitted on the training part, as a further row
+        #[arg(long, value_name = "LAGS")]
+        ridge: Option<usize>,
+        /// What trains and what tests.
+        #[command(flatten)]
+        division: Division,
+    },
+    /// Train the residual network; crash-safe checkpoints, Ctrl-C saves
+    #[command(
+        after_help = "Example:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume"
+    )]
+    Train {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Calibrated model file
+        #[arg(short, long)]
+        model: PathBuf,
+        /// Run folder to write
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Training configuration (TOML)
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// Go on from the run folder's last checkpoint
+        #[arg(long)]
+        resume: bool,
+        /// What trains and what tests.
+        #[command(flatten)]
+        division: Division,
+    },
+    /// Hybrid predictions for every sample that has a full history
+    #[command(after_help = "Example:\n  phyture predict flights -m n9-calibrated.toml -n run -o predictions.parquet")]
+    Predict {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file; the run's own where it is left out
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+        /// Run folder
+        #[arg(short, long)]
+        network: PathBuf,
+        /// CSV or Parquet file to write, by its ending
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Samples between predictions
+        #[arg(long, default_value_t = 1)]
+        stride: usize,
+    },
+    /// Forward, backward and an Adam step against the figures a file brings from PyTorch
+    #[command(after_help = "Example:\n  phyture parity small_f32.safetensors --json -")]
+    Parity {
+        /// Safetensors file with weights, inputs, outputs and gradients
+        file: PathBuf,
+    },
+}

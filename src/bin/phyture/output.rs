@@ -1,0 +1,82 @@
+//! How results reach people and programs: text on standard output, JSON where asked, progress on standard error.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use phyture::flight::atomic::write_atomically;
+use phyture::{Error, Result};
+use serde::Serialize;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Writes the machine-readable result, to standard output for `-`.
+pub fn json(target: Option<&Path>, value: &impl Serialize) -> Result<()> {
+    let Some(path) = target else { return Ok(()) };
+    let mut text =
+        serde_json::to_string_pretty(value).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+    text.push('\n');
+    if path == Path::new("-") {
+        return std::io::stdout().write_all(text.as_bytes()).map_err(Error::io(path));
+    }
+    write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Text for a person: on standard output, unless that carries the JSON; then on standard error.
+pub fn say(json: Option<&Path>, text: impl std::fmt::Display) {
+    if json == Some(Path::new("-")) {
+        eprintln!("{text}");
+    } else {
+        // A closed pipe (`phyture … | head`) is no error of the work.
+        let _ = writeln!(std::io::stdout(), "{text}");
+    }
+}
+
+/// Progress of long work: a bar with time left on a terminal, a plain line now and then otherwise.
+pub struct Progress {
+    bar: ProgressBar,
+    plain: bool,
+    begun: Instant,
+    told: Instant,
+    what: String,
+}
+
+/// How often a plain line is written when there is no terminal.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
+
+impl Progress {
+    /// A bar of `steps` steps, `done` of which are behind already.
+    pub fn new(what: &str, steps: u64, done: u64) -> Self {
+        let plain = !std::io::stderr().is_terminal();
+        let bar = ProgressBar::with_draw_target(
+            Some(steps),
+            if plain { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() },
+        );
+        if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}  {elapsed} gone, {eta} left") {
+            bar.set_style(style);
+        }
+        bar.set_prefix(what.to_owned());
+        bar.set_position(done);
+        bar.reset_eta();
+        let now = Instant::now();
+        Self { bar, plain, begun: now, told: now, what: what.to_owned() }
+    }
+
+    /// Moves to `position` with a short message (loss, rate).
+    pub fn at(&mut self, position: u64, message: impl FnOnce() -> String) {
+        if !self.plain {
+            self.bar.set_message(message());
+            self.bar.set_position(position);
+        } else if self.told.elapsed() >= PLAIN_INTERVAL {
+            self.told = Instant::now();
+            self.bar.set_position(position);
+            let (length, gone) = (self.bar.length().unwrap_or(position), self.begun.elapsed().as_secs_f64());
+            let left = gone / position.max(1) as f64 * length.saturating_sub(position) as f64;
+            eprintln!("{} {position}/{length}  {}  {gone:.0} s gone, about {left:.0} s left", self.what, message());
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}

@@ -1,0 +1,181 @@
+//! Blocks of ten seconds and the intervals that rest on them.
+//!
+//! Neighbouring samples of a flight are far from independent: an error lasts as long as the manoeuvre that causes it. A mean
+//! over samples is therefore given an interval from means over *blocks*, which are taken as independent. This file cuts
+//! windows into blocks and turns block sums into a mean and its 95 % interval. It does not know what is averaged.
+
+use crate::flight::{Flight, Window};
+
+/// Length of a block, s. Longer than the manoeuvres and the slow attitude and speed modes of a small helicopter (1 s to 5 s).
+pub const BLOCK_S: f64 = 10.0;
+
+/// Blocks below which an interval is shown but marked: Student's t is then above 2.8 and rests on the block means being normal.
+pub const FEW_BLOCKS: usize = 5;
+
+/// The block of every window, numbered from 0 without gaps in the order of flight and time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Blocks {
+    /// One entry a window: the number of its block.
+    pub of_window: Vec<usize>,
+    /// One entry a block: the flight and the ten seconds of that flight, counted from its first sample.
+    pub keys: Vec<(usize, usize)>,
+}
+
+impl Blocks {
+    /// Cuts windows into blocks of [`BLOCK_S`] by the time of their last row. A flight starts a new block.
+    ///
+    /// A window whose flight is not in `flights` is given the block of a flight with a step of one second; callers check before.
+    pub fn new(flights: &[Flight], windows: &[Window]) -> Self {
+        let key = |window: &Window| {
+            let step_s = flights.get(window.flight).map_or(1.0, |flight| flight.step_s);
+            // A block holds a whole number of samples, so that rounding of the step cannot move a sample across.
+            let samples = (BLOCK_S / step_s).round().max(1.0) as usize;
+            (window.flight, window.last / samples)
+        };
+        let mut keys: Vec<(usize, usize)> = windows.iter().map(key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let of_window = windows.iter().map(|window| keys.partition_point(|other| *other < key(window))).collect();
+        Self { of_window, keys }
+    }
+
+    /// Number of blocks.
+    pub fn len(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Whether there is no block, which is to say no window.
+    pub fn is_empty(&self) -> bool {
+        self.keys.is_empty()
+    }
+}
+
+/// Number of samples of one block and the sum of a quantity over them.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BlockSum {
+    /// Samples.
+    pub samples: f64,
+    /// Sum over the samples.
+    pub sum: f64,
+}
+
+/// A mean over samples with the standard error that the scatter between blocks gives it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BlockMean {
+    /// Σ sums / Σ samples.
+    pub mean: f64,
+    /// Standard error of the mean; absent with fewer than two blocks.
+    pub standard_error: Option<f64>,
+    /// Blocks that hold at least one sample.
+    pub blocks: usize,
+}
+
+impl BlockMean {
+    /// The ratio estimate m = Σ sᵦ / Σ nᵦ over blocks b and its sandwich variance
+    /// B/(B−1) · Σ (sᵦ − m nᵦ)² / (Σ nᵦ)² (Cochran, *Sampling Techniques*, 3rd ed., eq. 6.13 without the finite-population
+    /// factor). Blocks without samples are left out. `None` if there is no sample at all.
+    pub fn new(sums: impl Iterator<Item = BlockSum> + Clone) -> Option<Self> {
+        let (mut blocks, mut samples, mut sum) = (0_usize, 0.0, 0.0);
+        for block in sums.clone().filter(|block| block.samples > 0.0) {
+            blocks += 1;
+            samples += block.samples;
+            sum += block.sum;
+        }
+        if blocks == 0 {
+            return None;
+        }
+        let mean = sum / samples;
+        let standard_error = (blocks > 1).then(|| {
+            let scatter: f64 =
+                sums.filter(|block| block.samples > 0.0).map(|block| (block.sum - mean * block.samples).powi(2)).sum();
+            let count = blocks as f64;
+            (count / (count - 1.0) * scatter).sqrt() / samples
+        });
+        Some(Self { mean, standard_error, blocks })
+    }
+
+    /// 95 % interval of the mean, mean ± t · standard error with B − 1 degrees of freedom.
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        let half = student_975(self.blocks.saturating_sub(1)) * self.standard_error?;
+        Some([self.mean - half, self.mean + half])
+    }
+
+    /// 95 % interval of the square root of a mean of squares, made on the logarithm so that it stays positive:
+    /// √m · exp(± t · se / (2 m)) (delta method).
+    pub fn root_interval(&self) -> Option<[f64; 2]> {
+        let standard_error = self.standard_error?;
+        if self.mean <= 0.0 {
+            return Some([0.0, 0.0]);
+        }
+        let half = student_975(self.blocks.saturating_sub(1)) * standard_error / (2.0 * self.mean);
+        let root = self.mean.sqrt();
+        Some([root * (-half).exp(), root * half.exp()])
+    }
+}
+
+/// 97.5 % quantile of Student's t: tabulated to 10 degrees of freedom (Abramowitz and Stegun, table 26.10), above that the
+/// expansion about the normal quantile (ibid., eq. 26.7.5), which is then within 2e-4 of it. Infinite for 0 degrees of freedom.
+pub fn student_975(degrees: usize) -> f64 {
+    const TABLE: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+    const NORMAL: f64 = 1.959_964;
+    if degrees == 0 {
+        return f64::INFINITY;
+    }
+    if let Some(value) = TABLE.get(degrees - 1) {
+        return *value;
+    }
+    let (z, n) = (NORMAL, degrees as f64);
+    let (z3, z5, z7) = (z.powi(3), z.powi(5), z.powi(7));
+    z + (z3 + z) / (4.0 * n)
+        + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * n.powi(2))
+        + (3.0 * z7 + 19.0 * z5 + 17.0 * z3 - 15.0 * z) / (384.0 * n.powi(3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    const CLOSE: f64 = Tolerance::Close.relative_f64();
+
+    #[test]
+    fn equal_blocks_give_the_textbook_standard_error() {
+        // Block means 1, 2, 3, 4 of 5 samples each: s² = 5/3, se = sqrt(s² / 4).
+        let sums = [1.0, 2.0, 3.0, 4.0].map(|mean| BlockSum { samples: 5.0, sum: 5.0 * mean });
+        let mean = BlockMean::new(sums.into_iter());
+        let expected = (5.0_f64 / 3.0 / 4.0).sqrt();
+        assert!(mean.is_some_and(|mean| (mean.mean - 2.5).abs() <= CLOSE && mean.blocks == 4));
+        assert!(mean.and_then(|mean| mean.standard_error).is_some_and(|error| (error - expected).abs() <= CLOSE));
+    }
+
+    #[test]
+    fn one_block_has_no_interval_and_none_has_no_mean() {
+        let one = BlockMean::new([BlockSum { samples: 3.0, sum: 6.0 }].into_iter());
+        assert!(one.is_some_and(|mean| mean.mean.to_bits() == 2.0_f64.to_bits() && mean.interval().is_none()));
+        assert_eq!(BlockMean::new([BlockSum::default()].into_iter()), None);
+    }
+
+    #[test]
+    fn quantiles_fall_to_the_normal_one() {
+        // Published values: t(0.975; 11) = 2.201, (30) = 2.042, (120) = 1.980; three decimals are printed.
+        for (degrees, published) in [(11, 2.201), (30, 2.042), (120, 1.980)] {
+            assert_eq!(format!("{:.3}", student_975(degrees)), format!("{published:.3}"));
+        }
+        assert!((1..200).all(|degrees| student_975(degrees) > student_975(degrees + 1)));
+    }
+
+    proptest! {
+        #[test]
+        fn the_interval_holds_the_mean_and_scales(sums in prop::collection::vec((1.0..50.0_f64, 0.0..9.0_f64), 2..20), by in 0.1..10.0_f64) {
+            let make = |by: f64| BlockMean::new(sums.iter().map(move |(samples, value)| BlockSum { samples: *samples, sum: by * samples * value }));
+            let (one, other) = (make(1.0), make(by));
+            let inside = |mean: BlockMean| mean.interval().is_some_and(|[low, high]| low <= mean.mean && mean.mean <= high);
+            prop_assert!(one.is_some_and(inside));
+            let scaled = one.zip(other).is_some_and(|(a, b)| (a.mean * by - b.mean).abs() <= CLOSE * b.mean.abs().max(1.0));
+            prop_assert!(scaled);
+            let positive = one.and_then(|mean| mean.root_interval()).is_some_and(|[low, high]| 0.0 <= low && low <= high);
+            prop_assert!(positive);
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! A flight as the checks see it: sample by sample for the geometry, in pieces of 0.2 s for the comparison.
+//!
+//! Every relation ṡ = f is checked in its integral form, s(t₁) − s(t₀) = ∫ f dt over a piece (trapezoidal rule). That needs no
+//! differentiator, and noise enters at the two ends only. No verdicts here.
+
+use crate::critique::blocks::BLOCK_S;
+use crate::flight::attitude::{Matrix3, gravity_body, rotation_body_to_inertial};
+use crate::flight::{Column, Flight, Targets};
+use std::ops::Range;
+
+/// Three components.
+pub(super) type Vector = [f64; 3];
+
+/// Length of a piece, s: short against manoeuvres, long against the noise of one sample.
+const PIECE_S: f64 = 0.2;
+
+/// One sample.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Instant {
+    /// m, north-east-down.
+    pub position: Vector,
+    /// Roll, pitch, yaw, rad.
+    pub angles: Vector,
+    /// R_b^in of the angles.
+    pub rotation: Matrix3,
+    /// R_in^b g, m/s².
+    pub gravity: Vector,
+    /// Velocity in body axes, m/s.
+    pub velocity: Vector,
+    /// Body rates, rad/s.
+    pub rates: Vector,
+    /// v̇ as the log has it, m/s².
+    pub linear_target: Vector,
+    /// ω̇ as the log has it, rad/s².
+    pub angular_target: Vector,
+    /// u1 … u4.
+    pub controls: [f64; 4],
+}
+
+/// The samples of one flight, and what of them was recorded.
+pub(super) struct Motion {
+    pub step_s: f64,
+    pub instants: Vec<Instant>,
+    /// Position is in the log.
+    pub position: bool,
+    /// Heading is in the log.
+    pub heading: bool,
+    /// The accelerations are in the log.
+    pub recorded: bool,
+}
+
+impl Motion {
+    pub fn new(flight: &Flight) -> Self {
+        let at = |columns: [Column; 3], sample: usize| columns.map(|column| flight.column(column)[sample]);
+        let instant = |sample: usize| {
+            let angles = at([Column::Roll, Column::Pitch, Column::Yaw], sample);
+            Instant {
+                position: at([Column::X, Column::Y, Column::Z], sample),
+                angles,
+                rotation: rotation_body_to_inertial(angles[0], angles[1], angles[2]),
+                gravity: gravity_body(angles[0], angles[1]),
+                velocity: at([Column::Vx, Column::Vy, Column::Vz], sample),
+                rates: at([Column::Wx, Column::Wy, Column::Wz], sample),
+                linear_target: at([Column::VxDot, Column::VyDot, Column::VzDot], sample),
+                angular_target: at([Column::WxDot, Column::WyDot, Column::WzDot], sample),
+                controls: [Column::U1, Column::U2, Column::U3, Column::U4].map(|column| flight.column(column)[sample]),
+            }
+        };
+        let lacks = |column: Column| flight.absent.contains(&column);
+        Self {
+            step_s: flight.step_s,
+            instants: (0..flight.len()).map(instant).collect(),
+            position: ![Column::X, Column::Y, Column::Z].into_iter().any(lacks),
+            heading: !lacks(Column::Yaw),
+            recorded: flight.targets == Targets::Recorded,
+        }
+    }
+
+    /// Samples of a block.
+    pub fn block_samples(&self) -> usize {
+        (BLOCK_S / self.step_s).round().max(1.0) as usize
+    }
+
+    /// First and last sample of each piece, `margin` samples away from the ends of the flight, with its block in this flight.
+    pub fn pieces(&self, margin: usize) -> impl Iterator<Item = (Range<usize>, usize)> + '_ {
+        let length = ((PIECE_S / self.step_s).round() as usize).max(1);
+        let last = self.instants.len().saturating_sub(margin + 1);
+        (margin..)
+            .step_by(length)
+            .take_while(move |start| start + length <= last)
+            .map(move |start| (start..start + length, start / self.block_samples()))
+    }
+
+    /// ∫ f dt over a piece, with `f` given the sample.
+    pub fn integral<const N: usize>(&self, piece: &Range<usize>, f: impl Fn(usize) -> [f64; N]) -> [f64; N] {
+        let mut sum = [0.0; N];
+        for sample in piece.start..=piece.end {
+            let weight = if sample == piece.start || sample == piece.end { 0.5 } else { 1.0 };
+            sum.iter_mut().zip(f(sample)).for_each(|(sum, value)| *sum += weight * self.step_s * value);
+        }
+        sum
+    }
+}
+
+/// Length of a piece of this flight, s.
+pub(super) fn length_s(motion: &Motion, piece: &Range<usize>) -> f64 {
+    motion.step_s * (piece.end - piece.start) as f64
+}

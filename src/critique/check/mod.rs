@@ -1,0 +1,167 @@
+//! Before any physics: is the log what the program takes it for? Conventions, timing, excitation.
+//!
+//! A wrong sign or frame looks like a missing effect, and a large one; so this comes first and blocks what follows. Kinematic
+//! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
+//! little (`forces`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
+
+mod excitation;
+mod forces;
+mod gains;
+mod increments;
+mod regression;
+mod relations;
+mod report;
+mod timing;
+
+pub use excitation::{Collinearity, Excitation};
+pub use report::{CheckReport, Finding, Subject, Verdict};
+pub use timing::DelayProfile;
+
+use crate::flight::{Column, DataSet, Flight, Targets};
+use crate::physics::Model;
+
+/// Largest magnitude of a control that is still "about [−1, 1]".
+const LARGEST_CONTROL: f64 = 1.5;
+
+/// Checks conventions, timing and excitation of a data set. Of `model`, if there is one, only the control delay is used.
+///
+/// Conventions: ṗ = R v; Ṙᵀ = Rᵀ × ω; recorded targets against the derivatives of v and ω; the force along x and y, which a
+/// rotor keeps small; and free coefficients of gravity and −ω × v, expected to be 1 (paper eq. 14). Intervals are 95 %, from blocks of
+/// 10 s. A fault is named only where another convention explains the log better by a wide margin; a modelling error alone
+/// does not make one.
+pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
+    let mut relations = [
+        relations::Relation::position(),
+        relations::Relation::attitude(true),
+        relations::Relation::attitude(false),
+        relations::Relation::linear_targets(),
+        relations::Relation::angular_targets(),
+    ];
+    let (mut gains, mut forces, mut timing) = (gains::Gains::new(), forces::Forces::new(), timing::Timing::new());
+    for (index, flight) in data.flights.iter().enumerate() {
+        let motion = increments::Motion::new(flight);
+        relations.iter_mut().for_each(|relation| relation.add(index, &motion));
+        gains.add(index, &motion);
+        forces.add(index, &motion);
+        timing.add(index, &motion);
+    }
+
+    let mut findings = vec![origin(&data.flights)];
+    for relation in &relations {
+        let Some(finding) = relation.finding() else { continue };
+        // Gains of a relation that is known to be read wrongly say nothing more.
+        let fault = finding.verdict == Verdict::Fault;
+        findings.push(finding);
+        if !fault {
+            findings.extend(gains.findings(relation.name));
+        }
+    }
+    findings.extend(forces.lateral());
+    findings.extend(forces.coefficients());
+    findings.extend(plausibility(&data.flights));
+    findings.extend(timing.offsets());
+    let (delay, control_delay) = timing.control_delay(model.map(|model| model.data.control_delay_s));
+    findings.push(delay);
+    let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
+    findings.extend(excitation::findings(&excitation, &collinearity));
+
+    CheckReport {
+        fault: findings.iter().any(|finding| finding.verdict == Verdict::Fault),
+        summary: summary(&findings),
+        flights: data.flights.len(),
+        duration_s: data.duration_s(),
+        targets: if data.flights.iter().any(|flight| flight.targets == Targets::Derived) {
+            Targets::Derived
+        } else {
+            Targets::Recorded
+        },
+        findings,
+        control_delay,
+        excitation,
+        collinearity,
+        notes: data.notes.clone(),
+    }
+}
+
+fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> Finding {
+    Finding {
+        name: name.into(),
+        subject: Subject::Conventions,
+        verdict,
+        measured: None,
+        interval: None,
+        expected: None,
+        unit: "1".into(),
+        message,
+        set: set.map(Into::into),
+    }
+}
+
+/// Where the accelerations come from.
+fn origin(flights: &[Flight]) -> Finding {
+    let derived = flights.iter().filter(|flight| flight.targets == Targets::Derived).count();
+    let message = match derived {
+        0 => "accelerations are recorded".into(),
+        _ => format!(
+            "accelerations of {derived} of {} flights are derived from v and w: their conventions cannot be checked apart from those",
+            flights.len()
+        ),
+    };
+    finding("targets", Verdict::Ok, message, None)
+}
+
+/// Ranges that no aircraft of this kind leaves.
+fn plausibility(flights: &[Flight]) -> Vec<Finding> {
+    let largest = |columns: &[Column]| {
+        let values = flights.iter().flat_map(|flight| columns.iter().flat_map(|column| flight.column(*column)));
+        values.fold(0.0_f64, |largest, value| largest.max(value.abs()))
+    };
+    let mut findings = Vec::new();
+    let pitch = largest(&[Column::Pitch]);
+    // Half a degree of slack for rounding in the log.
+    if pitch > std::f64::consts::FRAC_PI_2 + 0.01 {
+        let message =
+            format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
+        findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
+    }
+    let control = largest(&[Column::U1, Column::U2, Column::U3, Column::U4]);
+    if control > LARGEST_CONTROL {
+        let message =
+            format!("controls reach {control:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]");
+        findings.push(finding(
+            "control_range",
+            Verdict::Warning,
+            message,
+            Some("[columns] u1 = \"u1 / 1000\" or the like, with the file's names"),
+        ));
+    }
+    let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
+    let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
+        (below + flight.column(Column::Z).iter().filter(|z| **z > 0.0).count(), samples + flight.len())
+    });
+    if 2 * below > samples {
+        let message = format!(
+            "z, which is down, is positive in {} % of the samples: flights below the starting point, or z is height",
+            100 * below / samples.max(1)
+        );
+        findings.push(finding(
+            "height_sign",
+            Verdict::Warning,
+            message,
+            Some("[columns] z = \"-z\", with the file's name, if z is height"),
+        ));
+    }
+    findings
+}
+
+fn summary(findings: &[Finding]) -> String {
+    let of = |verdict: Verdict| findings.iter().filter(move |finding| finding.verdict == verdict);
+    let names = |verdict: Verdict| of(verdict).map(|finding| finding.name.as_str()).collect::<Vec<_>>().join(", ");
+    if let Some(first) = of(Verdict::Fault).next() {
+        return format!("Convention fault ({}): {}.", names(Verdict::Fault), first.message);
+    }
+    match of(Verdict::Warning).count() {
+        0 => "No convention fault, no warning.".into(),
+        _ => format!("No convention fault; warnings: {}.", names(Verdict::Warning)),
+    }
+}

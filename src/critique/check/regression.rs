@@ -1,0 +1,102 @@
+//! Least squares on sums by block, and intervals that hold where errors within a block depend on each other.
+
+use crate::critique::blocks::student_975;
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Sums of one block: XᵀX, Xᵀy and Σy².
+#[derive(Clone)]
+struct Sums<const K: usize> {
+    gram: [[f64; K]; K],
+    moment: [f64; K],
+    square: f64,
+    rows: f64,
+}
+
+/// A regression y = Xβ + e on K columns, kept as sums by block.
+#[derive(Clone)]
+pub(super) struct BlockRegression<const K: usize> {
+    blocks: Vec<Sums<K>>,
+    open: Option<(usize, usize)>,
+}
+
+/// One coefficient.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Estimate {
+    pub value: f64,
+    /// 95 % interval.
+    pub interval: [f64; 2],
+}
+
+impl<const K: usize> BlockRegression<K> {
+    pub fn new() -> Self {
+        Self { blocks: Vec::new(), open: None }
+    }
+
+    /// Adds one row. Rows of one block (flight, number) come together.
+    pub fn add(&mut self, block: (usize, usize), row: &[f64; K], value: f64) {
+        if self.open != Some(block) {
+            self.open = Some(block);
+            self.blocks.push(Sums { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 });
+        }
+        let Some(sums) = self.blocks.last_mut() else { return };
+        sums.square += value * value;
+        sums.rows += 1.0;
+        for (i, left) in row.iter().enumerate() {
+            sums.moment[i] += left * value;
+            row.iter().enumerate().for_each(|(j, right)| sums.gram[i][j] += left * right);
+        }
+    }
+
+    pub fn blocks(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// β and its intervals from the sandwich (XᵀX)⁻¹ (Σ s_b s_bᵀ) (XᵀX)⁻¹ with block scores s_b = X_bᵀ e_b (Liang & Zeger
+    /// 1986), times B/(B − 1), and Student's t with B − K degrees of freedom. `None` if there are too few blocks or the columns
+    /// do not determine β.
+    pub fn estimates(&self) -> Option<[Estimate; K]> {
+        let count = self.blocks.len();
+        if count <= K {
+            return None;
+        }
+        let total = |i: usize, j: usize| self.blocks.iter().map(|sums| sums.gram[i][j]).sum::<f64>();
+        // Columns in units of their own length, so that the factorisation sees correlations and not units.
+        let scale: [f64; K] = std::array::from_fn(|i| total(i, i).sqrt());
+        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
+            return None;
+        }
+        let gram = DMatrix::from_fn(K, K, |i, j| total(i, j) / (scale[i] * scale[j]));
+        let inverse = Cholesky::new(gram)?.inverse();
+        let moment = DVector::from_fn(K, |i, _| self.blocks.iter().map(|sums| sums.moment[i]).sum::<f64>() / scale[i]);
+        let beta = &inverse * moment;
+        let mut meat = DMatrix::<f64>::zeros(K, K);
+        for sums in &self.blocks {
+            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j] / scale[j]).sum::<f64>();
+            let score = DVector::from_fn(K, |i, _| (sums.moment[i] - fitted(i)) / scale[i]);
+            meat += &score * score.transpose();
+        }
+        let blocks = count as f64;
+        let covariance = &inverse * meat * &inverse * (blocks / (blocks - 1.0));
+        let quantile = student_975(count - K);
+        let estimates = std::array::from_fn(|i| {
+            let (value, half) = (beta[i] / scale[i], quantile * covariance[(i, i)].max(0.0).sqrt() / scale[i]);
+            Estimate { value, interval: [value - half, value + half] }
+        });
+        estimates.iter().all(|estimate| estimate.interval.iter().all(|bound| bound.is_finite())).then_some(estimates)
+    }
+
+    /// Rows added.
+    pub fn rows(&self) -> f64 {
+        self.blocks.iter().map(|sums| sums.rows).sum()
+    }
+
+    /// Sum of squared errors of each block under the common least-squares fit. `None` as in [`BlockRegression::estimates`].
+    pub fn errors(&self) -> Option<Vec<f64>> {
+        let beta = self.estimates()?.map(|estimate| estimate.value);
+        let error = |sums: &Sums<K>| {
+            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j]).sum::<f64>();
+            (sums.square + (0..K).map(|i| beta[i] * (fitted(i) - 2.0 * sums.moment[i])).sum::<f64>()).max(0.0)
+        };
+        Some(self.blocks.iter().map(error).collect())
+    }
+}

@@ -1,0 +1,269 @@
+//! Kinematic relations between the streams of a log, each with the ways in which logs are known to break them.
+//!
+//! A relation is ṡ = f under the conventions of this program. A hypothesis is another reading of the same log, with its own s
+//! and f. If another reading leaves less than half of the error, consistently over blocks, the log is in that other reading: no
+//! aerodynamics enters, so nothing but a convention can do that. Gains of single axes are in `gains`.
+
+use super::increments::{Instant, Motion, Vector};
+use super::report::{Finding, Subject, Verdict};
+use crate::critique::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::flight::GRAVITY_M_S2;
+use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};
+use std::ops::Range;
+
+/// Three vectors, for relations of one vector with the rest zero.
+type Stack = [f64; 9];
+
+/// One reading of the log: the state s and its rate f at a sample.
+pub(super) struct Hypothesis {
+    /// What the log would be, as a clause.
+    says: &'static str,
+    /// What would make the program read it so.
+    set: &'static str,
+    state: fn(&Instant) -> Stack,
+    rate: fn(&Instant) -> Stack,
+}
+
+/// A relation and its readings, the nominal one first.
+pub(super) struct Relation {
+    pub name: &'static str,
+    /// The relation as a formula, for messages.
+    formula: &'static str,
+    pub applies: fn(&Motion) -> bool,
+    hypotheses: Vec<Hypothesis>,
+    /// Error and size of the measured change by hypothesis, one entry a block.
+    misfit: Vec<Vec<(f64, f64)>>,
+    open: Option<(usize, usize)>,
+}
+
+/// Share of the nominal error that another reading may leave at most to be taken for true.
+const CONVINCING_SHARE: f64 = 0.5;
+/// Share of the change that the nominal reading has to leave unexplained before another is considered at all.
+const MATERIAL_SHARE: f64 = 0.02;
+/// Unexplained share above which a relation is worth a warning though no other reading does better.
+const POOR_SHARE: f64 = 0.5;
+
+const TRANSPOSED: &str =
+    "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
+const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
+const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
+const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
+
+fn stack(first: Vector) -> Stack {
+    let mut stack = [0.0; 9];
+    stack[..3].copy_from_slice(&first);
+    stack
+}
+
+fn flat(rows: &Matrix3) -> Stack {
+    let mut stack = [0.0; 9];
+    stack.iter_mut().zip(rows.iter().flatten()).for_each(|(out, value)| *out = *value);
+    stack
+}
+
+fn transposed(matrix: &Matrix3) -> Matrix3 {
+    std::array::from_fn(|row| std::array::from_fn(|column| matrix[column][row]))
+}
+
+fn turned(angles: Vector) -> Matrix3 {
+    rotation_body_to_inertial(angles[0], angles[1], angles[2])
+}
+
+fn scaled(vector: Vector, by: Vector) -> Vector {
+    std::array::from_fn(|axis| vector[axis] * by[axis])
+}
+
+/// Port-up axes read as starboard-down ones, and back.
+const FLIP: Vector = [1.0, -1.0, -1.0];
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+/// ṙ = r × ω for the rows r of R: inertial axes seen from the turning body.
+fn turning(rotation: &Matrix3, rates: Vector) -> Stack {
+    flat(&rotation.map(|row| cross(row, rates)))
+}
+
+/// The three inertial axes in body components.
+fn axes(rotation: &Matrix3) -> Stack {
+    flat(rotation)
+}
+
+impl Relation {
+    fn new(name: &'static str, formula: &'static str, applies: fn(&Motion) -> bool, hypotheses: Vec<Hypothesis>) -> Self {
+        let misfit = hypotheses.iter().map(|_| Vec::new()).collect();
+        Self { name, formula, applies, hypotheses, misfit, open: None }
+    }
+
+    /// ṗ = R v.
+    #[rustfmt::skip]
+    pub fn position() -> Self {
+        let at = |i: &Instant| stack(i.position);
+        let read = |says, set, state, rate| Hypothesis { says, set, state, rate };
+        Self::new("position_rate", "p' = R v", |motion| motion.position && motion.heading, vec![
+            read("", "", at, |i| stack(rotate(&i.rotation, i.velocity))),
+            read("the velocity is written in inertial axes", "velocity = \"inertial\"", at, |i| stack(i.velocity)),
+            read("the attitude is that of the inertial frame seen from the body (transposed)", TRANSPOSED, at, |i| stack(rotate_back(&i.rotation, i.velocity))),
+            read("z is height (positive up)", "[columns] z = \"-z\", with the file's name", |i| stack(scaled(i.position, [1.0, 1.0, -1.0])), |i| stack(rotate(&i.rotation, i.velocity))),
+            read("x is east and y is north", "[columns] x and y exchanged, with the file's names", |i| stack([i.position[1], i.position[0], i.position[2]]), |i| stack(rotate(&i.rotation, i.velocity))),
+            read("position is east-north-up while the rest is not", "[columns] x, y and z as north, east, down, with the file's names", |i| stack([i.position[1], i.position[0], -i.position[2]]), |i| stack(rotate(&i.rotation, i.velocity))),
+            read("the velocity is nose-port-up while the rest is not", "[columns] vy = \"-vy\", vz = \"-vz\", with the file's names", at, |i| stack(rotate(&i.rotation, scaled(i.velocity, FLIP)))),
+            read("position is north-west-up while the rest is not", "[columns] y = \"-y\", z = \"-z\", with the file's names", |i| stack(scaled(i.position, FLIP)), |i| stack(rotate(&i.rotation, i.velocity))),
+            read("roll has the other sign", ROLL_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [-1.0, 1.0, 1.0])), i.velocity))),
+            read("pitch has the other sign", PITCH_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.velocity))),
+            read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.velocity))),
+            read("the angles are in degrees", ANGLES_DEGREES, at, |i| stack(rotate(&turned(i.angles.map(|angle| angle * DEGREE)), i.velocity))),
+        ])
+    }
+
+    /// ṙ = r × ω for the inertial axes r in body components, or of them the vertical alone where there is no heading.
+    #[rustfmt::skip]
+    pub fn attitude(heading: bool) -> Self {
+        let read = |says, set, state, rate| Hypothesis { says, set, state, rate };
+        if !heading {
+            const DOWN: fn(&Instant) -> Stack = |i| stack(i.rotation[2]);
+            return Self::new("attitude_rate", "d(R'k)/dt = (R'k) x w", |motion| !motion.heading, vec![
+                read("", "", DOWN, |i| stack(cross(i.rotation[2], i.rates))),
+                read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [-1.0; 3])))),
+                read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, FLIP)))),
+                read("roll has the other sign", ROLL_SIGN, |i| stack(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2], i.rates))),
+                read("pitch has the other sign", PITCH_SIGN, |i| stack(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2], i.rates))),
+                read("the rates are in degrees a second", "[units] rates = \"deg/s\"", DOWN, |i| stack(cross(i.rotation[2], i.rates.map(|rate| rate * DEGREE)))),
+                read("the angles are in degrees", ANGLES_DEGREES, |i| stack(turned(i.angles.map(|angle| angle * DEGREE))[2]), |i| stack(cross(turned(i.angles.map(|angle| angle * DEGREE))[2], i.rates))),
+            ]);
+        }
+        Self::new("attitude_rate", "dR'/dt = R' x w", |motion| motion.heading, vec![
+            read("", "", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates)),
+            read("the attitude is that of the inertial frame seen from the body (transposed)", TRANSPOSED, |i| axes(&transposed(&i.rotation)), |i| turning(&transposed(&i.rotation), i.rates)),
+            read("the rates are written in inertial axes", "[columns] wx, wy, wz as body rates: the log has inertial ones", |i| axes(&i.rotation), |i| turning(&i.rotation, rotate_back(&i.rotation, i.rates))),
+            read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [-1.0; 3]))),
+            read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, FLIP))),
+            read("roll has the other sign", ROLL_SIGN, |i| axes(&turned(scaled(i.angles, [-1.0, 1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [-1.0, 1.0, 1.0])), i.rates)),
+            read("pitch has the other sign", PITCH_SIGN, |i| axes(&turned(scaled(i.angles, [1.0, -1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.rates)),
+            read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
+            read("the rates are in degrees a second", "[units] rates = \"deg/s\"", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates.map(|rate| rate * DEGREE))),
+            read("the angles are in degrees", ANGLES_DEGREES, |i| axes(&turned(i.angles.map(|angle| angle * DEGREE))), |i| turning(&turned(i.angles.map(|angle| angle * DEGREE)), i.rates)),
+        ])
+    }
+
+    /// The recorded v̇ is the derivative of the body components of v.
+    #[rustfmt::skip]
+    pub fn linear_targets() -> Self {
+        const V: fn(&Instant) -> Stack = |i| stack(i.velocity);
+        // v̇ = a − ω × v for an inertial acceleration a in body axes.
+        const fn add(a: Vector, b: Vector) -> Vector { [a[0] + b[0], a[1] + b[1], a[2] + b[2]] }
+        fn without_turning(acceleration: Vector, i: &Instant) -> Stack { stack(add(acceleration, cross(i.velocity, i.rates))) }
+        let read = |says, set, rate| Hypothesis { says, set, state: V, rate };
+        Self::new("velocity_targets", "v_dot = dv/dt", |motion| motion.recorded, vec![
+            read("", "", |i| stack(i.linear_target)),
+            read("the targets are specific force, as an accelerometer measures it: gravity and Coriolis terms are missing", "targets = \"specific_force\"", |i| without_turning(add(i.linear_target, i.gravity), i)),
+            read("gravity has been taken out of the targets", "[columns] vx_dot = \"vx_dot + g_x\", vy_dot = \"vy_dot + g_y\", vz_dot = \"vz_dot + g_z\"", |i| stack(add(i.linear_target, i.gravity))),
+            read("the targets are the inertial acceleration in body axes: the Coriolis term is missing", "targets = \"body_acceleration\"", |i| without_turning(i.linear_target, i)),
+            read("the targets are the derivative of the inertial velocity in inertial axes", "targets = \"inertial\"", |i| without_turning(rotate_back(&i.rotation, i.linear_target), i)),
+            read("the targets are specific force with the sign of a reaction (+9.8 upwards at rest)", "[columns] vx_dot = \"-vx_dot\" and so on, and targets = \"specific_force\"", |i| without_turning(add(i.linear_target.map(|value| -value), i.gravity), i)),
+            read("the targets are specific force in nose-port-up axes", "[columns] vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\", and targets = \"specific_force\"", |i| without_turning(add(scaled(i.linear_target, FLIP), i.gravity), i)),
+            read("the targets are in units of g", "[units] acceleration = \"g\"", |i| stack(i.linear_target.map(|value| GRAVITY_M_S2 * value))),
+            read("the targets are specific force in units of g", "targets = \"specific_force\" and [units] acceleration = \"g\"", |i| without_turning(add(i.linear_target.map(|value| GRAVITY_M_S2 * value), i.gravity), i)),
+            read("the targets are nose-port-up while the velocity is not", "[columns] vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(scaled(i.linear_target, FLIP))),
+            read("the targets have the other sign", "[columns] vx_dot = \"-vx_dot\", vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(i.linear_target.map(|value| -value))),
+        ])
+    }
+
+    /// The recorded ω̇ is the derivative of ω.
+    #[rustfmt::skip]
+    pub fn angular_targets() -> Self {
+        const W: fn(&Instant) -> Stack = |i| stack(i.rates);
+        let read = |says, set, rate| Hypothesis { says, set, state: W, rate };
+        Self::new("rate_targets", "w_dot = dw/dt", |motion| motion.recorded, vec![
+            read("", "", |i| stack(i.angular_target)),
+            read("the angular targets are in degrees", "[units] angular_acceleration = \"deg/s^2\"", |i| stack(i.angular_target.map(|value| value * DEGREE))),
+            read("the rates are in degrees a second and their targets are not", "[units] rates = \"deg/s\"", |i| stack(i.angular_target.map(|value| value / DEGREE))),
+            read("the angular targets are nose-port-up while the rates are not", "[columns] wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(scaled(i.angular_target, FLIP))),
+            read("the angular targets have the other sign", "[columns] wx_dot = \"-wx_dot\", wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(i.angular_target.map(|value| -value))),
+        ])
+    }
+
+    /// Adds a flight.
+    pub fn add(&mut self, flight: usize, motion: &Motion) {
+        if !(self.applies)(motion) {
+            return;
+        }
+        for (piece, block) in motion.pieces(0) {
+            if self.open != Some((flight, block)) {
+                self.open = Some((flight, block));
+                self.misfit.iter_mut().for_each(|blocks| blocks.push((0.0, 0.0)));
+            }
+            for (hypothesis, blocks) in self.hypotheses.iter().zip(&mut self.misfit) {
+                let (error, size) = hypothesis.misfit(motion, &piece);
+                if let Some(sums) = blocks.last_mut() {
+                    *sums = (sums.0 + error, sums.1 + size);
+                }
+            }
+        }
+    }
+
+    /// Verdict over all flights; `None` where the relation never applied.
+    pub fn finding(&self) -> Option<Finding> {
+        let blocks = self.misfit.first()?.len();
+        if blocks == 0 {
+            return None;
+        }
+        let share = |index: usize| {
+            let (error, size) = self.misfit[index].iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+            if size > 0.0 { error / size } else { f64::NAN }
+        };
+        let nominal = share(0);
+        let best = (1..self.hypotheses.len()).min_by(|a, b| share(*a).total_cmp(&share(*b)));
+        let mut finding = Finding {
+            name: self.name.into(),
+            subject: Subject::Conventions,
+            verdict: Verdict::Ok,
+            measured: Some(100.0 * nominal),
+            interval: None,
+            expected: Some(0.0),
+            unit: "% unexplained".into(),
+            message: format!("{} holds", self.formula),
+            set: None,
+        };
+        let convincing =
+            best.filter(|&index| nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index));
+        if !nominal.is_finite() || blocks < FEW_BLOCKS {
+            finding.verdict = Verdict::Undetermined;
+            finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);
+        } else if let Some(index) = convincing {
+            finding.verdict = Verdict::Fault;
+            finding.message = format!(
+                "{} does not hold; {} ({:.1} % unexplained that way)",
+                self.formula,
+                self.hypotheses[index].says,
+                100.0 * share(index)
+            );
+            finding.set = Some(self.hypotheses[index].set.into());
+        } else if nominal > POOR_SHARE {
+            finding.verdict = Verdict::Warning;
+            finding.message = format!("{} holds poorly, and no other reading of the log does much better", self.formula);
+        }
+        Some(finding)
+    }
+
+    /// Whether a reading beats the nominal one block by block: the mean log ratio of errors is below zero with 95 % confidence.
+    fn consistent(&self, index: usize) -> bool {
+        let ratios = self.misfit[index].iter().zip(&self.misfit[0]).filter(|(other, nominal)| other.0 > 0.0 && nominal.0 > 0.0);
+        let ratios = ratios.map(|(other, nominal)| {
+            let relative = |(error, size): (f64, f64)| if size > 0.0 { error / size } else { error };
+            BlockSum { samples: 1.0, sum: (relative(*other) / relative(*nominal)).ln() }
+        });
+        BlockMean::new(ratios).and_then(|mean| mean.interval()).is_some_and(|[_, high]| high < 0.0)
+    }
+}
+
+impl Hypothesis {
+    /// Squared error of s(t₁) − s(t₀) − ∫ f dt, and the square of the change itself.
+    fn misfit(&self, motion: &Motion, piece: &Range<usize>) -> (f64, f64) {
+        let (start, end) = ((self.state)(&motion.instants[piece.start]), (self.state)(&motion.instants[piece.end]));
+        let predicted = motion.integral(piece, |sample| (self.rate)(&motion.instants[sample]));
+        let sums = start.iter().zip(end).zip(predicted).map(|((start, end), predicted)| {
+            let change = end - start;
+            ((change - predicted).powi(2), change.powi(2))
+        });
+        sums.fold((0.0, 0.0), |sum, term| (sum.0 + term.0, sum.1 + term.1))
+    }
+}

@@ -1,0 +1,318 @@
+//! Streams of a log against each other in time: which comes late, and by how much; and how late the controls act.
+//!
+//! An error is profiled over shifts of one stream by whole samples; the minimum is refined by a parabola, and its interval is from
+//! leaving out one block at a time (jackknife). A flight whose step differs from the first's is left out.
+
+use super::increments::Motion;
+use super::regression::BlockRegression;
+use super::report::{Finding, Subject, Verdict};
+use crate::critique::blocks::{FEW_BLOCKS, student_975};
+use crate::flight::attitude::{cross, rotate};
+use serde::{Deserialize, Serialize};
+
+/// Streams are compared up to this shift to either side, s.
+const LARGEST_SHIFT_S: f64 = 0.1;
+/// Delays of the controls that are tried, s.
+const CONTROL_DELAYS_S: [f64; 2] = [-0.02, 0.1];
+/// Fall of the summed log error over the profile below which its minimum means nothing.
+const LEAST_DEPTH: f64 = 0.02;
+
+/// Error against delay.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct DelayProfile {
+    /// Delay of the controls, s.
+    pub delay_s: Vec<f64>,
+    /// Error of the fit, as the geometric mean over channels of its rms, relative to the best.
+    pub relative_error: Vec<f64>,
+}
+
+/// Squared errors by channel, shift and block.
+struct Profile {
+    shifts: Vec<isize>,
+    /// `[channel][shift][block]`.
+    errors: Vec<Vec<Vec<f64>>>,
+}
+
+/// Where a profile has its minimum, in samples.
+struct Minimum {
+    at: f64,
+    interval: [f64; 2],
+    depth: f64,
+}
+
+impl Profile {
+    /// Σ over channels of ln Σ over blocks, less one block if asked.
+    fn objective(&self, shift: usize, without: Option<usize>, totals: &[Vec<f64>]) -> f64 {
+        let of = |channel: usize| totals[channel][shift] - without.map_or(0.0, |block| self.errors[channel][shift][block]);
+        (0..self.errors.len()).map(|channel| of(channel).max(f64::MIN_POSITIVE).ln()).sum()
+    }
+
+    /// Least objective, refined by the parabola through the lowest point and its neighbours; an end of the range stays.
+    fn lowest(&self, without: Option<usize>, totals: &[Vec<f64>]) -> Option<f64> {
+        let curve: Vec<f64> = (0..self.shifts.len()).map(|shift| self.objective(shift, without, totals)).collect();
+        let lowest = (0..curve.len()).min_by(|a, b| curve[*a].total_cmp(&curve[*b]))?;
+        let at = *self.shifts.get(lowest)? as f64;
+        if lowest == 0 || lowest + 1 == curve.len() {
+            return Some(at);
+        }
+        let (before, after) = (curve[lowest - 1] - curve[lowest], curve[lowest + 1] - curve[lowest]);
+        Some(if before + after > 0.0 { at + 0.5 * (before - after) / (before + after) } else { at })
+    }
+
+    fn totals(&self) -> Vec<Vec<f64>> {
+        self.errors.iter().map(|shifts| shifts.iter().map(|blocks| blocks.iter().sum()).collect()).collect()
+    }
+
+    fn minimum(&self) -> Option<Minimum> {
+        let totals = self.totals();
+        let blocks = self.errors.first()?.first()?.len();
+        if blocks < FEW_BLOCKS {
+            return None;
+        }
+        let at = self.lowest(None, &totals)?;
+        let left_out: Vec<f64> = (0..blocks).map(|block| self.lowest(Some(block), &totals)).collect::<Option<_>>()?;
+        let (count, mean) = (blocks as f64, left_out.iter().sum::<f64>() / blocks as f64);
+        let variance = (count - 1.0) / count * left_out.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+        let half = student_975(blocks - 1) * variance.sqrt();
+        let curve = (0..self.shifts.len()).map(|shift| self.objective(shift, None, &totals));
+        let (low, high) = curve.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
+        Some(Minimum { at, interval: [at - half, at + half], depth: high - low })
+    }
+}
+
+/// A pair of streams: the state of one, and the rate that the other gives it.
+struct Pair {
+    name: &'static str,
+    late: &'static str,
+    early: &'static str,
+    columns: &'static str,
+    applies: fn(&Motion) -> bool,
+    /// Change of the state less its predicted change, given the piece and the shift of the other stream.
+    error: fn(&Motion, &std::ops::Range<usize>, isize) -> f64,
+}
+
+fn shifted(sample: usize, by: isize) -> usize {
+    sample.saturating_add_signed(by)
+}
+
+fn squared(change: impl Fn(usize) -> f64, predicted: [f64; 3]) -> f64 {
+    (0..3).map(|axis| (change(axis) - predicted[axis]).powi(2)).sum()
+}
+
+const PAIRS: [Pair; 3] = [
+    Pair {
+        name: "velocity_offset",
+        late: "velocity and attitude come later than position",
+        early: "velocity and attitude come earlier than position",
+        columns: "x, y and z",
+        applies: |motion| motion.position && motion.heading,
+        error: |motion, piece, shift| {
+            let at = |k: usize| &motion.instants[k];
+            let travel = motion.integral(piece, |k| rotate(&at(shifted(k, shift)).rotation, at(shifted(k, shift)).velocity));
+            squared(|axis| at(piece.end).position[axis] - at(piece.start).position[axis], travel)
+        },
+    },
+    Pair {
+        name: "rates_offset",
+        late: "the rates come later than the attitude",
+        early: "the rates come earlier than the attitude",
+        columns: "roll, pitch and yaw (or q1 to q4)",
+        applies: |_| true,
+        error: |motion, piece, shift| {
+            let at = |k: usize| &motion.instants[k];
+            let rows = if motion.heading { 0..3 } else { 2..3 };
+            rows.map(|row| {
+                let turned = motion.integral(piece, |k| cross(at(k).rotation[row], at(shifted(k, shift)).rates));
+                squared(|axis| at(piece.end).rotation[row][axis] - at(piece.start).rotation[row][axis], turned)
+            })
+            .sum()
+        },
+    },
+    Pair {
+        name: "targets_offset",
+        late: "the targets come later than the velocity",
+        early: "the targets come earlier than the velocity",
+        columns: "vx, vy and vz",
+        applies: |motion| motion.recorded,
+        error: |motion, piece, shift| {
+            let at = |k: usize| &motion.instants[k];
+            let gained = motion.integral(piece, |k| at(shifted(k, shift)).linear_target);
+            squared(|axis| at(piece.end).velocity[axis] - at(piece.start).velocity[axis], gained)
+        },
+    },
+];
+
+/// Accumulates all profiles over flights.
+pub(super) struct Timing {
+    step_s: Option<f64>,
+    pairs: Vec<(Pair, Profile)>,
+    delays: Vec<isize>,
+    /// `[channel][delay]`: ω̇x, ω̇y, ω̇z, v̇z on their own state, their control and 1.
+    controls: Vec<Vec<BlockRegression<3>>>,
+    blocks: usize,
+}
+
+impl Timing {
+    pub fn new() -> Self {
+        Self { step_s: None, pairs: Vec::new(), delays: Vec::new(), controls: Vec::new(), blocks: 0 }
+    }
+
+    fn start(&mut self, step_s: f64) {
+        let samples = |time_s: f64| (time_s / step_s).round() as isize;
+        let largest = samples(LARGEST_SHIFT_S).max(2);
+        let shifts: Vec<isize> = (-largest..=largest).collect();
+        self.step_s = Some(step_s);
+        self.pairs = PAIRS
+            .into_iter()
+            .map(|pair| (pair, Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone() }))
+            .collect();
+        self.delays = (samples(CONTROL_DELAYS_S[0]).min(-1)..=samples(CONTROL_DELAYS_S[1]).max(2)).collect();
+        self.controls = vec![vec![BlockRegression::new(); self.delays.len()]; 4];
+    }
+
+    /// Adds a flight.
+    pub fn add(&mut self, flight: usize, motion: &Motion) {
+        let step_s = *self.step_s.get_or_insert(motion.step_s);
+        if self.delays.is_empty() {
+            self.start(step_s);
+        }
+        // One per cent is the tolerance to which a step is called constant.
+        if (motion.step_s / step_s - 1.0).abs() > 0.01 {
+            return;
+        }
+        self.blocks += motion.instants.len() / motion.block_samples();
+        let margin = self.pairs.first().map_or(0, |(_, profile)| profile.shifts.len() / 2);
+        for (pair, profile) in self.pairs.iter_mut().filter(|(pair, _)| (pair.applies)(motion)) {
+            for (index, shift) in profile.shifts.iter().enumerate() {
+                let mut open = None;
+                for (piece, block) in motion.pieces(margin) {
+                    let error = (pair.error)(motion, &piece, *shift);
+                    let blocks = &mut profile.errors[0][index];
+                    if open != Some(block) {
+                        open = Some(block);
+                        blocks.push(0.0);
+                    }
+                    blocks.iter_mut().last().into_iter().for_each(|sum| *sum += error);
+                }
+            }
+        }
+        self.add_controls(flight, motion);
+    }
+
+    fn add_controls(&mut self, flight: usize, motion: &Motion) {
+        let margin = self.delays.iter().map(|delay| delay.unsigned_abs()).max().unwrap_or(0);
+        let end = motion.instants.len().saturating_sub(margin);
+        for (sample, now) in motion.instants.iter().enumerate().take(end).skip(margin) {
+            let block = (flight, sample / motion.block_samples());
+            let heave = now.linear_target[2] + cross(now.rates, now.velocity)[2] - now.gravity[2];
+            let [wx, wy, wz] = now.angular_target;
+            let channels = [(now.rates[0], wx, 0), (now.rates[1], wy, 1), (now.rates[2], wz, 2), (now.velocity[2], heave, 3)];
+            for (index, delay) in self.delays.iter().enumerate() {
+                let controls = motion.instants[shifted(sample, -delay)].controls;
+                for (channel, (state, target, control)) in channels.into_iter().enumerate() {
+                    self.controls[channel][index].add(block, &[state, controls[control], 1.0], target);
+                }
+            }
+        }
+    }
+
+    /// Offsets between streams.
+    pub fn offsets(&self) -> Vec<Finding> {
+        let step_s = self.step_s.unwrap_or(1.0);
+        self.pairs
+            .iter()
+            .filter(|(_, profile)| !profile.errors[0][0].is_empty())
+            .map(|(pair, profile)| offset(pair, profile, step_s))
+            .collect()
+    }
+
+    /// The delay of the controls, common to all, and its profile.
+    pub fn control_delay(&self, of_model_s: Option<f64>) -> (Finding, Option<DelayProfile>) {
+        let step_s = self.step_s.unwrap_or(1.0);
+        let mut finding = Finding {
+            name: "control_delay".into(),
+            subject: Subject::Timing,
+            verdict: Verdict::Undetermined,
+            measured: None,
+            interval: None,
+            expected: of_model_s,
+            unit: "s".into(),
+            message: "these flights do not tell: the controls explain too little, or stand still".into(),
+            set: None,
+        };
+        // A channel whose control stands still says nothing about its delay.
+        let errors: Vec<Vec<Vec<f64>>> =
+            self.controls.iter().filter_map(|delays| delays.iter().map(BlockRegression::errors).collect()).collect();
+        if errors.is_empty() {
+            return (finding, None);
+        }
+        let profile = Profile { shifts: self.delays.clone(), errors };
+        let totals = profile.totals();
+        let curve: Vec<f64> = (0..profile.shifts.len()).map(|shift| profile.objective(shift, None, &totals)).collect();
+        let least = curve.iter().copied().fold(f64::INFINITY, f64::min);
+        let channels = profile.errors.len() as f64;
+        let shown = DelayProfile {
+            delay_s: profile.shifts.iter().map(|shift| *shift as f64 * step_s).collect(),
+            relative_error: curve.iter().map(|value| (0.5 * (value - least) / channels).exp()).collect(),
+        };
+        let Some(minimum) = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH) else { return (finding, Some(shown)) };
+        let [low, high] = minimum.interval.map(|samples| samples * step_s);
+        let delay_s = minimum.at * step_s;
+        (finding.measured, finding.interval, finding.verdict) = (Some(delay_s), Some([low, high]), Verdict::Ok);
+        let at_end = [profile.shifts.first(), profile.shifts.last()].into_iter().flatten().any(|end| *end as f64 == minimum.at);
+        if high < -step_s {
+            finding.verdict = Verdict::Warning;
+            finding.message =
+                "the controls are recorded after they act, or a feedback loop drives them; look at the log's time stamps".into();
+        } else {
+            finding.message =
+                format!("controls act this late{}", if at_end { ", or later: the end of the range tried" } else { "" });
+            let written = delay_s.max(0.0);
+            finding.set = Some(format!("control_delay_s = {written:.3} under [data] in the model file"));
+            if of_model_s.is_some_and(|model_s| model_s < low - step_s || model_s > high + step_s) {
+                finding.verdict = Verdict::Warning;
+                finding.message.push_str(", which is not what the model says");
+            } else if at_end {
+                finding.verdict = Verdict::Warning;
+            }
+        }
+        (finding, Some(shown))
+    }
+}
+
+fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
+    let mut finding = Finding {
+        name: pair.name.into(),
+        subject: Subject::Timing,
+        verdict: Verdict::Undetermined,
+        measured: None,
+        interval: None,
+        expected: Some(0.0),
+        unit: "s".into(),
+        message: "these flights do not tell".into(),
+        set: None,
+    };
+    let Some(minimum) = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH) else { return finding };
+    finding.measured = Some(minimum.at * step_s);
+    finding.interval = Some(minimum.interval.map(|samples| samples * step_s));
+    let [low, high] = minimum.interval;
+    // Half a sample is what sampling itself leaves open.
+    if minimum.at.abs() > 1.0 && (low > 0.5 || high < -0.5) {
+        finding.verdict = Verdict::Warning;
+        let late = minimum.at > 0.0;
+        finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());
+        finding.set = Some(if late {
+            format!("[columns] {} as `delay(NAME, {:.3})`, with the file's names", pair.columns, minimum.at * step_s)
+        } else {
+            format!(
+                "[columns] the other stream than {} as `delay(NAME, {:.3})`, with the file's names",
+                pair.columns,
+                -minimum.at * step_s
+            )
+        });
+    } else {
+        finding.verdict = Verdict::Ok;
+        finding.message = "in step".into();
+    }
+    finding
+}

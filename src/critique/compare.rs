@@ -1,0 +1,434 @@
+//! Measured against predicted: error measures per channel, over all windows, by manoeuvre and by regime.
+//!
+//! Takes predictions as numbers, whoever made them; which windows and which channels are worth judging is the caller's
+//! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
+
+use super::blocks::{BlockMean, BlockSum, Blocks};
+use super::regime::Regime;
+use crate::error::{Error, Result};
+use crate::flight::split::Part;
+use crate::flight::{Column, Flight, Targets, Window};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// The predictions of one model.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Name of the model.
+    pub name: String,
+    /// Predicted accelerations in the order of [`Column::TARGETS`], one entry a window, in the order of the windows.
+    pub predicted: Vec<[f64; 6]>,
+}
+
+/// A number for each channel, and their arithmetic mean. `None` (JSON `null`) where there is nothing to compute it from.
+///
+/// The mean mixes m/s² and rad/s² as the paper's tables do: it ranks models on one data set and means nothing else.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PerChannel {
+    /// d(vx)/dt, m/s² for an error.
+    pub vx_dot: Option<f64>,
+    /// d(vy)/dt, m/s².
+    pub vy_dot: Option<f64>,
+    /// d(vz)/dt, m/s².
+    pub vz_dot: Option<f64>,
+    /// d(wx)/dt, rad/s².
+    pub wx_dot: Option<f64>,
+    /// d(wy)/dt, rad/s².
+    pub wy_dot: Option<f64>,
+    /// d(wz)/dt, rad/s².
+    pub wz_dot: Option<f64>,
+    /// Arithmetic mean of the six, absent if one of them is.
+    pub mean: Option<f64>,
+}
+
+impl PerChannel {
+    /// From values in the order of [`Column::TARGETS`]. Values that are not finite become `None`.
+    pub fn new(values: [Option<f64>; 6]) -> Self {
+        let [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot] = values.map(|value| value.filter(|value| value.is_finite()));
+        let all: Option<Vec<f64>> = [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot].into_iter().collect();
+        let mean = all.map(|values| values.iter().sum::<f64>() / values.len() as f64);
+        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot, mean }
+    }
+
+    /// The six values in the order of [`Column::TARGETS`].
+    pub const fn channels(&self) -> [Option<f64>; 6] {
+        [self.vx_dot, self.vy_dot, self.vz_dot, self.wx_dot, self.wy_dot, self.wz_dot]
+    }
+}
+
+/// A 95 % interval for each channel, from the scatter between blocks of ten seconds; `None` with fewer than two blocks.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Intervals {
+    /// d(vx)/dt, m/s².
+    pub vx_dot: Option<[f64; 2]>,
+    /// d(vy)/dt, m/s².
+    pub vy_dot: Option<[f64; 2]>,
+    /// d(vz)/dt, m/s².
+    pub vz_dot: Option<[f64; 2]>,
+    /// d(wx)/dt, rad/s².
+    pub wx_dot: Option<[f64; 2]>,
+    /// d(wy)/dt, rad/s².
+    pub wy_dot: Option<[f64; 2]>,
+    /// d(wz)/dt, rad/s².
+    pub wz_dot: Option<[f64; 2]>,
+}
+
+impl Intervals {
+    fn new(values: [Option<[f64; 2]>; 6]) -> Self {
+        let finite = |interval: &[f64; 2]| interval.iter().all(|bound| bound.is_finite());
+        let [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot] = values.map(|value| value.filter(finite));
+        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot }
+    }
+
+    /// The six intervals in the order of [`Column::TARGETS`].
+    pub const fn channels(&self) -> [Option<[f64; 2]>; 6] {
+        [self.vx_dot, self.vy_dot, self.vz_dot, self.wx_dot, self.wy_dot, self.wz_dot]
+    }
+}
+
+/// Error over a part of the windows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PartError {
+    /// Root mean square error; all `None` when the part is empty.
+    pub rmse: PerChannel,
+    /// 95 % interval of the RMSE.
+    pub rmse_ci95: Intervals,
+    /// Windows in the part.
+    pub n: usize,
+    /// Blocks of ten seconds that the windows lie in.
+    pub blocks: usize,
+}
+
+/// Error measures of one model. With e = measured − predicted over N windows:
+/// RMSE = √(Σe²/N), MAE = Σ|e|/N, max_abs = max|e|, R² = 1 − Σe²/Σ(y − ȳ)², ȳ being the mean over the same windows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelError {
+    /// Name of the model.
+    pub name: String,
+    /// Number of windows N.
+    pub windows: usize,
+    /// Root mean square error, m/s² and rad/s².
+    pub rmse: PerChannel,
+    /// 95 % interval of the RMSE.
+    pub rmse_ci95: Intervals,
+    /// Mean absolute error, m/s² and rad/s².
+    pub mae: PerChannel,
+    /// Largest absolute error, m/s² and rad/s²; its `mean` is the mean of the six largest errors.
+    pub max_abs: PerChannel,
+    /// Coefficient of determination; `None` for a channel that does not vary.
+    pub r2: PerChannel,
+    /// Windows with a prediction that is not finite. They make the measures of their channel `None`.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub not_finite: usize,
+    /// Every manoeuvre class that has a window.
+    pub by_manoeuvre: BTreeMap<String, PartError>,
+    /// Every [`Regime`] by name, also those never flown (n = 0).
+    pub by_regime: BTreeMap<String, PartError>,
+}
+
+/// Models side by side on the same windows: the result of `compare`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// In the order in which the predictions were given.
+    pub models: Vec<ModelError>,
+    /// Derived if the targets of any flight among the windows were.
+    pub target: Targets,
+    /// Where the windows come from.
+    pub split: Part,
+}
+
+/// Lays the predictions of each row beside the measured targets at the last row of each window.
+///
+/// # Errors
+/// [`Error::Shape`] if a row has not one prediction a window, or a window lies outside its flight.
+pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part) -> Result<Comparison> {
+    let measured = measured(flights, windows)?;
+    let groups = Groups::new(flights, windows);
+    let derived = windows.iter().any(|window| flights[window.flight].targets == Targets::Derived);
+    let models = rows.iter().map(|row| {
+        check_row(row, windows)?;
+        Ok(model_error(row, &measured, &groups))
+    });
+    let models = models.collect::<Result<_>>()?;
+    Ok(Comparison { models, target: if derived { Targets::Derived } else { Targets::Recorded }, split })
+}
+
+/// The measured accelerations at the last row of each window, in the order of [`Column::TARGETS`].
+///
+/// # Errors
+/// [`Error::Shape`] if a window lies outside its flight.
+pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f64; 6]>> {
+    let target = |window: &Window| {
+        let flight = flights.get(window.flight)?;
+        (window.last < flight.len()).then(|| Column::TARGETS.map(|column| flight.column(column)[window.last]))
+    };
+    let fault = |window: &Window| Error::Shape {
+        operation: "compare",
+        message: format!("a window ends at row {} of flight {}, which is not there", window.last, window.flight),
+    };
+    windows.iter().map(|window| target(window).ok_or_else(|| fault(window))).collect()
+}
+
+/// Standard deviation of the measured accelerations over the windows, m/s² and rad/s²: what makes errors of different channels
+/// comparable. `None` for a channel that does not vary.
+///
+/// # Errors
+/// [`Error::Shape`] if a window lies outside its flight.
+pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<PerChannel> {
+    let measured = measured(flights, windows)?;
+    let one = |channel| Some((variation(&measured, channel)? / measured.len() as f64).sqrt());
+    Ok(PerChannel::new(std::array::from_fn(one)))
+}
+
+/// Refuses a row that has not one prediction a window.
+pub(super) fn check_row(row: &Row, windows: &[Window]) -> Result<()> {
+    if row.predicted.len() == windows.len() {
+        return Ok(());
+    }
+    let message =
+        format!("`{}` has {} predictions for {} windows; one each is needed", row.name, row.predicted.len(), windows.len());
+    Err(Error::Shape { operation: "compare", message })
+}
+
+/// To which block, manoeuvre and regime each window belongs.
+struct Groups {
+    blocks: Blocks,
+    manoeuvres: Vec<String>,
+    manoeuvre: Vec<usize>,
+    regime: Vec<usize>,
+}
+
+impl Groups {
+    fn new(flights: &[Flight], windows: &[Window]) -> Self {
+        let of = |window: &Window| &flights[window.flight].manoeuvre;
+        let mut manoeuvres: Vec<String> = windows.iter().map(of).cloned().collect();
+        manoeuvres.sort_unstable();
+        manoeuvres.dedup();
+        let manoeuvre = windows.iter().map(|window| manoeuvres.partition_point(|name| name < of(window))).collect();
+        let regime = windows.iter().map(|window| Regime::of(&flights[window.flight], window.last) as usize).collect();
+        Self { blocks: Blocks::new(flights, windows), manoeuvres, manoeuvre, regime }
+    }
+
+    /// Error over each of `count` parts, `part` naming the part of each window.
+    fn parts(&self, squares: &[[f64; 6]], part: impl Fn(usize) -> usize, count: usize) -> Vec<PartError> {
+        let blocks = self.blocks.len();
+        let mut sums = vec![(0_usize, [0.0; 6]); count * blocks];
+        for (window, square) in squares.iter().enumerate() {
+            let (n, sum) = &mut sums[part(window) * blocks + self.blocks.of_window[window]];
+            *n += 1;
+            for (total, value) in sum.iter_mut().zip(square) {
+                *total += value;
+            }
+        }
+        if blocks == 0 {
+            return vec![PartError::default(); count];
+        }
+        sums.chunks_exact(blocks).map(part_error).collect()
+    }
+}
+
+/// From the number of windows and the sums of squared errors of each block.
+fn part_error(blocks: &[(usize, [f64; 6])]) -> PartError {
+    let means: [Option<BlockMean>; 6] = std::array::from_fn(|channel| {
+        BlockMean::new(blocks.iter().map(|(n, sum)| BlockSum { samples: *n as f64, sum: sum[channel] }))
+    });
+    PartError {
+        rmse: PerChannel::new(means.map(|mean| Some(mean?.mean.sqrt()))),
+        rmse_ci95: Intervals::new(means.map(|mean| mean?.root_interval())),
+        n: blocks.iter().map(|(n, _)| n).sum(),
+        blocks: blocks.iter().filter(|(n, _)| *n > 0).count(),
+    }
+}
+
+fn model_error(row: &Row, measured: &[[f64; 6]], groups: &Groups) -> ModelError {
+    let errors: Vec<[f64; 6]> =
+        measured.iter().zip(&row.predicted).map(|(y, p)| std::array::from_fn(|channel| y[channel] - p[channel])).collect();
+    let squares: Vec<[f64; 6]> = errors.iter().map(|error| error.map(|value| value * value)).collect();
+    let whole = groups.parts(&squares, |_| 0, 1).pop().unwrap_or_default();
+    let count = errors.len() as f64;
+    let over = |channel: usize, fold: fn(f64, f64) -> f64| {
+        let values = errors.iter().map(|error| error[channel].abs());
+        // A fold with `max` would swallow NaN; the sum does not.
+        (!errors.is_empty() && values.clone().sum::<f64>().is_finite()).then(|| values.fold(0.0, fold))
+    };
+    let name = |(names, parts): (Vec<String>, Vec<PartError>)| names.into_iter().zip(parts).collect();
+    let by_manoeuvre = groups.parts(&squares, |window| groups.manoeuvre[window], groups.manoeuvres.len());
+    let by_regime = groups.parts(&squares, |window| groups.regime[window], Regime::COUNT);
+    ModelError {
+        name: row.name.clone(),
+        windows: errors.len(),
+        rmse: whole.rmse,
+        rmse_ci95: whole.rmse_ci95,
+        mae: PerChannel::new(std::array::from_fn(|channel| over(channel, |sum, value| sum + value).map(|sum| sum / count))),
+        max_abs: PerChannel::new(std::array::from_fn(|channel| over(channel, f64::max))),
+        r2: PerChannel::new(std::array::from_fn(|channel| {
+            let residual: f64 = squares.iter().map(|square| square[channel]).sum();
+            Some(1.0 - residual / variation(measured, channel)?)
+        })),
+        not_finite: row.predicted.iter().filter(|values| values.iter().any(|value| !value.is_finite())).count(),
+        by_manoeuvre: name((groups.manoeuvres.clone(), by_manoeuvre)),
+        by_regime: name((Regime::ALL.map(|regime| regime.name().to_owned()).into(), by_regime)),
+    }
+}
+
+/// Σ (y − ȳ)² of one channel; `None` if the channel is constant up to rounding, or there is nothing.
+pub(super) fn variation(measured: &[[f64; 6]], channel: usize) -> Option<f64> {
+    let count = measured.len() as f64;
+    let mean = measured.iter().map(|y| y[channel]).sum::<f64>() / count;
+    let total: f64 = measured.iter().map(|y| (y[channel] - mean).powi(2)).sum();
+    let rounding = count * (count * f64::EPSILON * mean.abs()).powi(2);
+    (total > rounding).then_some(total)
+}
+
+fn is_zero(count: &usize) -> bool {
+    *count == 0
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    const CLOSE: f64 = Tolerance::Close.relative_f64();
+
+    /// Flights of class `a` and `b`, 100 samples of 0.5 s each (five blocks), whose targets are `target(flight, sample, channel)`.
+    pub(in crate::critique) fn flights(target: impl Fn(usize, usize, usize) -> f64) -> Result<Vec<Flight>> {
+        let flight = |index: usize, class: &str| {
+            let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; 100]);
+            for (channel, column) in Column::TARGETS.into_iter().enumerate() {
+                columns[column as usize] = (0..100).map(|sample| target(index, sample, channel)).collect();
+            }
+            columns[Column::Z as usize] = vec![-10.0; 100];
+            columns[Column::Vx as usize] = (0..100).map(|sample| f64::from(sample) / 10.0).collect();
+            Flight::new(format!("f{index}"), class, 0.0, 0.5, columns, Targets::Recorded)
+        };
+        Ok(vec![flight(0, "a")?, flight(1, "b")?])
+    }
+
+    pub(in crate::critique) fn every_window(flights: &[Flight]) -> Vec<Window> {
+        let of = |(flight, length): (usize, usize)| (0..length).map(move |last| Window { flight, last });
+        flights.iter().map(Flight::len).enumerate().flat_map(of).collect()
+    }
+
+    fn close(found: Option<f64>, expected: f64) -> bool {
+        found.is_some_and(|found| (found - expected).abs() <= CLOSE * expected.abs().max(1.0))
+    }
+
+    fn one_channel(values: &[f64]) -> PerChannel {
+        PerChannel::new([values[0], 0.0, 0.0, 0.0, 0.0, 0.0].map(Some))
+    }
+
+    #[test]
+    fn four_windows_by_hand() -> Result<()> {
+        // Measured 1 2 3 4 (mean 2.5, variation 5), predicted 1 1 5 4: errors 0 1 -2 0.
+        let flights = flights(|_, sample, _| sample as f64 + 1.0)?;
+        let windows: Vec<Window> = (0..4).map(|last| Window { flight: 0, last }).collect();
+        let row = Row { name: "m".into(), predicted: [1.0, 1.0, 5.0, 4.0].map(|value| [value; 6]).to_vec() };
+        let found = compare(&flights, &windows, &[row], Part::All)?;
+        let model = &found.models[0];
+        assert!(close(model.rmse.vx_dot, (5.0_f64 / 4.0).sqrt()) && close(model.rmse.mean, (5.0_f64 / 4.0).sqrt()));
+        assert!(close(model.mae.wz_dot, 0.75) && close(model.max_abs.vy_dot, 2.0) && close(model.r2.vx_dot, 0.0));
+        assert_eq!((model.windows, model.by_manoeuvre.len(), model.by_regime["hover"].n), (4, 1, 4));
+        assert_eq!(model.rmse_ci95.vx_dot, None, "one block has no interval");
+        Ok(())
+    }
+
+    #[test]
+    fn the_json_has_the_documented_shape() -> Result<()> {
+        let flights = flights(|flight, sample, channel| ((flight + sample * 7 + channel) % 5) as f64)?;
+        let windows = every_window(&flights);
+        let row = Row { name: "paper".into(), predicted: vec![[0.0; 6]; windows.len()] };
+        let found = compare(&flights, &windows, &[row], Part::Locked)?;
+        let json = serde_json::to_value(&found).map_err(|error| Error::Undetermined(error.to_string()))?;
+        assert_eq!((&json["target"], &json["split"]), (&"recorded".into(), &"locked".into()));
+        let model = &json["models"][0];
+        assert_eq!((&model["name"], &model["windows"]), (&"paper".into(), &200.into()));
+        for measure in ["rmse", "mae", "max_abs", "r2"] {
+            let keys: Vec<_> =
+                model[measure].as_object().into_iter().flat_map(|object| object.keys().map(String::as_str)).collect();
+            assert_eq!(keys.len(), 7, "{measure} has six channels and the mean");
+            assert!(Column::TARGETS.iter().all(|column| model[measure][column.name()].is_number()));
+            assert!(model[measure]["mean"].is_number());
+        }
+        assert_eq!(model["by_manoeuvre"]["b"]["n"], 100);
+        assert!(model["by_manoeuvre"]["a"]["rmse"]["vz_dot"].is_number());
+        assert_eq!(model["by_regime"]["inverted"]["n"], 0);
+        assert!(model["by_regime"]["inverted"]["rmse"]["mean"].is_null(), "the RMSE of nothing is null");
+        assert!(model.get("not_finite").is_none());
+        let back: Comparison = serde_json::from_value(json).map_err(|error| Error::Undetermined(error.to_string()))?;
+        assert_eq!(back.models[0].by_regime.len(), found.models[0].by_regime.len());
+        Ok(())
+    }
+
+    #[test]
+    fn nothing_nan_and_constants_are_null() -> Result<()> {
+        let flights = flights(|_, _, _| 0.1)?;
+        let empty = compare(&flights, &[], &[Row { name: "m".into(), predicted: vec![] }], Part::All)?;
+        assert_eq!((empty.models[0].rmse, empty.models[0].r2), (PerChannel::default(), PerChannel::default()));
+        let windows = every_window(&flights);
+        let mut predicted = vec![[0.0; 6]; windows.len()];
+        predicted[3][2] = f64::NAN;
+        let found = compare(&flights, &windows, &[Row { name: "m".into(), predicted }], Part::All)?;
+        let model = &found.models[0];
+        assert_eq!((model.not_finite, model.rmse.vz_dot, model.mae.vz_dot, model.max_abs.vz_dot), (1, None, None, None));
+        assert!(close(model.rmse.vx_dot, 0.1) && model.rmse.mean.is_none() && model.r2.vx_dot.is_none());
+        Ok(())
+    }
+
+    #[test]
+    fn misfits_are_refused() -> Result<()> {
+        let flights = flights(|_, _, _| 0.0)?;
+        let short = compare(&flights, &[Window { flight: 0, last: 0 }], &[Row { name: "m".into(), predicted: vec![] }], Part::All);
+        assert!(matches!(short, Err(Error::Shape { message, .. }) if message.contains("`m` has 0 predictions for 1 windows")));
+        let outside = compare(&flights, &[Window { flight: 0, last: 100 }], &[], Part::All);
+        assert!(matches!(outside, Err(Error::Shape { message, .. }) if message.contains("row 100 of flight 0")));
+        Ok(())
+    }
+
+    #[test]
+    fn one_derived_flight_makes_the_targets_derived() -> Result<()> {
+        let mut flights = flights(|_, _, _| 0.0)?;
+        flights[1].targets = Targets::Derived;
+        let target = |flight| Ok::<_, Error>(compare(&flights, &[Window { flight, last: 0 }], &[], Part::Test)?.target);
+        assert_eq!((target(0)?, target(1)?), (Targets::Recorded, Targets::Derived));
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        #[test]
+        fn the_measures_hang_together(errors in prop::collection::vec(-5.0..5.0_f64, 200), scale in 0.1..10.0_f64, turn in 0..200_usize) {
+            let flights = flights(|flight, sample, _| errors[flight * 100 + sample])?;
+            let mut windows = every_window(&flights);
+            let zero = Row { name: "zero".into(), predicted: vec![[0.0; 6]; 200] };
+            let scaled = Row { name: "scaled".into(), predicted: errors.iter().map(|e| [e * (1.0 - scale); 6]).collect() };
+            let found = compare(&flights, &windows, &[zero.clone(), scaled], Part::All)?;
+            let [model, other] = [&found.models[0], &found.models[1]];
+            // MAE ≤ RMSE ≤ largest error; errors scaled by s scale the RMSE by s.
+            let [rmse, mae, largest] = [model.rmse, model.mae, model.max_abs].map(|value| value.vx_dot.unwrap_or(f64::NAN));
+            prop_assert!(mae <= rmse * (1.0 + CLOSE) && rmse <= largest * (1.0 + CLOSE));
+            prop_assert!(close(other.rmse.vx_dot, rmse * scale));
+            // Pooled over the parts, squared errors are those of the whole.
+            for parts in [&model.by_manoeuvre, &model.by_regime] {
+                let total: f64 = parts.values().map(|part| part.n as f64 * part.rmse.vx_dot.unwrap_or(0.0).powi(2)).sum();
+                prop_assert_eq!(parts.values().map(|part| part.n).sum::<usize>(), 200);
+                prop_assert!(close(Some((total / 200.0).sqrt()), rmse));
+            }
+            let inside = model.rmse_ci95.vx_dot.is_some_and(|[low, high]| low <= rmse && rmse <= high);
+            prop_assert!(inside);
+            // The order of the windows does not matter.
+            windows.rotate_left(turn);
+            let turned = compare(&flights, &windows, &[zero], Part::All)?;
+            prop_assert!(close(turned.models[0].rmse.mean, model.rmse.mean.unwrap_or(f64::NAN)));
+            prop_assert!(close(turned.models[0].r2.wz_dot, model.r2.wz_dot.unwrap_or(f64::NAN)));
+        }
+    }
+
+    #[test]
+    fn a_mean_needs_all_six() {
+        assert!(close(one_channel(&[3.0]).mean, 0.5));
+        assert_eq!(one_channel(&[f64::INFINITY]).mean, None);
+    }
+}

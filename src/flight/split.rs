@@ -1,0 +1,289 @@
+//! Which samples may be learned from and which only judge: the paper's two protocols, and a chronological one for a single log.
+//!
+//! A split is made before anything else (calibration, scaling, windows), and what follows sees only [`Span`]s. No window
+//! crosses a span, so no window crosses a partition and no time stamp is in two of them (paper section 4.1).
+
+use super::{Flight, Span};
+use crate::error::{Error, Result};
+use phyture_kernels::random::permutation;
+use std::fmt;
+use std::str::FromStr;
+
+/// Length of a segment of the benchmark split, s (paper section 4.1).
+pub const SEGMENT_S: f64 = 10.0;
+
+/// Seed of the benchmark split (paper section 4.1).
+pub const BENCHMARK_SEED: u64 = 2030;
+
+/// Shares of the segments that train and validate; the rest tests (paper section 4.1: 70/20/10).
+const TRAINING_SHARE: f64 = 0.7;
+const VALIDATION_SHARE: f64 = 0.2;
+
+/// How samples are divided.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Protocol {
+    /// Random 10-s segments, 70 % training, 20 % validation, 10 % test (paper section 4.1). Leftovers shorter than 10 s at the
+    /// end of a flight belong to no partition. Written `segments`.
+    #[default]
+    Segments,
+    /// The first share of every flight trains, the rest tests; no validation. Written `first 0.75`.
+    First(f64),
+}
+
+impl fmt::Display for Protocol {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Segments => f.write_str("segments"),
+            Self::First(share) => write!(f, "first {share}"),
+        }
+    }
+}
+
+impl From<Protocol> for String {
+    fn from(protocol: Protocol) -> Self {
+        protocol.to_string()
+    }
+}
+
+impl TryFrom<String> for Protocol {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self> {
+        text.parse()
+    }
+}
+
+impl FromStr for Protocol {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let first = || text.strip_prefix("first")?.trim().parse().ok().filter(|share: &f64| *share > 0.0 && *share < 1.0);
+        match text.trim() {
+            "segments" => Ok(Self::Segments),
+            _ => first().map(Self::First).ok_or_else(|| Error::Config {
+                place: "split".into(),
+                field: "split".into(),
+                found: format!("`{text}`"),
+                expected:
+                    "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`"
+                        .into(),
+            }),
+        }
+    }
+}
+
+/// Which part of the data a figure is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Part {
+    /// Flights named in the model file that no search and no training sees.
+    Locked,
+    /// The test partition of the protocol.
+    Test,
+    /// Everything.
+    All,
+}
+
+impl Part {
+    /// Name in files and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Locked => "locked",
+            Self::Test => "test",
+            Self::All => "all",
+        }
+    }
+}
+
+/// A division of a data set into spans.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Split {
+    /// Calibration, scaling and training use these only.
+    pub training: Vec<Span>,
+    /// Hyperparameter choice only.
+    pub validation: Vec<Span>,
+    /// Judged once, at the end.
+    pub test: Vec<Span>,
+    /// What `test` is: locked flights or the protocol's test partition.
+    pub tested: Part,
+}
+
+impl Split {
+    /// Divides `flights`. Where `locked` names manoeuvre classes or flights, these are the test part and *all* other flights
+    /// train (the paper's manoeuvre-class protocol, section 4.4); otherwise `protocol` divides each flight, with `seed`.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a locked name fits neither a class nor a flight; [`Error::Undetermined`] if nothing is left to
+    /// train on or to test on.
+    pub fn new(flights: &[Flight], locked: &[String], protocol: &Protocol, seed: u64) -> Result<Self> {
+        let split = if locked.is_empty() { by_protocol(flights, protocol, seed) } else { by_name(flights, locked)? };
+        for (spans, part) in [(&split.training, "train"), (&split.test, "test")] {
+            if spans.is_empty() {
+                let rule =
+                    if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
+                return Err(Error::Undetermined(format!(
+                    "{rule} leaves no samples to {part} on, of {} flights and {:.0} s; give more or longer flights, or another split",
+                    flights.len(),
+                    flights.iter().map(Flight::duration_s).sum::<f64>()
+                )));
+            }
+        }
+        Ok(split)
+    }
+}
+
+fn whole(flights: &[Flight]) -> impl Iterator<Item = Span> {
+    flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() })
+}
+
+fn by_name(flights: &[Flight], locked: &[String]) -> Result<Split> {
+    let names = |flight: &Flight| [flight.manoeuvre.clone(), flight.name.clone()];
+    if let Some(unknown) = locked.iter().find(|name| !flights.iter().any(|flight| names(flight).contains(name))) {
+        let mut classes: Vec<&str> = flights.iter().map(|flight| flight.manoeuvre.as_str()).collect();
+        classes.dedup();
+        return Err(Error::Config {
+            place: "model file".into(),
+            field: "data.locked".into(),
+            found: format!("`{unknown}`, which is no manoeuvre class and no flight of this data set"),
+            expected: format!("one of the classes {} or a flight's name", classes.join(", ")),
+        });
+    }
+    let (test, training) = whole(flights).partition(|span| names(&flights[span.flight]).iter().any(|name| locked.contains(name)));
+    Ok(Split { training, validation: Vec::new(), test, tested: Part::Locked })
+}
+
+fn by_protocol(flights: &[Flight], protocol: &Protocol, seed: u64) -> Split {
+    let mut split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
+    match *protocol {
+        Protocol::First(share) => {
+            for span in whole(flights) {
+                let cut = (span.end as f64 * share).round() as usize;
+                split.training.extend((cut > 0).then_some(Span { end: cut, ..span }));
+                split.test.extend((cut < span.end).then_some(Span { start: cut, ..span }));
+            }
+        }
+        Protocol::Segments => {
+            let sorted: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
+            let mut segments: Vec<Span> =
+                permutation(sorted.len(), seed, 0).into_iter().map(|index| sorted[index as usize]).collect();
+            let training = (segments.len() as f64 * TRAINING_SHARE).round() as usize;
+            let validation = (segments.len() as f64 * VALIDATION_SHARE).round() as usize;
+            // A test segment is worth more than a validation one when there are only a few.
+            let validation = validation.min(segments.len().saturating_sub(training + 1));
+            split.test = joined(segments.split_off(training + validation));
+            split.validation = joined(segments.split_off(training));
+            split.training = joined(segments);
+        }
+    }
+    split
+}
+
+/// The whole 10-s segments of a span.
+fn segments(span: Span, step_s: f64) -> impl Iterator<Item = Span> {
+    let samples = (SEGMENT_S / step_s).round().max(1.0) as usize;
+    (0..(span.end - span.start) / samples).map(move |index| {
+        let start = span.start + index * samples;
+        Span { flight: span.flight, start, end: start + samples }
+    })
+}
+
+/// Sorts spans and joins those that touch.
+fn joined(mut spans: Vec<Span>) -> Vec<Span> {
+    spans.sort_unstable();
+    let mut runs: Vec<Span> = Vec::with_capacity(spans.len());
+    for span in spans {
+        match runs.last_mut() {
+            Some(run) if run.flight == span.flight && run.end == span.start => run.end = span.end,
+            _ => runs.push(span),
+        }
+    }
+    runs
+}
+
+/// The 20 canonical classes sorted and paired, or whatever classes there are: `(held-out classes)` a fold (paper section 4.4).
+pub fn class_folds(classes: &[&str], folds: usize) -> Vec<Vec<String>> {
+    let mut sorted: Vec<String> = classes.iter().map(|class| (*class).to_owned()).collect();
+    sorted.sort_unstable();
+    sorted.dedup();
+    let size = sorted.len().div_ceil(folds.max(1)).max(1);
+    sorted.chunks(size).map(<[String]>::to_vec).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::Targets;
+    use proptest::prelude::*;
+
+    fn flights(lengths: &[usize]) -> Vec<Flight> {
+        let flight = |(index, samples): (usize, &usize)| {
+            let columns = std::array::from_fn(|_| vec![0.0; *samples]);
+            Flight::new(format!("f{index}"), format!("class{}", index % 3), 0.0, 0.01, columns, Targets::Recorded)
+        };
+        lengths.iter().enumerate().filter_map(|pair| flight(pair).ok()).collect()
+    }
+
+    fn samples(spans: &[Span]) -> usize {
+        spans.iter().map(|span| span.end - span.start).sum()
+    }
+
+    proptest! {
+        #[test]
+        fn segments_are_disjoint_and_of_the_stated_shares(lengths in prop::collection::vec(1usize..9000, 4..12), seed: u64) {
+            let logs = flights(&lengths);
+            let whole_segments: usize = lengths.iter().map(|length| length / 1000).sum();
+            prop_assume!(whole_segments >= 10);
+            let split = Split::new(&logs, &[], &Protocol::Segments, seed).map_err(|error| TestCaseError::fail(error.to_string()))?;
+            let mut seen: Vec<Vec<u8>> = lengths.iter().map(|length| vec![0; *length]).collect();
+            for span in split.training.iter().chain(&split.validation).chain(&split.test) {
+                seen[span.flight][span.start..span.end].iter_mut().for_each(|count| *count += 1);
+            }
+            prop_assert!(seen.iter().flatten().all(|count| *count <= 1));
+            prop_assert_eq!(samples(&split.training), (whole_segments as f64 * 0.7).round() as usize * 1000);
+            let all = samples(&split.training) + samples(&split.validation) + samples(&split.test);
+            prop_assert_eq!(all, whole_segments * 1000);
+        }
+    }
+
+    #[test]
+    fn locked_flights_are_the_test_and_nothing_else_is() -> Result<()> {
+        let logs = flights(&[100, 200, 300, 400]);
+        let split = Split::new(&logs, &["class1".into(), "f3".into()], &Protocol::Segments, 1)?;
+        assert_eq!(split.test.iter().map(|span| span.flight).collect::<Vec<_>>(), [1, 3]);
+        assert_eq!(split.training.iter().map(|span| span.flight).collect::<Vec<_>>(), [0, 2]);
+        assert_eq!(split.tested, Part::Locked);
+        Ok(())
+    }
+
+    #[test]
+    fn an_unknown_locked_name_is_an_error_that_lists_the_classes() {
+        let message = Split::new(&flights(&[100]), &["chaos".into()], &Protocol::Segments, 1).map_err(|error| error.to_string());
+        assert!(matches!(message, Err(text) if text.contains("`chaos`") && text.contains("class0")));
+    }
+
+    #[test]
+    fn too_little_data_is_said() {
+        let message = Split::new(&flights(&[900]), &[], &Protocol::Segments, 1).map_err(|error| error.to_string());
+        assert!(matches!(message, Err(text) if text.contains("no samples to train on")));
+    }
+
+    #[test]
+    fn first_share_is_chronological_and_round_trips() -> Result<()> {
+        let protocol: Protocol = "first 0.75".parse()?;
+        assert_eq!(protocol.to_string(), "first 0.75");
+        let split = Split::new(&flights(&[1000]), &[], &protocol, 1)?;
+        assert_eq!(split.training, [Span { flight: 0, start: 0, end: 750 }]);
+        assert_eq!(split.test, [Span { flight: 0, start: 750, end: 1000 }]);
+        assert!("first 1.5".parse::<Protocol>().is_err());
+        Ok(())
+    }
+
+    #[test]
+    fn twenty_classes_make_ten_pairs() {
+        let names: Vec<String> = (0..20).map(|index| format!("m{index:02}")).collect();
+        let folds = class_folds(&names.iter().map(String::as_str).collect::<Vec<_>>(), 10);
+        assert_eq!(folds.len(), 10);
+        assert_eq!(folds[3], ["m06", "m07"]);
+    }
+}

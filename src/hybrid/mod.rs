@@ -1,0 +1,202 @@
+//! Physics and network as one model: â = a^p + r̂ (paper eq. 12), on recorded windows or one sample at a time.
+//!
+//! A [`Hybrid`] holds everything a prediction needs (calibrated model, inputs, scales, weights) and is one file. How it was
+//! trained is in `train`.
+
+pub mod scaling;
+pub mod sequence;
+mod stream;
+
+pub use scaling::{Scale, Scaling};
+pub use stream::StreamingHybrid;
+
+use crate::error::{Error, Result};
+use crate::flight::{Flight, Window};
+use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
+use crate::nn::{Network, OutputScale, PhyTureConfig};
+use crate::physics::Model;
+use crate::tape::{Session, Threads};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Windows predicted at a time: enough for every worker, few enough to keep memory small.
+const CHUNK: usize = 64;
+
+/// Steps of a log may differ from the trained one by this share (the tolerance of a log's own step).
+const STEP_TOLERANCE: f64 = 0.01;
+
+/// Key of the metadata of a hybrid's file.
+const METADATA: &str = "phyture_hybrid";
+
+/// What a hybrid is, but for its weights.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Description {
+    /// The calibrated physical model.
+    pub model: Model,
+    /// The network.
+    pub config: PhyTureConfig,
+    /// State-control inputs, as formulas of the log's columns.
+    pub inputs: Vec<String>,
+    /// Fixed scales from the training part.
+    pub scaling: Scaling,
+    /// Sampling step of the training data, s.
+    pub step_s: f64,
+}
+
+impl Description {
+    /// Records the network with its fixed output scale.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the configuration is impossible.
+    pub fn network(&self, standardise_loss: bool) -> Result<Network<f32>> {
+        let output = OutputScale {
+            scale: self.scaling.output.iter().map(|scale| scale.deviation).collect(),
+            offset: self.scaling.output.iter().map(|scale| scale.mean).collect(),
+        };
+        Network::new(&self.config, &output, standardise_loss)
+    }
+
+    /// Refuses a flight sampled at another step than the training data.
+    fn check_step(&self, flight: &Flight) -> Result<()> {
+        if (flight.step_s / self.step_s - 1.0).abs() <= STEP_TOLERANCE {
+            return Ok(());
+        }
+        Err(Error::Config {
+            place: format!("flight `{}`", flight.name),
+            field: "step".into(),
+            found: format!("{} s", flight.step_s),
+            expected: format!("the {} s the network was trained at; set `resample_hz` in dataset.toml", self.step_s),
+        })
+    }
+}
+
+/// A calibrated model with a trained network.
+pub struct Hybrid {
+    description: Description,
+    network: Network<f32>,
+    parameters: Vec<f32>,
+}
+
+impl Hybrid {
+    /// Joins a description and weights.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the configuration is impossible; [`Error::Shape`] if the number of weights is not the network's.
+    pub fn new(description: Description, parameters: Vec<f32>) -> Result<Self> {
+        let network = description.network(false)?;
+        let count = network.graph().parameter_count();
+        if parameters.len() != count {
+            let message = format!("{} weights, and the network has {count}", parameters.len());
+            return Err(Error::Shape { operation: "hybrid", message });
+        }
+        Ok(Self { description, network, parameters })
+    }
+
+    /// What it is, but for its weights.
+    pub const fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// Writes one safetensors file: the weights under the names of the exchange with PyTorch, everything else as metadata.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string(&self.description)
+            .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+        let tensor = |parameter: &crate::tape::Parameter| {
+            let numbers = Numbers::F32(self.parameters[parameter.range()].to_vec());
+            (parameter.name.clone(), Tensor { shape: parameter.shape.lengths().to_vec(), numbers })
+        };
+        let tensors = self.network.parameters().iter().map(tensor).collect();
+        SafeTensors { metadata: [(METADATA.to_owned(), text)].into(), tensors }.write(path)
+    }
+
+    /// Reads what [`Hybrid::write`] wrote. The file may come from anywhere: whatever is wrong with it is an error.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::File`] saying what is wrong.
+    pub fn read(path: &Path) -> Result<Self> {
+        let file = SafeTensors::read(path)?;
+        let fault = |message: String| Error::File { path: path.into(), message };
+        let text = file.metadata.get(METADATA).ok_or_else(|| fault("holds no hybrid of phyture (no such metadata)".into()))?;
+        let description: Description =
+            serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;
+        let network = description.network(false)?;
+        let mut parameters = vec![0.0; network.graph().parameter_count()];
+        for parameter in network.parameters() {
+            let tensor =
+                file.tensors.get(&parameter.name).ok_or_else(|| fault(format!("lacks the tensor `{}`", parameter.name)))?;
+            match &tensor.numbers {
+                Numbers::F32(numbers)
+                    if tensor.shape == parameter.shape.lengths() && numbers.iter().all(|number| number.is_finite()) =>
+                {
+                    parameters[parameter.range()].copy_from_slice(numbers);
+                }
+                _ => {
+                    return Err(fault(format!(
+                        "tensor `{}` is not finite f32 of shape {:?}",
+                        parameter.name,
+                        parameter.shape.lengths()
+                    )));
+                }
+            }
+        }
+        Self::new(description, parameters)
+    }
+
+    /// Predicted accelerations â at the last row of each window, in the order of [`crate::flight::Column::TARGETS`], m/s² and
+    /// rad/s².
+    ///
+    /// # Errors
+    /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; what evaluating the
+    /// model gives.
+    pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
+        let Description { model, config, inputs, scaling, .. } = &self.description;
+        flights.iter().try_for_each(|flight| self.description.check_step(flight))?;
+        let whole = |window: &Window| {
+            window.last + 1 >= config.history && flights.get(window.flight).is_some_and(|flight| window.last < flight.len())
+        };
+        if let Some(window) = windows.iter().find(|window| !whole(window)) {
+            return Err(Error::Config {
+                place: "prediction".into(),
+                field: "window".into(),
+                found: format!("flight {}, row {}", window.flight, window.last),
+                expected: format!("a row with a full history of {} samples", config.history),
+            });
+        }
+        let sequences = sequence::sequences(flights, model, inputs, scaling, config)?;
+        let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
+        let mut predicted = Vec::with_capacity(windows.len());
+        for chunk in windows.chunks(CHUNK) {
+            let fill = |sample: usize, slabs: &mut [&mut [f32]]| {
+                if let (Some(window), [state, physics, ..]) = (chunk.get(sample), slabs) {
+                    sequences[window.flight].history(window.last, state, physics);
+                }
+            };
+            session.predict(&self.parameters, chunk.len(), &fill, &mut |sample, output| {
+                let window = chunk[sample];
+                predicted.push(self.complete(sequences[window.flight].baseline(window.last), output));
+            })?;
+        }
+        Ok(predicted)
+    }
+
+    /// The network's last row, on top of the baseline where it is a residual.
+    fn complete(&self, baseline: [f64; 6], output: &[f32]) -> [f64; 6] {
+        let residual = self.description.config.variant.predicts_residual();
+        let last = &output[output.len().saturating_sub(6)..];
+        std::array::from_fn(|channel| {
+            let learned = last.get(channel).copied().map_or(f64::NAN, f64::from);
+            if residual { baseline[channel] + learned } else { learned }
+        })
+    }
+
+    /// A predictor that takes one sample at a time.
+    ///
+    /// # Errors
+    /// As [`Model::stream`].
+    pub fn stream(&self) -> Result<StreamingHybrid<'_>> {
+        StreamingHybrid::new(self)
+    }
+}

@@ -1,0 +1,151 @@
+//! Flights as the network sees them: scaled state and physics rows, ready to be cut into histories.
+
+use super::scaling::{Scale, Scaling};
+use crate::error::{Error, Result};
+use crate::flight::{Accelerations, Column, Flight, Span};
+use crate::formula::Formula;
+use crate::nn::PhyTureConfig;
+use crate::physics::Model;
+
+/// What the network learns: the residual r = a − a^p, or the acceleration itself (the variants without residual learning).
+fn learned(flight: &Flight, baseline: &Accelerations, residual: bool) -> Accelerations {
+    std::array::from_fn(|channel| {
+        let measured = flight.column(Column::TARGETS[channel]);
+        let offset = |sample: usize| if residual { baseline[channel][sample] } else { 0.0 };
+        measured.iter().enumerate().map(|(sample, value)| value - offset(sample)).collect()
+    })
+}
+
+/// One flight, unscaled.
+struct Raw {
+    state: Vec<Vec<f64>>,
+    baseline: Accelerations,
+    learned: Accelerations,
+}
+
+impl Raw {
+    fn new(flight: &Flight, model: &Model, inputs: &[Formula], residual: bool) -> Result<Self> {
+        let state = inputs.iter().map(|formula| crate::physics::evaluate(formula, flight)).collect::<Result<_>>()?;
+        let baseline = model.predict(flight)?;
+        let learned = learned(flight, &baseline, residual);
+        Ok(Self { state, baseline, learned })
+    }
+}
+
+/// One flight: rows of f32, one a sample.
+#[derive(Clone, Debug)]
+pub struct Sequence {
+    /// Scaled state-control rows, `[samples, D_S]`.
+    state: Vec<f32>,
+    /// Scaled baseline rows, `[samples, 6]`.
+    physics: Vec<f32>,
+    /// What the network is to predict, `[samples, 6]`, physical units.
+    learned: Vec<f32>,
+    /// Baseline accelerations a^p, physical units, f64.
+    baseline: Accelerations,
+}
+
+impl Sequence {
+    fn new(raw: Raw, scaling: &Scaling) -> Self {
+        let rows = |columns: &[Vec<f64>], scales: &[Scale]| {
+            let samples = columns.first().map_or(0, Vec::len);
+            let row = |sample: usize| columns.iter().zip(scales).map(move |(column, scale)| scale.apply(column[sample]) as f32);
+            (0..samples).flat_map(row).collect()
+        };
+        let physical = [Scale { mean: 0.0, deviation: 1.0 }; 6];
+        Self {
+            state: rows(&raw.state, &scaling.state),
+            physics: rows(&raw.baseline, &scaling.physics),
+            learned: rows(&raw.learned, &physical),
+            baseline: raw.baseline,
+        }
+    }
+
+    /// Baseline acceleration of a sample.
+    pub fn baseline(&self, sample: usize) -> [f64; 6] {
+        std::array::from_fn(|channel| self.baseline[channel][sample])
+    }
+
+    /// Copies the history that ends with row `last` into `state` `[H, D_S]` and `physics` `[H, 6]`.
+    pub fn history(&self, last: usize, state: &mut [f32], physics: &mut [f32]) {
+        copy_ending_at(&self.physics, last, 6, physics);
+        let channels = self.state.len() / (self.physics.len() / 6).max(1);
+        copy_ending_at(&self.state, last, channels, state);
+    }
+
+    /// Copies the last rows of what is to be learned, up to and including row `last`, into `target` `[P, 6]`.
+    pub fn target(&self, last: usize, target: &mut [f32]) {
+        copy_ending_at(&self.learned, last, 6, target);
+    }
+}
+
+fn copy_ending_at(rows: &[f32], last: usize, channels: usize, target: &mut [f32]) {
+    let end = (last + 1) * channels;
+    target.copy_from_slice(&rows[end - target.len()..end]);
+}
+
+/// Parses the inputs of a hybrid.
+///
+/// # Errors
+/// [`Error::Formula`] pointing at the character.
+pub fn parse_inputs(inputs: &[String]) -> Result<Vec<Formula>> {
+    inputs.iter().map(|text| Formula::parse(text)).collect()
+}
+
+/// The flights of a data set as sequences under `scaling`.
+///
+/// # Errors
+/// [`Error::Formula`] if an input or an effect names a column that a flight lacks; [`Error::Undetermined`] if a value is not
+/// finite: a NaN never reaches the network.
+pub fn sequences(
+    flights: &[Flight],
+    model: &Model,
+    inputs: &[String],
+    scaling: &Scaling,
+    config: &PhyTureConfig,
+) -> Result<Vec<Sequence>> {
+    let formulas = parse_inputs(inputs)?;
+    let one = |flight: &Flight| {
+        let sequence = Sequence::new(Raw::new(flight, model, &formulas, config.variant.predicts_residual())?, scaling);
+        check_finite(flight, inputs, &sequence)?;
+        Ok(sequence)
+    };
+    flights.iter().map(one).collect()
+}
+
+/// Scales from the training spans alone.
+///
+/// # Errors
+/// As [`sequences`].
+pub fn scaling(flights: &[Flight], spans: &[Span], model: &Model, inputs: &[String], config: &PhyTureConfig) -> Result<Scaling> {
+    let formulas = parse_inputs(inputs)?;
+    let raw: Vec<Raw> = flights
+        .iter()
+        .map(|flight| Raw::new(flight, model, &formulas, config.variant.predicts_residual()))
+        .collect::<Result<_>>()?;
+    let of = |column: &dyn Fn(&Raw) -> Vec<f64>| {
+        let columns: Vec<Vec<f64>> = raw.iter().map(column).collect();
+        Scale::of(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), spans)
+    };
+    Ok(Scaling {
+        state: (0..inputs.len()).map(|input| of(&|raw| raw.state[input].clone())).collect(),
+        physics: std::array::from_fn(|channel| of(&|raw| raw.baseline[channel].clone())),
+        output: std::array::from_fn(|channel| of(&|raw| raw.learned[channel].clone())),
+    })
+}
+
+fn check_finite(flight: &Flight, inputs: &[String], sequence: &Sequence) -> Result<()> {
+    let channels = inputs.len().max(1);
+    let state =
+        sequence.state.iter().position(|value| !value.is_finite()).map(|at| (at / channels, inputs[at % channels].as_str()));
+    let physics = sequence.physics.iter().position(|value| !value.is_finite()).map(|at| (at / 6, "the baseline"));
+    match state.or(physics) {
+        None => Ok(()),
+        Some((sample, what)) => Err(Error::Undetermined(format!(
+            "flight `{}`, {:.2} s: {what} is not a finite number there (a division by zero, a root or logarithm of a negative number); \
+             change the formula, or filter these rows with `use` in dataset.toml",
+            flight.name,
+            flight.time_s(sample)
+        ))),
+    }
+}

@@ -1,0 +1,207 @@
+//! An effect: one named piece of physics, as terms in the formula grammar. Data only; evaluation is in `evaluate`.
+
+use super::evaluate::standard_names;
+use crate::error::{Error, Result};
+use crate::flight::Column;
+use crate::formula::Formula;
+use std::fmt;
+
+/// Kind of the effects that a user writes as a formula.
+pub const FORMULA_KIND: &str = "formula";
+
+/// Name of the coefficient of a [`FORMULA_KIND`] effect.
+pub const FORMULA_COEFFICIENT: &str = "coefficient";
+
+/// One summand of one predicted acceleration: `coefficient * regressor`.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Term {
+    /// Index into [`Column::TARGETS`] of the acceleration it adds to.
+    pub channel: usize,
+    /// Name of the coefficient; `None` stands for a fixed 1, known from first principles. Terms that name the same coefficient
+    /// of an effect share it, also across channels.
+    pub coefficient: Option<String>,
+    /// What is multiplied.
+    pub regressor: Formula,
+}
+
+/// A number that calibration finds.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Coefficient {
+    /// Name, unique in its effect.
+    pub name: String,
+    /// Value, in [`Coefficient::unit`].
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+    /// 95 % confidence interval of the last calibration.
+    pub ci95: Option<[f64; 2]>,
+    /// What it stands for, in a few words.
+    pub meaning: String,
+}
+
+/// A number inside a regressor that calibration leaves alone: geometry, a time constant.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Parameter {
+    /// Name under which the formulas of the effect use it.
+    pub name: String,
+    /// Value, in [`Parameter::unit`].
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+    /// Known beforehand (geometry), as against chosen by a search.
+    pub fixed: bool,
+}
+
+/// A signal that the other effects should see changed: a servo lag replaces `u1` by `lag(u1, tau_s)`. It has no coefficient.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Swap {
+    /// Name replaced in the regressors.
+    pub name: String,
+    /// What stands there instead; it may use `name` itself and the parameters of the effect that owns the swap.
+    pub with: Formula,
+    /// Names of the effects it changes; empty means all.
+    pub within: Vec<String>,
+}
+
+/// One named piece of physics.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Effect {
+    /// What it is: a built-in kind, or [`FORMULA_KIND`].
+    pub kind: String,
+    /// Name, unique in its model; the kind, unless given.
+    pub name: String,
+    /// The physics in one sentence.
+    pub meaning: String,
+    /// Summands.
+    pub terms: Vec<Term>,
+    /// Numbers that calibration finds.
+    pub coefficients: Vec<Coefficient>,
+    /// Numbers that it leaves alone.
+    pub parameters: Vec<Parameter>,
+    /// Changes to the signals of other effects.
+    pub swaps: Vec<Swap>,
+    /// Whether it takes part.
+    pub enabled: bool,
+    /// What put it into the model, if not a person.
+    pub added_by: Option<String>,
+}
+
+impl Effect {
+    /// A user's own effect: one term `coefficient * formula` on one acceleration.
+    ///
+    /// # Errors
+    /// [`Error::Formula`] if the text is no formula.
+    pub fn formula(name: impl Into<String>, channel: usize, formula: &str, value: f64) -> Result<Self> {
+        let unit = Column::TARGETS.get(channel).map_or("1", |column| column.unit());
+        Ok(Self {
+            kind: FORMULA_KIND.into(),
+            name: name.into(),
+            meaning: "a formula of the user".into(),
+            terms: vec![Term { channel, coefficient: Some(FORMULA_COEFFICIENT.into()), regressor: Formula::parse(formula)? }],
+            coefficients: vec![Coefficient {
+                name: FORMULA_COEFFICIENT.into(),
+                value,
+                unit: format!("{unit} per unit"),
+                ci95: None,
+                meaning: "factor of the formula".into(),
+            }],
+            parameters: Vec::new(),
+            swaps: Vec::new(),
+            enabled: true,
+            added_by: None,
+        })
+    }
+
+    /// A coefficient by name.
+    pub fn coefficient(&self, name: &str) -> Option<&Coefficient> {
+        self.coefficients.iter().find(|coefficient| coefficient.name == name)
+    }
+
+    /// A coefficient by name, to change it.
+    pub fn coefficient_mut(&mut self, name: &str) -> Option<&mut Coefficient> {
+        self.coefficients.iter_mut().find(|coefficient| coefficient.name == name)
+    }
+
+    /// Checks that the effect is whole: channels exist, terms name coefficients it has, every coefficient is used, values are
+    /// finite, and no regressor reads an acceleration.
+    ///
+    /// # Errors
+    /// [`Error::Config`] or [`Error::Formula`] naming what is wrong; `place` is the model or file.
+    pub fn check(&self, place: &str) -> Result<()> {
+        let fault = |field: &str, found: String, expected: &str| {
+            let field = format!("{}.{field}", self.name);
+            Err(Error::Config { place: place.into(), field, found, expected: expected.into() })
+        };
+        for term in &self.terms {
+            if term.channel >= Column::TARGETS.len() {
+                return fault("channel", term.channel.to_string(), "0 to 5, an index of the six accelerations");
+            }
+            if let Some(name) = term.coefficient.as_deref().filter(|name| self.coefficient(name).is_none()) {
+                return fault(name, "used by a term but not listed".into(), "a coefficient of the effect");
+            }
+            self.check_inputs(&term.regressor)?;
+        }
+        for swap in &self.swaps {
+            self.check_inputs(&swap.with)?;
+        }
+        for coefficient in &self.coefficients {
+            if !coefficient.value.is_finite() {
+                return fault(&coefficient.name, coefficient.value.to_string(), "a finite number");
+            }
+            if !self.terms.iter().any(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
+                return fault(&coefficient.name, "listed but used by no term".into(), "a coefficient that a term multiplies");
+            }
+        }
+        if let Some(parameter) = self.parameters.iter().find(|parameter| standard_names().contains(&parameter.name.as_str())) {
+            return fault(&parameter.name, "a parameter with the name of a column".into(), "a name that no column has");
+        }
+        match self.parameters.iter().find(|parameter| !parameter.value.is_finite()) {
+            Some(parameter) => fault(&parameter.name, parameter.value.to_string(), "a finite number"),
+            None => Ok(()),
+        }
+    }
+
+    /// Accelerations are what a model predicts; a regressor that reads one would answer the question with itself.
+    fn check_inputs(&self, formula: &Formula) -> Result<()> {
+        let is_target = |name: &str| Column::from_name(name).is_some_and(|column| Column::TARGETS.contains(&column));
+        let Some(error) = formula.unknown_name(&|name| !is_target(name)) else { return Ok(()) };
+        Err(match error {
+            Error::Formula { formula, at, .. } => {
+                let message = "an acceleration cannot be an input of the model; use `rate(…)` of the velocity".into();
+                self.name_error(Error::Formula { message, formula, at })
+            }
+            other => other,
+        })
+    }
+
+    /// Puts the effect's name before a formula error.
+    pub(super) fn name_error(&self, error: Error) -> Error {
+        match error {
+            Error::Formula { message, formula, at } => {
+                Error::Formula { message: format!("effect `{}`: {message}", self.name), formula, at }
+            }
+            other => other,
+        }
+    }
+}
+
+/// One line a term, with the numbers in place: `vz_dot += -20.1 m/s² * u4`.
+impl fmt::Display for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut gap = "";
+        for term in &self.terms {
+            let channel = Column::TARGETS.get(term.channel).map_or("?", |column| column.name());
+            write!(f, "{gap}{channel} += ")?;
+            match term.coefficient.as_deref().and_then(|name| self.coefficient(name)) {
+                Some(Coefficient { value, unit, .. }) => write!(f, "{value} {unit} * ({})", term.regressor)?,
+                None => write!(f, "{}", term.regressor)?,
+            }
+            gap = "\n";
+        }
+        for swap in &self.swaps {
+            write!(f, "{gap}{} := {}", swap.name, swap.with)?;
+            gap = "\n";
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,200 @@
+//! The physical model: a list of effects, the aircraft's geometry, and what is known about the data it fits. How it is written
+//! to a file is in `model_file`; how its numbers are found, in `calibrate`.
+
+use super::baseline;
+use super::effect::Effect;
+use super::evaluate::{self, StreamingModel};
+use crate::error::{Error, Result};
+use crate::flight::split::Protocol;
+use crate::flight::{Accelerations, Column, Flight};
+use crate::formula::Formula;
+use std::collections::BTreeMap;
+
+/// A value of the free table `[provenance]`.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub enum Entry {
+    /// Text; dates are kept as text.
+    Text(String),
+    /// Whole number.
+    Integer(i64),
+    /// Number.
+    Number(f64),
+    /// Yes or no.
+    Boolean(bool),
+    /// List.
+    List(Vec<Self>),
+    /// Table.
+    Table(BTreeMap<String, Self>),
+}
+
+/// What is known about the data.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ModelData {
+    /// Time from a recorded control to its effect, s, at least 0: controls enter every term as `delay(u, control_delay_s)`. A
+    /// control that is held over a step acts half a step before a derivative that is centred on the sample.
+    pub control_delay_s: f64,
+    /// Manoeuvre classes or flights that no search may see.
+    pub locked: Vec<String>,
+    /// How the flights are divided where none is locked.
+    pub split: Protocol,
+}
+
+/// A first-principles model of an unmanned helicopter: predicted acceleration = sum of the terms of its enabled effects.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Model {
+    /// Name of the aircraft or of the model.
+    pub name: String,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Diagonal of the inertia tensor about body x, y, z, kg m²; only ratios matter to the baseline.
+    pub inertia: [f64; 3],
+    /// Rotor radius, m.
+    pub rotor_radius_m: f64,
+    /// Effects, in the order in which they are summed.
+    pub effects: Vec<Effect>,
+    /// What is known about the data.
+    pub data: ModelData,
+    /// Where the numbers come from; free form.
+    pub provenance: BTreeMap<String, Entry>,
+}
+
+impl Model {
+    /// Names of the model's own numbers, usable in every formula: `mass_kg`, `ix iy iz` (kg m²), `rotor_radius_m`,
+    /// `control_delay_s`. They come before a further column of the log of the same name.
+    pub const CONSTANTS: [&'static str; 6] = ["mass_kg", "ix", "iy", "iz", "rotor_radius_m", "control_delay_s"];
+
+    /// The paper's baseline (eqs. 14-15) with all coefficients zero and no control delay.
+    ///
+    /// Mass in kg, diagonal inertia in kg m² (ratios matter), rotor radius in m.
+    pub fn paper(name: impl Into<String>, mass_kg: f64, inertia: [f64; 3], rotor_radius_m: f64) -> Self {
+        Self {
+            name: name.into(),
+            mass_kg,
+            inertia,
+            rotor_radius_m,
+            effects: baseline::paper(),
+            data: ModelData::default(),
+            provenance: BTreeMap::new(),
+        }
+    }
+
+    /// An effect by name.
+    pub fn effect(&self, name: &str) -> Option<&Effect> {
+        self.effects.iter().find(|effect| effect.name == name)
+    }
+
+    /// An effect by name, to change it.
+    pub fn effect_mut(&mut self, name: &str) -> Option<&mut Effect> {
+        self.effects.iter_mut().find(|effect| effect.name == name)
+    }
+
+    /// Baseline accelerations a^p, one vector a channel in the order of [`Column::TARGETS`] (m/s², then rad/s²).
+    ///
+    /// # Errors
+    /// [`Error::Formula`] at a name the flight does not carry, [`Error::Log`] if an effect reads a column that is absent from
+    /// the flight, [`Error::Undetermined`] where a formula gives no finite number, [`Error::Config`] if the model is not whole.
+    pub fn predict(&self, flight: &Flight) -> Result<Accelerations> {
+        evaluate::predict(self, flight)
+    }
+
+    /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.
+    ///
+    /// # Errors
+    /// As [`Model::predict`], where it does not depend on a flight.
+    pub fn stream(&self, step_s: f64) -> Result<StreamingModel> {
+        StreamingModel::new(self, step_s)
+    }
+
+    /// Root mean square of measured minus predicted acceleration over the given spans, by channel (m/s², rad/s²); rows of
+    /// overlapping spans count once each time they are listed.
+    ///
+    /// # Errors
+    /// As [`Model::predict`]; [`Error::Undetermined`] if the spans hold no row.
+    pub fn rmse(&self, flights: &[Flight], spans: &[crate::flight::Span]) -> Result<[f64; 6]> {
+        let mut squares = [0.0; 6];
+        let mut rows = 0;
+        for (index, flight) in flights.iter().enumerate() {
+            let mut spans = spans.iter().filter(|span| span.flight == index).peekable();
+            if spans.peek().is_none() {
+                continue;
+            }
+            let predicted = self.predict(flight)?;
+            for span in spans {
+                let range = span.start.min(flight.len())..span.end.min(flight.len());
+                rows += range.len();
+                for ((sum, predicted), target) in squares.iter_mut().zip(&predicted).zip(Column::TARGETS) {
+                    let pairs = predicted.iter().zip(flight.column(target)).take(range.end).skip(range.start);
+                    *sum += pairs.map(|(predicted, measured)| (measured - predicted).powi(2)).sum::<f64>();
+                }
+            }
+        }
+        if rows == 0 {
+            return Err(Error::Undetermined("no rows to compare: the spans are empty; give at least one flight".into()));
+        }
+        Ok(squares.map(|sum| (sum / rows as f64).sqrt()))
+    }
+
+    /// Checks that the model is whole: positive geometry, a delay that is not negative, effects with names of their own.
+    ///
+    /// # Errors
+    /// [`Error::Config`] or [`Error::Formula`] naming what is wrong.
+    pub fn check(&self) -> Result<()> {
+        self.check_in(&format!("model `{}`", self.name))
+    }
+
+    /// As [`Model::check`], naming `place` in errors.
+    pub(super) fn check_in(&self, place: &str) -> Result<()> {
+        let fault = |field: &str, found: String, expected: &str| {
+            Err(Error::Config { place: place.into(), field: field.into(), found, expected: expected.into() })
+        };
+        let [ix, iy, iz] = self.inertia;
+        let lengths =
+            [("mass_kg", self.mass_kg), ("inertia", ix), ("inertia", iy), ("inertia", iz), ("rotor_radius_m", self.rotor_radius_m)];
+        if let Some((field, value)) = lengths.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+            return fault(field, value.to_string(), "a positive, finite number");
+        }
+        let delay_s = self.data.control_delay_s;
+        if !(0.0..=1.0).contains(&delay_s) {
+            return fault("data.control_delay_s", delay_s.to_string(), "0 to 1 s; a model cannot act before its control");
+        }
+        for (index, effect) in self.effects.iter().enumerate() {
+            effect.check(place)?;
+            if self.effects.iter().take(index).any(|earlier| earlier.name == effect.name) {
+                return fault("effect", format!("`{}` twice", effect.name), "effects with names of their own; set `name`");
+            }
+        }
+        Ok(())
+    }
+
+    /// A constant as the formulas of `effect` see it: its own parameters first, then the model's.
+    pub(super) fn constant(&self, effect: &Effect, name: &str) -> Option<f64> {
+        if let Some(parameter) = effect.parameters.iter().find(|parameter| parameter.name == name) {
+            return Some(parameter.value);
+        }
+        let [ix, iy, iz] = self.inertia;
+        let values = [self.mass_kg, ix, iy, iz, self.rotor_radius_m, self.data.control_delay_s];
+        Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1)
+    }
+
+    /// A regressor of `effect` as it is evaluated: the swaps of the enabled effects applied in order, then the control delay.
+    pub(super) fn effective_regressor(&self, effect: &Effect, regressor: &Formula) -> Result<Formula> {
+        let mut result = regressor.clone();
+        for owner in self.effects.iter().filter(|owner| owner.enabled) {
+            for swap in owner.swaps.iter().filter(|swap| swap.within.is_empty() || swap.within.contains(&effect.name)) {
+                // The owner's parameters become numbers here: `effect` may have parameters of the same names.
+                let number = |name: &str| owner.parameters.iter().find(|known| known.name == name).map(|known| known.value);
+                let with =
+                    swap.with.substitute(&|name| number(name).and_then(|value| Formula::parse(&format!("({value:?})")).ok()))?;
+                result = result
+                    .substitute(&|name| (name == swap.name).then(|| with.clone()))
+                    .map_err(|error| owner.name_error(error))?;
+            }
+        }
+        if self.data.control_delay_s > 0.0 {
+            let control = |name: &str| matches!(Column::from_name(name), Some(Column::U1 | Column::U2 | Column::U3 | Column::U4));
+            let delayed = |name: &str| Formula::parse(&format!("delay({name}, control_delay_s)")).ok();
+            result = result.substitute(&|name| if control(name) { delayed(name) } else { None })?;
+        }
+        Ok(result)
+    }
+}

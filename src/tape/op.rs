@@ -1,0 +1,154 @@
+//! What an operation of the tape is: a shape rule, what it keeps, a forward pass and, if it can be trained through, a
+//! backward pass. The operations themselves are in `ops`, one file each; this file knows none of them.
+
+use super::shape::Shape;
+use crate::error::{Error, Result};
+use phyture_kernels::level::Level;
+use phyture_kernels::random::Stream;
+use phyture_kernels::{Real, Write};
+
+/// Largest number of operands of one operation.
+pub const MAX_OPERANDS: usize = 4;
+
+/// Buffers of one operation for one sample, in elements.
+///
+/// *Workspace* is written by the forward pass and read by the backward pass (means of a layer norm, the log-sum-exp of an
+/// attention); *scratch* is dead when the call returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Memory {
+    /// Kept from the forward to the backward pass.
+    pub workspace: usize,
+    /// For the forward call alone.
+    pub forward_scratch: usize,
+    /// For the backward call alone.
+    pub backward_scratch: usize,
+}
+
+/// What a backward pass reads besides dy: all that is not named here is freed, or reused, after its last forward use.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reads {
+    /// By operand.
+    pub operands: [bool; MAX_OPERANDS],
+    /// The operation's own result.
+    pub result: bool,
+}
+
+impl Reads {
+    /// Nothing: the backward pass needs dy and the shapes alone.
+    pub const NOTHING: Self = Self { operands: [false; MAX_OPERANDS], result: false };
+
+    /// The operands with these indices.
+    pub fn operands(indices: &[usize]) -> Self {
+        Self { operands: std::array::from_fn(|index| indices.contains(&index)), result: false }
+    }
+
+    /// The operation's own result, and not its operands.
+    pub const fn result() -> Self {
+        Self { operands: [false; MAX_OPERANDS], result: true }
+    }
+
+    /// And its own result.
+    pub const fn and_result(mut self) -> Self {
+        self.result = true;
+        self
+    }
+}
+
+/// What a forward pass is given.
+pub struct Forward<'a, T> {
+    /// Operands, in order; empty beyond the last.
+    pub x: [&'a [T]; MAX_OPERANDS],
+    /// Result, to be written completely; holds anything before.
+    pub y: &'a mut [T],
+    /// Workspace, to be written completely; holds anything before.
+    pub workspace: &'a mut [T],
+    /// Scratch; holds anything before.
+    pub scratch: &'a mut [T],
+    /// Shapes of the operands.
+    pub shapes: &'a [Shape],
+    /// Instruction-set level for the kernels.
+    pub level: Level,
+    /// Random stream of this operation, step and sample; `None` when random parts are off. Counter-based: the backward pass
+    /// and any thread make the same numbers again.
+    pub stream: Option<Stream>,
+}
+
+/// One gradient to be produced, and how.
+pub struct Gradient<'a, T> {
+    /// Where to.
+    pub values: &'a mut [T],
+    /// Whether to set or to add.
+    pub write: Write,
+}
+
+/// What a backward pass is given.
+pub struct Backward<'a, T> {
+    /// Operands named in [`Reads`]; the others are empty.
+    pub x: [&'a [T]; MAX_OPERANDS],
+    /// Result, if named in [`Reads`]; empty otherwise.
+    pub y: &'a [T],
+    /// Gradient of the loss with respect to the result.
+    pub dy: &'a [T],
+    /// Workspace as the forward pass left it.
+    pub workspace: &'a [T],
+    /// Gradients to produce, by operand; `None` where nobody asks.
+    pub dx: [Option<Gradient<'a, T>>; MAX_OPERANDS],
+    /// Scratch; holds anything before.
+    pub scratch: &'a mut [T],
+    /// Shapes of the operands.
+    pub shapes: &'a [Shape],
+    /// Instruction-set level for the kernels.
+    pub level: Level,
+    /// The random stream of the forward pass.
+    pub stream: Option<Stream>,
+}
+
+/// An operation: numbers in, numbers out, for one sample.
+pub trait Op<T: Real>: Send + Sync {
+    /// Name in errors.
+    fn name(&self) -> &'static str;
+
+    /// Shape of the result.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] with the operands' shapes and what would fit.
+    fn shape(&self, operands: &[Shape]) -> Result<Shape>;
+
+    /// Buffers for operands of these shapes.
+    fn memory(&self, _operands: &[Shape]) -> Memory {
+        Memory::default()
+    }
+
+    /// Writes the result and the workspace.
+    fn forward(&self, io: Forward<'_, T>);
+
+    /// The backward pass, if there is one. An operation without cannot stand on a path from a parameter to a loss: planning a
+    /// training session then fails, naming it.
+    fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
+        None
+    }
+}
+
+/// An operation with a backward pass.
+pub trait Differentiable<T: Real>: Op<T> {
+    /// What the backward pass reads.
+    fn reads(&self) -> Reads;
+
+    /// Whether there is a gradient with respect to this operand (a constant such as a target has none).
+    fn reaches(&self, _operand: usize) -> bool {
+        true
+    }
+
+    /// Writes every gradient asked for, as its [`Write`] says.
+    fn backward(&self, io: Backward<'_, T>);
+}
+
+/// The error for operands that do not fit.
+pub(crate) fn misfit(operation: &'static str, operands: &[Shape], expected: &str) -> Error {
+    Error::Shape { operation, message: format!("operands of shapes {operands:?}; expected {expected}") }
+}
+
+/// The operands as an array of known length.
+pub(crate) fn exactly<const N: usize>(operation: &'static str, operands: &[Shape], expected: &str) -> Result<[Shape; N]> {
+    <[Shape; N]>::try_from(operands).map_err(|_| misfit(operation, operands, expected))
+}

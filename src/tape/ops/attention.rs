@@ -1,0 +1,100 @@
+//! Multi-head attention without the projections (paper eqs. 21–23), with dropout on the probabilities while training.
+//!   o = (m∘softmax(q·kᵀ/√d_k)/(1−p))·v for each head;  dq, dk, dv by recomputation from the kept log-sum-exp
+//! q, o [queries, d]; k, v [keys, d]; head h is columns h·d_k … (h+1)·d_k. No score map is stored. Kept: `[heads, queries]`.
+
+use super::{or_scratch, rows, rows_mut};
+use crate::error::Result;
+use crate::tape::Shape;
+use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
+use phyture_kernels::Real;
+use phyture_kernels::attention::{self, Gradients};
+use phyture_kernels::dropout::Mask;
+use phyture_kernels::random::Stream;
+
+/// Operands q, k, v.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Attention {
+    /// Heads; a divisor of d.
+    pub heads: usize,
+    /// Probability of dropping a probability, in [0, 1).
+    pub dropout: f64,
+}
+
+impl Attention {
+    fn mask(&self, stream: Option<Stream>) -> Option<Mask> {
+        stream.filter(|_| self.dropout > 0.0).map(|stream| Mask::new(stream, self.dropout))
+    }
+}
+
+impl<T: Real> Op<T> for Attention {
+    fn name(&self) -> &'static str {
+        "attention"
+    }
+
+    fn shape(&self, operands: &[Shape]) -> Result<Shape> {
+        const EXPECTED: &str = "queries [n, d], keys and values [m, d], and a number of heads that divides d";
+        let [q, k, v] = exactly("attention", operands, EXPECTED)?;
+        match (q.lengths(), k.lengths()) {
+            ([_, d], [_, width]) if d == width && k == v && self.heads > 0 && d.is_multiple_of(self.heads) => Ok(q),
+            _ => Err(misfit("attention", operands, EXPECTED)),
+        }
+    }
+
+    fn memory(&self, operands: &[Shape]) -> Memory {
+        let [q, k, ..] = operands else { return Memory::default() };
+        let ((queries, d), (keys, _)) = (q.rows(), k.rows());
+        let scratch = attention::scratch_len(self.heads, queries, keys, d / self.heads);
+        // The kernel makes all three gradients; those nobody asks for go to scratch.
+        Memory { workspace: self.heads * queries, forward_scratch: scratch, backward_scratch: scratch + q.len() + 2 * k.len() }
+    }
+
+    fn forward(&self, io: Forward<'_, T>) {
+        let [q, k, ..] = io.shapes else { return };
+        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
+        let mask = self.mask(io.stream);
+        let o = rows_mut(io.y, q);
+        attention::forward(io.level, self.heads, operands.0, operands.1, operands.2, mask, o, io.workspace, io.scratch);
+    }
+
+    fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
+        Some(self)
+    }
+}
+
+impl<T: Real> Differentiable<T> for Attention {
+    fn reads(&self) -> Reads {
+        Reads::operands(&[0, 1, 2]).and_result()
+    }
+
+    fn backward(&self, io: Backward<'_, T>) {
+        let [q, k, ..] = io.shapes else { return };
+        let [dq, dk, dv, ..] = io.dx;
+        let mut scratch = io.scratch;
+        let (dq, dk, dv) =
+            (or_scratch(dq, &mut scratch, q.len()), or_scratch(dk, &mut scratch, k.len()), or_scratch(dv, &mut scratch, k.len()));
+        let gradients = Gradients {
+            dq: rows_mut(dq.values, q),
+            dk: rows_mut(dk.values, k),
+            dv: rows_mut(dv.values, k),
+            write_q: dq.write,
+            write_k: dk.write,
+            write_v: dv.write,
+        };
+        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
+        let (o, d_o) = (rows(io.y, q), rows(io.dy, q));
+        let mask = self.mask(io.stream);
+        let lse = io.workspace;
+        attention::backward(io.level, self.heads, operands.0, operands.1, operands.2, mask, o, lse, d_o, gradients, scratch);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TWO_HEADS: Attention = Attention { heads: 2, dropout: 0.3 };
+
+    gradcheck!(attention: TWO_HEADS, [[5, 6], [7, 6], [7, 6]], [[3, 2], [2, 2], [2, 2]], [[1, 2], [1, 2], [1, 2]]);
+    gradcheck!(several_blocks: TWO_HEADS, [[70, 4], [90, 4], [90, 4]]);
+    gradcheck!(one_head_as_wide_as_the_paper: Attention { heads: 1, dropout: 0.0 }, [[9, 16], [9, 16], [9, 16]]);
+}

@@ -1,0 +1,66 @@
+//! Sinusoidal positions added to a sequence (paper eqs. 19–20): y = x + PE, dx = dy.
+//!   PE(p, 2i) = sin(p/10000^(2i/d)),  PE(p, 2i+1) = cos(p/10000^(2i/d))
+
+use super::{rows, rows_mut};
+use crate::error::Result;
+use crate::tape::Shape;
+use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
+use phyture_kernels::{Real, RowsMut, encoding, rows};
+
+/// The table `[rows, channels]`, made once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PositionalEncoding {
+    table: Vec<f64>,
+    rows: usize,
+    channels: usize,
+}
+
+impl PositionalEncoding {
+    /// The table for sequences of this length and width.
+    pub fn new(rows: usize, channels: usize) -> Self {
+        let mut table = vec![0.0; rows * channels];
+        encoding::sinusoidal(RowsMut::packed(&mut table, rows, channels));
+        Self { table, rows, channels }
+    }
+}
+
+impl<T: Real> Op<T> for PositionalEncoding {
+    fn name(&self) -> &'static str {
+        "positional_encoding"
+    }
+
+    fn shape(&self, operands: &[Shape]) -> Result<Shape> {
+        const EXPECTED: &str = "one sequence of the table's shape";
+        let [x] = exactly("positional_encoding", operands, EXPECTED)?;
+        let fits = x.lengths() == [self.rows, self.channels];
+        if fits { Ok(x) } else { Err(misfit("positional_encoding", operands, EXPECTED)) }
+    }
+
+    fn forward(&self, io: Forward<'_, T>) {
+        for ((y, x), position) in io.y.iter_mut().zip(io.x[0]).zip(&self.table) {
+            *y = *x + T::of(*position);
+        }
+    }
+
+    fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
+        Some(self)
+    }
+}
+
+impl<T: Real> Differentiable<T> for PositionalEncoding {
+    fn reads(&self) -> Reads {
+        Reads::NOTHING
+    }
+
+    fn backward(&self, io: Backward<'_, T>) {
+        let ([shape, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
+        rows::copy(io.level, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    gradcheck!(positional_encoding: PositionalEncoding::new(7, 4), [[7, 4]]);
+}

@@ -1,0 +1,66 @@
+//! The operations of the tape, one file each: shape rule, what is kept, forward, backward, and a gradient check.
+//!
+//! An operation checks shapes once, while recording, and then calls kernels; the arithmetic is in `phyture-kernels`. To add
+//! one: a file with a type that implements [`Op`](super::op::Op) and [`Differentiable`](super::op::Differentiable), one
+//! `gradcheck!` line at its foot, and its name here.
+
+mod activation;
+mod affine;
+mod attention;
+mod concatenate;
+mod conv1d;
+mod copy;
+mod dropout;
+mod encoding;
+mod halves;
+mod last_rows;
+mod layer_norm;
+mod linear;
+mod moving_average;
+mod scale_exp;
+mod squared_error;
+mod sum;
+mod temporal;
+
+pub use activation::Activation;
+pub use affine::Affine;
+pub use attention::Attention;
+pub use concatenate::Concatenate;
+pub use conv1d::{Conv1d, Epilogue};
+pub use copy::Copy;
+pub use dropout::Dropout;
+pub use encoding::PositionalEncoding;
+pub use halves::{Half, Interleave};
+pub use last_rows::LastRows;
+pub use layer_norm::LayerNorm;
+pub use linear::Linear;
+pub use moving_average::MovingAverage;
+pub use scale_exp::ScaleExp;
+pub use squared_error::SquaredError;
+pub use sum::{Add, Subtract};
+pub use temporal::Temporal;
+
+use super::op::Gradient;
+use super::shape::Shape;
+use phyture_kernels::{Rows, RowsMut, Write};
+
+/// A value as packed rows of its last axis.
+fn rows<'a, T>(values: &'a [T], shape: &Shape) -> Rows<'a, T> {
+    let (rows, columns) = shape.rows();
+    Rows::packed(values, rows, columns)
+}
+
+/// A value as packed rows of its last axis, to be written.
+fn rows_mut<'a, T>(values: &'a mut [T], shape: &Shape) -> RowsMut<'a, T> {
+    let (rows, columns) = shape.rows();
+    RowsMut::packed(values, rows, columns)
+}
+
+/// A gradient, or, where nobody asks for it, a place for it in the scratch.
+fn or_scratch<'a, T>(gradient: Option<Gradient<'a, T>>, scratch: &mut &'a mut [T], len: usize) -> Gradient<'a, T> {
+    gradient.unwrap_or_else(|| {
+        let (values, rest) = std::mem::take(scratch).split_at_mut(len);
+        *scratch = rest;
+        Gradient { values, write: Write::Set }
+    })
+}

@@ -1,0 +1,569 @@
+//! Replaying a plan: one sample at a time, one worker a core, the same bits on any number of threads.
+//!
+//! The batch is the outermost loop. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
+//! gradient slab of its own; shards are summed in order. So neither the number of threads nor their timing can change a bit.
+//! In the steady state (no more samples than in an earlier call) nothing is allocated.
+//!
+//! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic but the sum over shards.
+
+use super::graph::{Graph, MAX_INPUTS, Var};
+use super::op::{Backward, Forward, Gradient, MAX_OPERANDS};
+use super::plan::{ALIGNMENT_BYTES, Piece, Plan, Role, Step, alignment};
+use crate::error::{Error, Result};
+use phyture_kernels::level::Level;
+use phyture_kernels::random::Stream;
+use phyture_kernels::{Real, Write};
+use std::sync::{Mutex, PoisonError};
+
+/// Gradient shards of a training session: a constant, so that the order of summation is one. More than this many threads bring
+/// nothing in training.
+pub const SHARDS: usize = 8;
+
+/// Elements summed over the shards at a time, so that the sum stays in cache.
+const REDUCE_BLOCK: usize = 4096;
+
+/// How many threads a session works on; 0 means all cores. Without the feature `rayon`, always the calling one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Threads(pub usize);
+
+/// Key of the random streams of one training step. With the same key the same dropout masks are drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct DropoutKey {
+    /// Seed of the run.
+    pub seed: u64,
+    /// Optimiser step.
+    pub step: u64,
+}
+
+/// Fills the inputs of one sample, in the order in which the graph recorded them; called on worker threads.
+pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
+
+/// Activations, gradients of activations, workspaces and scratch of one sample, at an aligned start.
+struct Slab<T> {
+    numbers: Vec<T>,
+    len: usize,
+}
+
+impl<T: Real> Slab<T> {
+    fn new(len: usize) -> Self {
+        Self { numbers: vec![T::ZERO; len + alignment::<T>()], len }
+    }
+
+    fn aligned(&mut self) -> &mut [T] {
+        let skip = self.numbers.as_ptr().align_offset(ALIGNMENT_BYTES).min(alignment::<T>());
+        self.numbers.get_mut(skip..skip + self.len).unwrap_or_default()
+    }
+}
+
+/// Parameter gradients of the samples of one shard.
+struct Shard<T> {
+    gradients: Vec<T>,
+}
+
+/// A plan with its memory, ready to be replayed.
+pub struct Session<T> {
+    plan: Plan<T>,
+    level: Level,
+    poison: bool,
+    slabs: Mutex<Vec<Slab<T>>>,
+    shards: Vec<Shard<T>>,
+    gradients: Vec<T>,
+    losses: Vec<f64>,
+    /// By sample: outputs in order, then the gradients of the inputs that have one.
+    results: Vec<T>,
+    #[cfg(feature = "rayon")]
+    pool: Option<rayon::ThreadPool>,
+}
+
+impl<T: Real> Session<T> {
+    /// A session that computes the loss, its gradients, and `outputs`.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if the loss is not one number, depends on nothing trainable, or an operation on the way has no backward
+    /// pass; [`Error::Config`] if the instruction-set level asked for is not available, or threads cannot be started.
+    pub fn train(graph: &Graph<T>, loss: Var, outputs: &[Var], threads: Threads) -> Result<Self> {
+        Self::new(Plan::train(graph, loss, outputs)?, threads)
+    }
+
+    /// A session that computes `outputs` alone and keeps nothing for a backward pass.
+    ///
+    /// # Errors
+    /// As [`Session::train`].
+    pub fn infer(graph: &Graph<T>, outputs: &[Var], threads: Threads) -> Result<Self> {
+        Self::new(Plan::infer(graph, outputs)?, threads)
+    }
+
+    fn new(plan: Plan<T>, threads: Threads) -> Result<Self> {
+        let level = Level::detect().map_err(|error| Error::Config {
+            place: "environment".into(),
+            field: phyture_kernels::level::ENVIRONMENT_VARIABLE.into(),
+            found: error.to_string(),
+            expected: "a level of this processor, or nothing".into(),
+        })?;
+        let trains = plan.loss.is_some();
+        let count = if threads.0 == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { threads.0 };
+        let count = if cfg!(feature = "rayon") { count } else { 1 };
+        // Inference has nothing to sum, so its number of shards is free.
+        let shards = if trains { SHARDS } else { SHARDS.max(count) };
+        let gradient_len = if trains { plan.parameter_len } else { 0 };
+        Ok(Self {
+            level,
+            poison: false,
+            slabs: Mutex::new((0..count.min(shards)).map(|_| Slab::new(plan.slab_len)).collect()),
+            shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
+            gradients: vec![T::ZERO; gradient_len],
+            losses: Vec::new(),
+            results: Vec::new(),
+            #[cfg(feature = "rayon")]
+            pool: if count > 1 { Some(pool(count)?) } else { None },
+            plan,
+        })
+    }
+
+    /// Fills the slab with NaN before each sample: an operation that reads what nobody wrote shows at once. For tests.
+    pub fn set_poison(&mut self, poison: bool) {
+        self.poison = poison;
+    }
+
+    /// The instruction-set level it runs at.
+    pub const fn level(&self) -> Level {
+        self.level
+    }
+
+    /// Numbers in the slab of one worker: the memory of one sample in flight.
+    pub fn slab_len(&self) -> usize {
+        self.plan.slab_len
+    }
+
+    /// Forward, and in a training session backward, for samples `0..samples`.
+    ///
+    /// Returns the mean loss over the samples, summed in f64; 0 in an inference session. Afterwards [`Session::gradients`]
+    /// holds the gradient of that mean. `dropout: None` turns dropout off.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if `parameters` is not as long as the graph's flat slab.
+    pub fn step(&mut self, parameters: &[T], samples: usize, dropout: Option<DropoutKey>, fill: Fill<'_, T>) -> Result<f64> {
+        if parameters.len() != self.plan.parameter_len {
+            let message = format!("{} parameters; the graph has {}", parameters.len(), self.plan.parameter_len);
+            return Err(Error::Shape { operation: "session", message });
+        }
+        let result_len = self.result_len();
+        if self.losses.len() < samples {
+            self.losses.resize(samples, 0.0);
+            self.results.resize(samples * result_len, T::ZERO);
+        }
+        let Self { plan, level, poison, slabs, shards, gradients, losses, results, .. } = self;
+        let (level, poison, count) = (*level, *poison, shards.len());
+        let losses = &mut losses[..samples];
+        let replay = Replay { plan, level, poison, slabs, parameters, dropout, fill, samples, result_len, shards: count };
+        let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
+        let mut work = || {
+            replay.work(shards, 0, losses_mut, results);
+            // A shard without samples has written nothing.
+            let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
+            reduce(gradients, shards, &used, 0);
+        };
+        #[cfg(feature = "rayon")]
+        match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+        #[cfg(not(feature = "rayon"))]
+        work();
+        for range in &self.plan.unreached {
+            if let Some(gradients) = self.gradients.get_mut(range.clone()) {
+                gradients.fill(T::ZERO);
+            }
+        }
+        Ok(self.losses[..samples].iter().sum::<f64>() / samples.max(1) as f64)
+    }
+
+    /// Runs samples `0..samples` without dropout and hands the outputs over in order.
+    ///
+    /// # Errors
+    /// As [`Session::step`].
+    pub fn predict(
+        &mut self,
+        parameters: &[T],
+        samples: usize,
+        fill: Fill<'_, T>,
+        each: &mut dyn FnMut(usize, &[T]),
+    ) -> Result<()> {
+        self.step(parameters, samples, None, fill)?;
+        let output_len = self.plan.outputs.iter().map(ExactSizeIterator::len).sum();
+        let result_len = self.result_len();
+        for sample in 0..samples {
+            each(sample, &self.results[sample * result_len..][..output_len]);
+        }
+        Ok(())
+    }
+
+    /// Gradient of the mean loss of the last step, one number a parameter, in the layout of the flat slab. Empty in an
+    /// inference session.
+    pub fn gradients(&self) -> &[T] {
+        &self.gradients
+    }
+
+    /// Loss of each sample of the last step.
+    pub fn losses(&self) -> &[f64] {
+        &self.losses
+    }
+
+    /// Output `index` of a sample of the last step; empty if there is no such output or sample.
+    pub fn output(&self, index: usize, sample: usize) -> &[T] {
+        let before = self.plan.outputs.iter().take(index).map(ExactSizeIterator::len).sum::<usize>();
+        let len = self.plan.outputs.get(index).map_or(0, ExactSizeIterator::len);
+        self.result(sample, before, len)
+    }
+
+    /// Gradient of the mean loss with respect to input `index` of a sample of the last step. Empty if the input was recorded
+    /// without gradient, or no path joins it to the loss.
+    pub fn input_gradient(&self, index: usize, sample: usize) -> &[T] {
+        let len = |range: &Option<std::ops::Range<usize>>| range.as_ref().map_or(0, ExactSizeIterator::len);
+        let outputs = self.plan.outputs.iter().map(ExactSizeIterator::len).sum::<usize>();
+        let before = outputs + self.plan.input_gradients.iter().take(index).map(len).sum::<usize>();
+        self.result(sample, before, self.plan.input_gradients.get(index).map_or(0, len))
+    }
+
+    fn result(&self, sample: usize, start: usize, len: usize) -> &[T] {
+        let start = sample * self.result_len() + start;
+        self.results.get(start..start + len).unwrap_or_default()
+    }
+
+    fn result_len(&self) -> usize {
+        self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()).map(ExactSizeIterator::len).sum()
+    }
+}
+
+#[cfg(feature = "rayon")]
+fn pool(threads: usize) -> Result<rayon::ThreadPool> {
+    let named = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("phyture-{index}"));
+    named.build().map_err(|error| Error::Config {
+        place: "session".into(),
+        field: "threads".into(),
+        found: format!("{threads} ({error})"),
+        expected: "a number of threads that the system can start".into(),
+    })
+}
+
+/// Two closures, on two threads if a pool is there.
+fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
+    #[cfg(feature = "rayon")]
+    if rayon::current_thread_index().is_some() {
+        rayon::join(a, b);
+        return;
+    }
+    a();
+    b();
+}
+
+/// gradients = Σ shards, element by element in the order of the shards.
+fn reduce<T: Real>(gradients: &mut [T], shards: &[Shard<T>], used: &(dyn Fn(usize) -> bool + Sync), start: usize) {
+    if gradients.len() > REDUCE_BLOCK {
+        let half = (gradients.len() / 2).next_multiple_of(REDUCE_BLOCK);
+        let (low, high) = gradients.split_at_mut(half.min(gradients.len()));
+        return join(|| reduce(low, shards, used, start), || reduce(high, shards, used, start + half));
+    }
+    gradients.fill(T::ZERO);
+    for (_, shard) in shards.iter().enumerate().filter(|(index, _)| used(*index)) {
+        let part = shard.gradients.get(start..).unwrap_or_default();
+        gradients.iter_mut().zip(part).for_each(|(sum, part)| *sum += *part);
+    }
+}
+
+/// What all workers of one step share.
+struct Replay<'a, T> {
+    plan: &'a Plan<T>,
+    level: Level,
+    poison: bool,
+    slabs: &'a Mutex<Vec<Slab<T>>>,
+    parameters: &'a [T],
+    dropout: Option<DropoutKey>,
+    fill: Fill<'a, T>,
+    samples: usize,
+    result_len: usize,
+    shards: usize,
+}
+
+impl<T: Real> Replay<'_, T> {
+    /// First sample of a shard: shards are as equal as they can be, and depend on the number of samples alone.
+    const fn first_sample(&self, shard: usize) -> usize {
+        shard * self.samples / self.shards
+    }
+
+    fn work(&self, shards: &mut [Shard<T>], first: usize, losses: &mut [f64], results: &mut [T]) {
+        match shards {
+            [] => {}
+            [shard] => self.shard(shard, self.first_sample(first), losses, results),
+            _ => {
+                let (low, high) = shards.split_at_mut(shards.len() / 2);
+                let middle = first + low.len();
+                let samples = self.first_sample(middle) - self.first_sample(first);
+                let (low_losses, high_losses) = losses.split_at_mut(samples);
+                let (low_results, high_results) = results.split_at_mut(samples * self.result_len);
+                join(|| self.work(low, first, low_losses, low_results), || self.work(high, middle, high_losses, high_results));
+            }
+        }
+    }
+
+    fn shard(&self, shard: &mut Shard<T>, first: usize, losses: &mut [f64], results: &mut [T]) {
+        if losses.is_empty() {
+            return;
+        }
+        let lock = || self.slabs.lock().unwrap_or_else(PoisonError::into_inner);
+        // There are as many slabs as threads, and a thread holds one at a time.
+        let mut slab = lock().pop().unwrap_or_else(|| Slab::new(self.plan.slab_len));
+        for (index, loss) in losses.iter_mut().enumerate() {
+            let result = &mut results[index * self.result_len..][..self.result_len];
+            *loss = self.sample(slab.aligned(), &mut shard.gradients, first + index, index == 0, result);
+        }
+        lock().push(slab);
+    }
+
+    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
+        if self.poison {
+            slab.fill(T::NAN);
+        }
+        let mut inputs: [&mut [T]; MAX_INPUTS] = std::array::from_fn(|_| Default::default());
+        let count = self.plan.inputs.len();
+        carve(slab, &self.plan.inputs, |role, piece| {
+            if let Role::X(index) = role {
+                inputs[index] = piece;
+            }
+        });
+        (self.fill)(sample, &mut inputs[..count]);
+        for step in &self.plan.forward {
+            self.forward(step, slab, sample);
+        }
+        let mut loss = 0.0;
+        if let Some((value, gradient)) = self.plan.loss {
+            loss = slab[value].f64();
+            slab[gradient] = T::of(1.0 / self.samples as f64);
+            for step in &self.plan.backward {
+                self.backward(step, slab, gradients, sample, first);
+            }
+        }
+        let mut result = result;
+        for range in self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()) {
+            let (now, later) = result.split_at_mut(range.len());
+            now.copy_from_slice(&slab[range.clone()]);
+            result = later;
+        }
+        loss
+    }
+
+    fn stream(&self, step: &Step<T>, sample: usize) -> Option<Stream> {
+        self.dropout.map(|key| Stream::new(key.seed, key.step, step.site, sample as u64))
+    }
+
+    fn forward(&self, step: &Step<T>, slab: &mut [T], sample: usize) {
+        let mut io = Forward {
+            x: [&[]; MAX_OPERANDS],
+            y: Default::default(),
+            workspace: Default::default(),
+            scratch: Default::default(),
+            shapes: &step.shapes,
+            level: self.level,
+            stream: self.stream(step, sample),
+        };
+        for (index, range) in &step.parameters {
+            io.x[*index] = &self.parameters[range.clone()];
+        }
+        carve(slab, &step.pieces, |role, piece| match role {
+            Role::X(index) => io.x[index] = piece,
+            Role::Y => io.y = piece,
+            Role::Workspace => io.workspace = piece,
+            Role::Scratch => io.scratch = piece,
+            Role::Dy | Role::Dx(..) => {}
+        });
+        step.op.forward(io);
+    }
+
+    fn backward(&self, step: &Step<T>, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool) {
+        let mut io = Backward {
+            x: [&[]; MAX_OPERANDS],
+            y: &[],
+            dy: &[],
+            workspace: &[],
+            dx: [const { None }; MAX_OPERANDS],
+            scratch: Default::default(),
+            shapes: &step.shapes,
+            level: self.level,
+            stream: self.stream(step, sample),
+        };
+        for (index, range) in &step.parameters {
+            io.x[*index] = &self.parameters[range.clone()];
+        }
+        carve(slab, &step.pieces, |role, piece| match role {
+            Role::X(index) => io.x[index] = piece,
+            Role::Y => io.y = piece,
+            Role::Workspace => io.workspace = piece,
+            Role::Scratch => io.scratch = piece,
+            Role::Dy => io.dy = piece,
+            Role::Dx(index, write) => io.dx[index] = Some(Gradient { values: piece, write }),
+        });
+        carve(gradients, &step.parameter_gradients, |role, piece| {
+            if let Role::Dx(index, write) = role {
+                // Over the samples of a shard the gradients add up; the first sample sets.
+                let write = if first { write } else { Write::Add };
+                io.dx[index] = Some(Gradient { values: piece, write });
+            }
+        });
+        if let Some(differentiable) = step.op.differentiable() {
+            differentiable.backward(io);
+        }
+    }
+}
+
+/// Hands out disjoint pieces of a slab, sorted by start.
+fn carve<'a, T>(slab: &'a mut [T], pieces: &[Piece], mut take: impl FnMut(Role, &'a mut [T])) {
+    let mut rest = slab;
+    let mut position = 0;
+    for piece in pieces {
+        let (_, tail) = std::mem::take(&mut rest).split_at_mut(piece.start - position);
+        let (taken, tail) = tail.split_at_mut(piece.len);
+        take(piece.role, taken);
+        rest = tail;
+        position = piece.start + piece.len;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradcheck;
+    use super::super::ops::{Dropout, Linear, SquaredError};
+    use super::super::plan::tests::{random_graph, recipe};
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    const KEY: Option<DropoutKey> = Some(DropoutKey { seed: 4, step: 2 });
+
+    fn fill<T: Real>(sample: usize, inputs: &mut [&mut [T]]) {
+        for (index, input) in inputs.iter_mut().enumerate() {
+            let stream = Stream::new(1, 0, index as u64, sample as u64);
+            input.iter_mut().enumerate().for_each(|(at, value)| *value = T::of(stream.uniform(at as u64) - 0.5));
+        }
+    }
+
+    fn parameters<T: Real>(count: usize) -> Vec<T> {
+        let stream = Stream::new(2, 0, 0, 0);
+        (0..count).map(|at| T::of(stream.uniform(at as u64) - 0.5)).collect()
+    }
+
+    /// Linear, dropout, linear with the same weight, squared error; and a parameter that nothing reads.
+    fn shared_weight<T: Real>() -> Result<(Graph<T>, Var, Var)> {
+        let mut graph = Graph::<T>::new();
+        let (x, target) = (graph.input_with_gradient("x", &[5, 4])?, graph.input("target", &[5, 4])?);
+        graph.parameter("unused", &[3])?;
+        let (weight, bias) = (graph.parameter("weight", &[4, 4])?, graph.parameter("bias", &[4])?);
+        let first = graph.apply(Linear, &[x, weight, bias])?;
+        let dropped = graph.apply(Dropout { rate: 0.3 }, &[first])?;
+        let second = graph.apply(Linear, &[dropped, weight, bias])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[second, target])?;
+        Ok((graph, loss, second))
+    }
+
+    fn bits(values: &[f32]) -> Vec<u32> {
+        values.iter().map(|value| value.to_bits()).collect()
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let (graph, loss, output) = shared_weight::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        // Fewer samples than shards, as many, more, and not a multiple.
+        for samples in [1, 3, SHARDS, 29] {
+            let mut found = Vec::new();
+            for threads in [1, 2, 16] {
+                let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
+                let loss = session.step(&parameters, samples, KEY, &fill)?;
+                let outputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.output(0, sample))).collect();
+                let inputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.input_gradient(0, sample))).collect();
+                assert!(session.input_gradient(1, 0).is_empty(), "a target has no gradient");
+                found.push((loss.to_bits(), bits(session.gradients()), outputs, inputs));
+            }
+            assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_batch_is_the_mean_of_its_samples_and_a_shared_weight_sums() -> Result<()> {
+        let (graph, loss, _) = shared_weight::<f64>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut session = Session::train(&graph, loss, &[], Threads(2))?;
+        // More samples first, so that nothing of them may show later.
+        session.step(&parameters, 11, None, &fill)?;
+        let whole = session.step(&parameters, 5, None, &fill)?;
+        let gradients = session.gradients().to_vec();
+        let (mut sum, mut sums) = (0.0, vec![0.0; gradients.len()]);
+        for sample in 0..5 {
+            sum += session.step(&parameters, 1, None, &|_, inputs: &mut [&mut [f64]]| fill(sample, inputs))?;
+            sums.iter_mut().zip(session.gradients()).for_each(|(sum, value)| *sum += value);
+        }
+        assert!((whole - sum / 5.0).abs() < Tolerance::Close.relative_f64());
+        assert!(gradients.iter().zip(&sums).all(|(whole, sum)| (whole - sum / 5.0).abs() < Tolerance::Close.relative_f64()));
+        assert_eq!(gradients[..3], [0.0; 3], "a parameter that nothing reads has gradient zero");
+        gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &|name| name == "unused", 3)
+            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+    }
+
+    #[test]
+    fn dropout_follows_its_key_and_is_off_without_one() -> Result<()> {
+        let (graph, loss, output) = shared_weight::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut train = Session::train(&graph, loss, &[output], Threads(1))?;
+        let mut run = |key| {
+            train.step(&parameters, 2, key, &fill)?;
+            Ok::<_, Error>(bits(train.output(0, 1)))
+        };
+        let (first, again, off) = (run(KEY)?, run(KEY)?, run(None)?);
+        let other = run(Some(DropoutKey { seed: 4, step: 3 }))?;
+        assert_eq!(first, again);
+        assert!(first != other && first != off);
+        let mut order = Vec::new();
+        let mut infer = Session::infer(&graph, &[output], Threads(2))?;
+        infer.predict(&parameters, 3, &fill, &mut |sample, output| {
+            order.push(sample);
+            assert!(sample != 1 || bits(output) == off, "inference differs from training without dropout");
+        })?;
+        assert_eq!(order, [0, 1, 2]);
+        assert!(infer.gradients().is_empty());
+        assert!(infer.step(&parameters[1..], 1, None, &fill).is_err(), "too few parameters were accepted");
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn random_graphs_have_exact_gradients_and_read_nothing_unwritten(recipe in recipe()) {
+            let (graph, loss, values) = random_graph(&recipe)?;
+            let parameters = parameters(graph.parameter_count());
+            let mut plain = Session::train(&graph, loss, &values, Threads(1))?;
+            let mut poisoned = Session::train(&graph, loss, &values, Threads(1))?;
+            poisoned.set_poison(true);
+            // The second step meets the first one's numbers, or NaN.
+            for _ in 0..2 {
+                let (a, b) = (plain.step(&parameters, 3, None, &fill)?, poisoned.step(&parameters, 3, None, &fill)?);
+                prop_assert_eq!(a.to_bits(), b.to_bits());
+                prop_assert_eq!(plain.gradients(), poisoned.gradients());
+                prop_assert_eq!(plain.input_gradient(0, 2), poisoned.input_gradient(0, 2));
+                for index in 0..values.len() {
+                    prop_assert_eq!(plain.output(index, 1), poisoned.output(index, 1));
+                }
+            }
+            // Keeping outputs alive changes the places of buffers, not the numbers.
+            let mut lean = Session::train(&graph, loss, &[], Threads(1))?;
+            lean.step(&parameters, 3, None, &fill)?;
+            prop_assert_eq!(lean.gradients(), plain.gradients());
+            // A parameter whose value nothing reads on has no gradient; that the others have the right one is checked.
+            let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(|value| *value == 0.0);
+            let zero = |name: &str| graph.parameters().iter().any(|parameter| parameter.name == name && still(parameter));
+            if !graph.parameters().iter().all(still) {
+                let checked = gradcheck::graph(&graph, loss, &parameters, 2, None, &fill, &zero, 5);
+                prop_assert!(checked.is_ok(), "{:?}", checked);
+            }
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! The optimiser loop, one step at a time: order of windows, loss and gradients, Adam. No files, no clock.
+
+use super::config::TrainConfig;
+use super::schedule::Schedule;
+use crate::error::{Error, Result};
+use crate::flight::Window;
+use crate::hybrid::sequence::Sequence;
+use crate::nn::Network;
+use crate::tape::{DropoutKey, Session, Threads};
+use phyture_kernels::adam::{self, Adam};
+use phyture_kernels::random::permutation;
+use serde::{Deserialize, Serialize};
+
+/// Everything that training changes. With configuration and data, this is the whole run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct State {
+    /// Steps done.
+    pub step: u64,
+    /// θ, flat.
+    pub parameters: Vec<f32>,
+    /// Adam's m.
+    pub first_moment: Vec<f32>,
+    /// Adam's v.
+    pub second_moment: Vec<f32>,
+}
+
+/// What one step did.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct StepReport {
+    /// Steps done, this one included.
+    pub step: u64,
+    /// Epoch of the step, from 0.
+    pub epoch: usize,
+    /// Mean over the batch of the squared 2-norm over the channels, (m/s²)² and (rad/s²)² summed (paper eq. 13).
+    pub loss: f64,
+    /// Learning rate of the step.
+    pub rate: f64,
+    /// Euclidean norm of the gradient. Logged, not clipped.
+    pub gradient_norm: f64,
+}
+
+/// A training run in memory.
+pub struct Trainer<'a> {
+    config: &'a TrainConfig,
+    sequences: &'a [Sequence],
+    windows: &'a [Window],
+    session: Session<f32>,
+    schedule: Schedule,
+    state: State,
+    /// Order of the windows in `epoch_of_order`.
+    order: Vec<u32>,
+    epoch_of_order: Option<usize>,
+}
+
+impl<'a> Trainer<'a> {
+    /// A run from its beginning, or from `state`.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if there are no windows; [`Error::File`] if the state is not one of this network.
+    pub fn new(
+        config: &'a TrainConfig,
+        network: &Network<f32>,
+        sequences: &'a [Sequence],
+        windows: &'a [Window],
+        state: Option<State>,
+        threads: Threads,
+    ) -> Result<Self> {
+        if windows.is_empty() {
+            return Err(Error::Undetermined(format!(
+                "no training window: no run of training samples is as long as the history of {} samples; shorten `network.history` or give longer flights",
+                config.network.history
+            )));
+        }
+        let count = network.graph().parameter_count();
+        let state = state.unwrap_or_else(|| State {
+            step: 0,
+            parameters: network.initial(config.seed),
+            first_moment: vec![0.0; count],
+            second_moment: vec![0.0; count],
+        });
+        if [&state.parameters, &state.first_moment, &state.second_moment].iter().any(|slab| slab.len() != count) {
+            let message = format!("holds {} parameters, and the network of this configuration has {count}", state.parameters.len());
+            return Err(Error::File { path: "checkpoint".into(), message });
+        }
+        let schedule = Schedule::new(config.peak_rate, config.warmup_epochs, config.epochs, windows.len().div_ceil(config.batch));
+        let session = Session::train(network.graph(), network.loss(), &[], threads)?;
+        Ok(Self { config, sequences, windows, session, schedule, state, order: Vec::new(), epoch_of_order: None })
+    }
+
+    /// Steps in one epoch; the last may have fewer windows than the others.
+    pub fn steps_an_epoch(&self) -> usize {
+        self.windows.len().div_ceil(self.config.batch)
+    }
+
+    /// Steps of the whole run.
+    pub fn steps(&self) -> u64 {
+        (self.steps_an_epoch() * self.config.epochs) as u64
+    }
+
+    /// What has been learned so far.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// One step; `None` when the run is at its end.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if loss or gradient are not finite: the run has diverged, and its state is that of the step before.
+    pub fn step(&mut self) -> Result<Option<StepReport>> {
+        let done = self.state.step;
+        if done >= self.steps() {
+            return Ok(None);
+        }
+        let (epoch, batch) = (done as usize / self.steps_an_epoch(), done as usize % self.steps_an_epoch());
+        if self.epoch_of_order != Some(epoch) {
+            self.order = permutation(self.windows.len(), self.config.seed, epoch as u64);
+            self.epoch_of_order = Some(epoch);
+        }
+        let start = batch * self.config.batch;
+        let chosen = &self.order[start..(start + self.config.batch).min(self.order.len())];
+        let (sequences, windows) = (self.sequences, self.windows);
+        let fill = |sample: usize, inputs: &mut [&mut [f32]]| {
+            let window = windows[chosen[sample] as usize];
+            if let [state, physics, target] = inputs {
+                sequences[window.flight].history(window.last, state, physics);
+                sequences[window.flight].target(window.last, target);
+            }
+        };
+        let dropout = (self.config.network.dropout > 0.0).then_some(DropoutKey { seed: self.config.seed, step: done });
+        let loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
+        let gradients = self.session.gradients();
+        let gradient_norm = gradients.iter().map(|gradient| f64::from(*gradient).powi(2)).sum::<f64>().sqrt();
+        if !(loss.is_finite() && gradient_norm.is_finite()) {
+            return Err(Error::Undetermined(format!(
+                "training diverged at step {}: loss {loss}, gradient norm {gradient_norm}; lower `peak_rate` ({})",
+                done + 1,
+                self.config.peak_rate
+            )));
+        }
+        let rate = self.schedule.rate(done as usize);
+        let State { parameters, first_moment, second_moment, .. } = &mut self.state;
+        let adam = Adam { learning_rate: rate, ..Adam::default() };
+        adam::step(self.session.level(), &adam, done + 1, 1.0, gradients, parameters, first_moment, second_moment);
+        self.state.step += 1;
+        Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
+    }
+}
