@@ -51,7 +51,11 @@ struct Shape {
 
 impl Shape {
     fn of<T>(heads: usize, q: &Rows<'_, T>, k: &Rows<'_, T>, v: &Rows<'_, T>, o: &Rows<'_, T>, log_sum_exp: usize) -> Self {
-        assert!(heads > 0 && q.cols() > 0 && q.cols().is_multiple_of(heads), "attention: {heads} heads do not divide {} columns", q.cols());
+        assert!(
+            heads > 0 && q.cols() > 0 && q.cols().is_multiple_of(heads),
+            "attention: {heads} heads do not divide {} columns",
+            q.cols()
+        );
         assert!(q.cols() == k.cols() && q.cols() == v.cols() && q.cols() == o.cols(), "attention: widths differ");
         assert!(k.rows() == v.rows() && q.rows() == o.rows(), "attention: rows of k and v, or of q and o, differ");
         assert!(k.rows() > 0, "attention: softmax over no key");
