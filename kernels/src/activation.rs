@@ -155,3 +155,51 @@ impl<T: Real> Kernel for Backward<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::reference;
+    use crate::testing::{Matrix, assert_near, check_writes};
+    use crate::tolerance::Tolerance;
+
+    const ALL: [Activation; 6] = [
+        Activation::Identity,
+        Activation::Relu,
+        Activation::LeakyRelu { slope: 0.01 },
+        Activation::Tanh,
+        Activation::Sigmoid,
+        Activation::Gelu,
+    ];
+
+    fn check<T: Real>(kind: Activation, shape: (usize, usize), stretch: f64, seed: u64) {
+        let (unit, dy) = (Matrix::<T>::random(seed, shape), Matrix::<T>::random(seed + 1, shape));
+        let x = Matrix::<T>::filled(shape, 3, 2, |i, j| unit.view().row(i)[j] * T::of(stretch));
+        let y_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(reference::activation(kind, x.view().row(i)[j].f64())));
+        let dx_expected = Matrix::filled(shape, 0, 0, |i, j| {
+            T::of(reference::activation_derivative(kind, x.view().row(i)[j].f64()) * dy.view().row(i)[j].f64())
+        });
+        for level in Level::available() {
+            let mut y = Matrix::<T>::poisoned(seed, shape);
+            forward(level, kind, x.view(), y.view_mut());
+            y.check_gaps();
+            assert_near(&format!("{kind:?} at {level}"), &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
+            let saved = if kind.saves() == Saves::Input { x.view() } else { y.view() };
+            check_writes(&format!("{kind:?} backward at {level}"), &dx_expected, Tolerance::Close, |dx, write| {
+                backward(level, kind, saved, dy.view(), dx, write);
+            });
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn equals_its_definition(rows in 0_usize..10, cols in 0_usize..200, stretch in 0.1_f64..20.0, seed in 0_u64..1000) {
+            for kind in ALL {
+                check::<f32>(kind, (rows, cols), stretch, seed);
+                check::<f64>(kind, (rows, cols), stretch, seed);
+            }
+        }
+    }
+}

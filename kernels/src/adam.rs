@@ -83,3 +83,52 @@ impl<T: Real> Kernel for Step<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::reference;
+    use crate::testing::{assert_near, numbers};
+    use crate::tolerance::Tolerance;
+
+    fn check<T: Real>(len: usize, start: usize, scale: f64, seed: u64) {
+        let adam = Adam::default();
+        for level in Level::available() {
+            let (mut theta, mut m, mut v) = (numbers::<T>(seed, len), vec![T::ZERO; len], vec![T::ZERO; len]);
+            let widen = |x: &[T]| x.iter().map(|x| x.f64()).collect::<Vec<f64>>();
+            let mut expected = (widen(&theta), widen(&m), widen(&v));
+            let start = start.min(len);
+            for t in 1..=10 {
+                let gradient = numbers::<T>(seed + t, len);
+                step(level, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
+                for i in start..len {
+                    let g = gradient[i].f64() * scale;
+                    let moments = (expected.1[i], expected.2[i]);
+                    (expected.0[i], expected.1[i], expected.2[i]) =
+                        reference::adam(&adam, t, expected.0[i], g, moments.0, moments.1);
+                }
+            }
+            let narrow = |x: &[f64]| x.iter().map(|x| T::of(*x)).collect::<Vec<T>>();
+            assert_near("parameters", &theta, &narrow(&expected.0), Tolerance::Close);
+            assert_near("first moment", &m, &narrow(&expected.1), Tolerance::Close);
+            assert_near("second moment", &v, &narrow(&expected.2), Tolerance::Close);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn ten_steps_equal_the_formula(len in 0_usize..200, start in 0_usize..9, scale in 0.1_f64..2.0, seed in 0_u64..1000) {
+            check::<f32>(len, start, scale, seed);
+            check::<f64>(len, start, scale, seed);
+        }
+    }
+
+    #[test]
+    fn the_first_step_is_one_learning_rate_against_the_sign_of_the_gradient() {
+        let (mut theta, mut m, mut v) = ([1.0_f64, 1.0], [0.0; 2], [0.0; 2]);
+        step(Level::PLAIN, &Adam::default(), 1, 1.0, &[3.0, -40.0], &mut theta, &mut m, &mut v);
+        assert_near("parameters", &theta, &[1.0 - 1e-3, 1.0 + 1e-3], Tolerance::Close);
+    }
+}

@@ -116,3 +116,71 @@ pub fn backward<T: Real>(level: Level, mask: Mask, dy: Rows<'_, T>, dx: RowsMut<
     same_shape(&dy, &dx.view());
     level.run(Apply { mask, x: dy, y: dx, write });
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Matrix, assert_near, check_writes, inner};
+    use crate::tolerance::Tolerance;
+
+    proptest! {
+        #[test]
+        fn every_level_makes_the_mask_that_keeps_says(
+            rows in 0_usize..40, cols in 0_usize..200, rate in 0.0_f64..0.99, seed in 0_u64..1000,
+        ) {
+            let mask = Mask::new(Stream::new(seed, 0, 0, 0), rate);
+            let x = Matrix::<f32>::random(seed, (rows, cols));
+            let scale = mask.scale() as f32;
+            let expected = Matrix::filled((rows, cols), 0, 0, |i, j| if mask.keeps(i, j) { x.view().row(i)[j] * scale } else { 0.0 });
+            for level in Level::available() {
+                let mut y = Matrix::<f32>::poisoned(seed, (rows, cols));
+                forward(level, mask, x.view(), y.view_mut());
+                assert_eq!(y.to_vec(), expected.to_vec(), "level {level}");
+                y.check_gaps();
+                check_writes("backward", &expected, Tolerance::Close, |dx, write| backward(level, mask, x.view(), dx, write));
+            }
+        }
+
+        #[test]
+        fn lanes_are_the_rows(row in 0_usize..10_000, column in 0_usize..10_000, seed: u64) {
+            let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.5);
+            let mut values = [1.0_f32; 8];
+            MaskLanes::<8>::new(mask, row).drop(column, &mut values);
+            let expected: Vec<f32> = (row..row + 8).map(|i| f32::from(u8::from(mask.keeps(i, column)))).collect();
+            assert_eq!(values.to_vec(), expected);
+        }
+
+        #[test]
+        fn backward_is_the_adjoint(rows in 1_usize..20, cols in 1_usize..20, seed in 0_u64..1000) {
+            let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.3);
+            let (x, dy) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
+            let (mut y, mut dx) = (Matrix::<f64>::poisoned(1, (rows, cols)), Matrix::<f64>::poisoned(1, (rows, cols)));
+            forward(Level::PLAIN, mask, x.view(), y.view_mut());
+            backward(Level::PLAIN, mask, dy.view(), dx.view_mut(), Write::Set);
+            let sides = (inner(&y.to_vec(), &dy.to_vec()), inner(&x.to_vec(), &dx.to_vec()));
+            assert_near("<Ax, y> and <x, A'y>", &[sides.0], &[sides.1], Tolerance::Close);
+        }
+    }
+
+    #[test]
+    fn the_share_dropped_is_the_rate_and_rate_zero_drops_nothing() {
+        const SIDE: usize = 1000;
+        for rate in [0.0, 0.05, 0.2, 0.5, 0.9] {
+            let mask = Mask::new(Stream::new(3, 0, 0, 0), rate);
+            let dropped = (0..SIDE * SIDE).filter(|i| !mask.keeps(i / SIDE, i % SIDE)).count() as f64 / (SIDE * SIDE) as f64;
+            // 6 standard deviations of a share of a million draws.
+            let bound = 6.0 * (rate * (1.0 - rate)).sqrt() / SIDE as f64;
+            assert!((dropped - rate).abs() <= bound, "rate {rate}: {dropped}");
+        }
+    }
+
+    #[test]
+    fn the_scale_is_one_over_the_keep_probability() {
+        let stream = Stream::new(0, 0, 0, 0);
+        assert_near("rate 0.5", &[Mask::new(stream, 0.5).scale()], &[2.0], Tolerance::Close);
+        assert_near("rate 0", &[Mask::new(stream, 0.0).scale()], &[1.0], Tolerance::Close);
+        assert!(Mask::new(stream, 5.0).scale().is_finite() && Mask::new(stream, f64::NAN) == Mask::new(stream, 0.0));
+    }
+}

@@ -26,6 +26,7 @@ pub mod real;
 pub mod reference;
 pub mod rows;
 pub mod sci;
+mod sums;
 pub mod temporal;
 #[cfg(test)]
 mod testing;

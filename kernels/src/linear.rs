@@ -54,3 +54,54 @@ impl<T: Real> Kernel for SumRows<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::reference;
+    use crate::testing::{Matrix, assert_near, check_writes, numbers};
+    use crate::tolerance::Tolerance;
+
+    fn check<T: Real>(rows: usize, inputs: usize, outputs: usize, seed: u64) {
+        let (x, dy) = (Matrix::<T>::random(seed, (rows, inputs)), Matrix::<T>::random(seed + 1, (rows, outputs)));
+        let (weight, bias) = (numbers::<T>(seed + 2, outputs * inputs), numbers::<T>(seed + 3, outputs));
+        let weight_rows = Rows::packed(&weight, outputs, inputs);
+        let mut product = Matrix::<T>::poisoned(seed, (rows, outputs));
+        reference::gemm_abt(x.view(), weight_rows, product.view_mut());
+        let y_expected = Matrix::filled((rows, outputs), 0, 0, |i, o| product.view().row(i)[o] + bias[o]);
+        let mut dx = Matrix::<T>::poisoned(seed, (rows, inputs));
+        reference::gemm_ab(dy.view(), weight_rows, dx.view_mut());
+        let mut dw = Matrix::<T>::poisoned(0, (1, weight.len()));
+        reference::gemm_atb(dy.view(), x.view(), RowsMut::packed(dw.view_mut().row_mut(0), outputs, inputs));
+        let ones = Matrix::<T>::filled((rows, 1), 0, 0, |_, _| T::ONE);
+        let mut db = Matrix::<T>::poisoned(0, (1, outputs));
+        reference::gemm_atb(ones.view(), dy.view(), db.view_mut());
+        for level in Level::available() {
+            let mut scratch = vec![T::NAN; scratch_len(rows, inputs, outputs)];
+            let mut y = Matrix::<T>::poisoned(seed, (rows, outputs));
+            forward(level, x.view(), &weight, Some(&bias), y.view_mut(), &mut scratch);
+            assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
+            forward(level, x.view(), &weight, None, y.view_mut(), &mut scratch);
+            assert_near("y without bias", &y.to_vec(), &product.to_vec(), Tolerance::Close);
+            y.check_gaps();
+            check_writes("dx", &dx, Tolerance::Close, |dx, write| {
+                backward_input(level, dy.view(), &weight, dx, write, &mut scratch)
+            });
+            check_writes("dW", &dw, Tolerance::Close, |mut dw, write| {
+                backward_weight(level, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
+            });
+            check_writes("db", &db, Tolerance::Close, |mut db, write| backward_bias(level, dy.view(), db.row_mut(0), write));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn equals_the_matrix_product(rows in 0_usize..100, inputs in 1_usize..70, outputs in 1_usize..70, seed in 0_u64..1000) {
+            check::<f32>(rows, inputs, outputs, seed);
+            check::<f64>(rows, inputs, outputs, seed);
+        }
+    }
+}

@@ -51,3 +51,27 @@ impl<T: Real> Kernel for Gradient<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Matrix, assert_near, check_writes};
+    use crate::tolerance::Tolerance;
+
+    proptest! {
+        #[test]
+        fn value_and_gradient(rows in 0_usize..40, cols in 0_usize..20, weight in 0.01_f64..2.0, seed in 0_u64..1000) {
+            let (y, target) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
+            let expected: f64 = y.to_vec().iter().zip(target.to_vec()).map(|(y, t)| weight * (y - t) * (y - t)).sum();
+            assert_near("value", &[squared_error(y.view(), target.view(), weight)], &[expected], Tolerance::Close);
+            let gradient = Matrix::filled((rows, cols), 0, 0, |i, j| 2.0 * weight * (y.view().row(i)[j] - target.view().row(i)[j]));
+            for level in Level::available() {
+                check_writes("gradient", &gradient, Tolerance::Close, |dy, write| {
+                    squared_error_gradient(level, y.view(), target.view(), weight, dy, write);
+                });
+            }
+        }
+    }
+}

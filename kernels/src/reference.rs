@@ -172,8 +172,8 @@ pub fn attention_backward<T: Real>(
             }
         }
         for c in 0..size {
-            for i in 0..q.rows() {
-                dq.row_mut(i)[h * size + c] = sum((0..k.rows()).map(|j| d_scores[i][j] * at(&k, j, c)));
+            for (i, d_scores) in d_scores.iter().enumerate() {
+                dq.row_mut(i)[h * size + c] = sum(d_scores.iter().enumerate().map(|(j, ds)| ds * at(&k, j, c)));
             }
             for j in 0..k.rows() {
                 dk.row_mut(j)[h * size + c] = sum((0..q.rows()).map(|i| d_scores[i][j] * at(&q, i, c)));

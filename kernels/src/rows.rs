@@ -276,3 +276,86 @@ pub fn fill<T: Real>(mut y: RowsMut<'_, T>, value: T) {
         y.row_mut(i).fill(value);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Matrix, assert_near, check_writes, inner};
+    use crate::tolerance::Tolerance;
+
+    proptest! {
+        #[test]
+        fn interleave_undoes_split_bit_for_bit(rows in 0_usize..200, cols in 0_usize..40, seed in 0_u64..1000) {
+            let x = Matrix::<f32>::random(seed, (rows, cols));
+            for level in Level::available() {
+                let mut even = Matrix::<f32>::poisoned(seed, (rows.div_ceil(2), cols));
+                let mut odd = Matrix::<f32>::poisoned(seed + 1, (rows / 2, cols));
+                let mut back = Matrix::<f32>::poisoned(seed + 2, (rows, cols));
+                split(level, x.view(), even.view_mut(), odd.view_mut());
+                interleave(level, even.view(), odd.view(), back.view_mut(), Write::Set);
+                assert_eq!(back.to_vec(), x.to_vec());
+                back.check_gaps();
+            }
+        }
+
+        #[test]
+        fn interleave_is_the_adjoint_of_split(rows in 0_usize..100, cols in 1_usize..20, seed in 0_u64..1000) {
+            let (x, y) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
+            let (even, odd) = (y.view().even(), y.view().odd());
+            let mut back = Matrix::<f64>::poisoned(seed, (rows, cols));
+            interleave(Level::PLAIN, even, odd, back.view_mut(), Write::Set);
+            let of = |x: &Matrix<f64>| inner(&x.to_vec(), &y.to_vec());
+            assert_near("<split x, y> and <x, interleave y>", &[of(&x)], &[inner(&x.to_vec(), &back.to_vec())], Tolerance::Close);
+        }
+
+        #[test]
+        fn sums_and_differences(rows in 0_usize..60, cols in 0_usize..200, seed in 0_u64..1000) {
+            let (a, b) = (Matrix::<f32>::random(seed, (rows, cols)), Matrix::<f32>::random(seed + 1, (rows, cols)));
+            let (a_values, b_values) = (a.to_vec(), b.to_vec());
+            for level in Level::available() {
+                let mut y = Matrix::<f32>::poisoned(seed, (rows, cols));
+                add(level, a.view(), b.view(), y.view_mut());
+                assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a + b).collect::<Vec<_>>());
+                subtract(level, a.view(), b.view(), y.view_mut());
+                assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a - b).collect::<Vec<_>>());
+                y.check_gaps();
+                check_writes("copy", &a, Tolerance::Close, |y, write| copy(level, a.view(), y, write));
+            }
+        }
+    }
+
+    #[test]
+    fn views_pick_the_rows_and_columns_they_say() {
+        let mut data: Vec<u32> = (0..30).collect();
+        let x = Rows::new(&data, 5, 4, 6);
+        let first = |x: Rows<'_, u32>| (0..x.rows()).map(|i| x.row(i)[0]).collect::<Vec<_>>();
+        assert_eq!(first(x.even()), [0, 12, 24]);
+        assert_eq!(first(x.odd()), [6, 18]);
+        assert_eq!(first(x.odd().odd()), [18]);
+        assert_eq!(first(x.range(2, 4).columns(1, 2)), [13, 19]);
+        assert_eq!(x.every(7, 2).rows(), 0);
+        assert_eq!(x.range(5, 5).rows(), 0);
+        fill_numbers(RowsMut::new(&mut data, 5, 4, 6).odd().columns(2, 1));
+        assert_eq!((data[8], data[20], data[2]), (99, 99, 2));
+    }
+
+    fn fill_numbers(mut y: RowsMut<'_, u32>) {
+        for i in 0..y.rows() {
+            y.row_mut(i).fill(99);
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "hold no 2 x 3 view")]
+    fn a_view_beyond_its_slice_is_refused() {
+        let _ = Rows::new(&[0.0; 6], 2, 3, 4);
+    }
+
+    #[test]
+    #[should_panic(expected = "overlap")]
+    fn overlapping_rows_cannot_be_written() {
+        let _ = RowsMut::new(&mut [0.0; 6], 2, 3, 2);
+    }
+}

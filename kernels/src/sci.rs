@@ -80,3 +80,44 @@ impl<T: Real> Kernel for Backward<'_, T> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::testing::{Matrix, assert_near, check_writes};
+    use crate::tolerance::Tolerance;
+
+    fn check<T: Real>(shape: (usize, usize), seed: u64) {
+        let [x, s, dy] = [0, 1, 2].map(|k| Matrix::<T>::random(seed + k, shape));
+        let of = |m: &Matrix<T>, i: usize, j: usize| m.view().row(i)[j].f64();
+        let y_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&x, i, j) * of(&s, i, j).exp()));
+        let dx_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&dy, i, j) * of(&s, i, j).exp()));
+        let ds_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&dy, i, j) * of(&x, i, j) * of(&s, i, j).exp()));
+        for level in Level::available() {
+            let mut y = Matrix::<T>::poisoned(seed, shape);
+            scale(level, x.view(), s.view(), y.view_mut());
+            y.check_gaps();
+            assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
+            for other in crate::testing::WRITES {
+                check_writes("dx", &dx_expected, Tolerance::Close, |dx, write| {
+                    let mut ds = Matrix::<T>::random(seed, shape);
+                    scale_backward(level, x.view(), s.view(), dy.view(), dx, write, ds.view_mut(), other);
+                });
+                check_writes("ds", &ds_expected, Tolerance::Close, |ds, write| {
+                    let mut dx = Matrix::<T>::random(seed, shape);
+                    scale_backward(level, x.view(), s.view(), dy.view(), dx.view_mut(), other, ds, write);
+                });
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn equals_its_definition(rows in 0_usize..20, cols in 0_usize..200, seed in 0_u64..1000) {
+            check::<f32>((rows, cols), seed);
+            check::<f64>((rows, cols), seed);
+        }
+    }
+}

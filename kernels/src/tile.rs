@@ -138,7 +138,11 @@ fn row_tile<T: Real, I: Isa, L: LeftRows<T>, const MR: usize, const NR: usize>(
     let (depth, last) = (left.depth(), left.rows() - 1);
     let mut acc = [[T::ZERO; NR]; MR];
     for (tap, lines) in panel.chunks_exact(depth).enumerate() {
-        let pieces: [&[T]; MR] = std::array::from_fn(|i| &left.piece((first + i).min(last), tap)[..depth]);
+        // Not array::from_fn: its closure is not always inlined, and then the lengths are lost.
+        let mut pieces: [&[T]; MR] = [&[]; MR];
+        for (i, piece) in pieces.iter_mut().enumerate() {
+            *piece = &left.piece((first + i).min(last), tap)[..depth];
+        }
         for (p, line) in lines.iter().enumerate().take(depth) {
             for i in 0..MR {
                 let a = pieces[i][p];
