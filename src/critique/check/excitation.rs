@@ -57,7 +57,11 @@ pub struct Collinearity {
 
 /// The table of movements.
 pub(super) fn movements(flights: &[Flight]) -> Vec<Excitation> {
-    SHOWN.into_iter().filter(|column| flights.iter().all(|flight| !flight.absent.contains(column))).map(|column| movement(flights, column)).collect()
+    SHOWN
+        .into_iter()
+        .filter(|column| flights.iter().all(|flight| !flight.absent.contains(column)))
+        .map(|column| movement(flights, column))
+        .collect()
 }
 
 fn movement(flights: &[Flight], column: Column) -> Excitation {
@@ -68,7 +72,10 @@ fn movement(flights: &[Flight], column: Column) -> Excitation {
     let deviation = (square / duration_s).sqrt();
     let blocks = flights.iter().flat_map(|flight| {
         let samples = (BLOCK_S / flight.step_s).round().max(1.0) as usize;
-        flight.column(column).chunks(samples).map(move |block| block.iter().map(|value| (value - mean).powi(2)).sum::<f64>() * flight.step_s)
+        flight
+            .column(column)
+            .chunks(samples)
+            .map(move |block| block.iter().map(|value| (value - mean).powi(2)).sum::<f64>() * flight.step_s)
     });
     let mut blocks: Vec<f64> = blocks.collect();
     blocks.sort_unstable_by(|a, b| b.total_cmp(a));
@@ -122,7 +129,12 @@ fn channel_collinearity(flights: &[Flight], channel: &str, columns: [Column; 2])
     };
     let covariance = DMatrix::from_fn(2, 2, |i, j| gram[(i, j)] / count - gram[(i, 2)] * gram[(j, 2)] / count.powi(2));
     let correlation = DMatrix::from_fn(2, 2, |i, j| covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt());
-    let inflation = correlation.iter().all(|value| value.is_finite()).then(|| Cholesky::new(correlation)).flatten().map(|factor| factor.inverse());
+    let inflation = correlation
+        .iter()
+        .all(|value| value.is_finite())
+        .then(|| Cholesky::new(correlation))
+        .flatten()
+        .map(|factor| factor.inverse());
     let variance_inflation = inflation.into_iter().flat_map(|inverse| {
         columns.into_iter().enumerate().map(move |(index, column)| (column.name().to_owned(), inverse[(index, index)]))
     });

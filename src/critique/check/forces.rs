@@ -119,7 +119,11 @@ impl Forces {
             interval: None,
             expected: None,
             unit: "m/s²".into(),
-            message: format!("force along x and y is smallest as the log is read; next: {} ({:.2} m/s²)", self.readings[best].says, rms(best)),
+            message: format!(
+                "force along x and y is smallest as the log is read; next: {} ({:.2} m/s²)",
+                self.readings[best].says,
+                rms(best)
+            ),
             set: None,
         };
         if blocks < FEW_BLOCKS {
@@ -135,7 +139,8 @@ impl Forces {
             finding.set = Some(self.readings[best].set.into());
         } else if total(best) < total(0) && interval.is_some_and(|[_, high]| high < 0.0) {
             finding.verdict = Verdict::Warning;
-            finding.message = format!("force along x and y is a little smaller, {:.2} m/s², if {}", rms(best), self.readings[best].says);
+            finding.message =
+                format!("force along x and y is a little smaller, {:.2} m/s², if {}", rms(best), self.readings[best].says);
         }
         Some(finding)
     }
@@ -181,12 +186,18 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
                 "gravity enters with the other sign: roll or pitch has the other sign, the attitude is transposed, or z points up",
                 "axes = \"NWU/FLU\" if z points up; [columns] roll = \"-roll\" or pitch = \"-pitch\"",
             ),
-            ("gravity", ..) => ("gravity enters with the wrong size: wrong units of angles or accelerations", "[units] angles, acceleration or velocity"),
+            ("gravity", ..) => (
+                "gravity enters with the wrong size: wrong units of angles or accelerations",
+                "[units] angles, acceleration or velocity",
+            ),
             (_, true, _) => (
                 "the Coriolis term is not in the accelerations: they are those of the inertial velocity",
                 "targets = \"body_acceleration\" or \"inertial\"; velocity = \"inertial\" if accelerations are derived",
             ),
-            (_, _, true) => ("the Coriolis term enters with the other sign: look at the signs of rates and velocity", "axes = \"NWU/FLU\", or [columns] wx = \"-wx\" and so on"),
+            (_, _, true) => (
+                "the Coriolis term enters with the other sign: look at the signs of rates and velocity",
+                "axes = \"NWU/FLU\", or [columns] wx = \"-wx\" and so on",
+            ),
             _ => ("the Coriolis term enters with the wrong size: wrong units of rates", "[units] rates"),
         };
         finding.message = message.into();
@@ -195,7 +206,9 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
         finding.message = format!("these flights do not tell how {what} enters");
     } else if beyond(WARNING_MARGIN) {
         finding.verdict = Verdict::Warning;
-        finding.message = format!("{what} enters with a coefficient off 1; forces not modelled here, a tilted sensor or a wrong time step can do that");
+        finding.message = format!(
+            "{what} enters with a coefficient off 1; forces not modelled here, a tilted sensor or a wrong time step can do that"
+        );
     } else {
         finding.verdict = Verdict::Ok;
         finding.message = format!("{what} enters as it should");

@@ -85,7 +85,10 @@ impl Motion {
     pub fn pieces(&self, margin: usize) -> impl Iterator<Item = (Range<usize>, usize)> + '_ {
         let length = ((PIECE_S / self.step_s).round() as usize).max(1);
         let last = self.instants.len().saturating_sub(margin + 1);
-        (margin..).step_by(length).take_while(move |start| start + length <= last).map(move |start| (start..start + length, start / self.block_samples()))
+        (margin..)
+            .step_by(length)
+            .take_while(move |start| start + length <= last)
+            .map(move |start| (start..start + length, start / self.block_samples()))
     }
 
     /// ∫ f dt over a piece, with `f` given the sample.

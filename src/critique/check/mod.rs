@@ -70,7 +70,11 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         summary: summary(&findings),
         flights: data.flights.len(),
         duration_s: data.duration_s(),
-        targets: if data.flights.iter().any(|flight| flight.targets == Targets::Derived) { Targets::Derived } else { Targets::Recorded },
+        targets: if data.flights.iter().any(|flight| flight.targets == Targets::Derived) {
+            Targets::Derived
+        } else {
+            Targets::Recorded
+        },
         findings,
         control_delay,
         excitation,
@@ -98,7 +102,10 @@ fn origin(flights: &[Flight]) -> Finding {
     let derived = flights.iter().filter(|flight| flight.targets == Targets::Derived).count();
     let message = match derived {
         0 => "accelerations are recorded".into(),
-        _ => format!("accelerations of {derived} of {} flights are derived from v and w: their conventions cannot be checked apart from those", flights.len()),
+        _ => format!(
+            "accelerations of {derived} of {} flights are derived from v and w: their conventions cannot be checked apart from those",
+            flights.len()
+        ),
     };
     finding("targets", Verdict::Ok, message, None)
 }
@@ -113,21 +120,36 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
     let pitch = largest(&[Column::Pitch]);
     // Half a degree of slack for rounding in the log.
     if pitch > std::f64::consts::FRAC_PI_2 + 0.01 {
-        let message = format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
+        let message =
+            format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
         findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
     }
     let control = largest(&[Column::U1, Column::U2, Column::U3, Column::U4]);
     if control > LARGEST_CONTROL {
-        let message = format!("controls reach {control:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]");
-        findings.push(finding("control_range", Verdict::Warning, message, Some("[columns] u1 = \"u1 / 1000\" or the like, with the file's names")));
+        let message =
+            format!("controls reach {control:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]");
+        findings.push(finding(
+            "control_range",
+            Verdict::Warning,
+            message,
+            Some("[columns] u1 = \"u1 / 1000\" or the like, with the file's names"),
+        ));
     }
     let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
         (below + flight.column(Column::Z).iter().filter(|z| **z > 0.0).count(), samples + flight.len())
     });
     if 2 * below > samples {
-        let message = format!("z, which is down, is positive in {} % of the samples: flights below the starting point, or z is height", 100 * below / samples.max(1));
-        findings.push(finding("height_sign", Verdict::Warning, message, Some("[columns] z = \"-z\", with the file's name, if z is height")));
+        let message = format!(
+            "z, which is down, is positive in {} % of the samples: flights below the starting point, or z is height",
+            100 * below / samples.max(1)
+        );
+        findings.push(finding(
+            "height_sign",
+            Verdict::Warning,
+            message,
+            Some("[columns] z = \"-z\", with the file's name, if z is height"),
+        ));
     }
     findings
 }

@@ -43,7 +43,8 @@ const MATERIAL_SHARE: f64 = 0.02;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
-const TRANSPOSED: &str = "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
+const TRANSPOSED: &str =
+    "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
@@ -123,6 +124,9 @@ impl Relation {
                 read("", "", DOWN, |i| stack(cross(i.rotation[2], i.rates))),
                 read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [-1.0; 3])))),
                 read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, FLIP)))),
+                read("the roll rate has the other sign", "[columns] wx = \"-wx\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [-1.0, 1.0, 1.0])))),
+                read("the pitch rate has the other sign", "[columns] wy = \"-wy\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [1.0, -1.0, 1.0])))),
+                read("the yaw rate has the other sign", "[columns] wz = \"-wz\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [1.0, 1.0, -1.0])))),
                 read("roll has the other sign", ROLL_SIGN, |i| stack(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2], i.rates))),
                 read("pitch has the other sign", PITCH_SIGN, |i| stack(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2], i.rates))),
                 read("the rates are in degrees a second", "[units] rates = \"deg/s\"", DOWN, |i| stack(cross(i.rotation[2], i.rates.map(|rate| rate * DEGREE)))),
@@ -135,6 +139,9 @@ impl Relation {
             read("the rates are written in inertial axes", "[columns] wx, wy, wz as body rates: the log has inertial ones", |i| axes(&i.rotation), |i| turning(&i.rotation, rotate_back(&i.rotation, i.rates))),
             read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [-1.0; 3]))),
             read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, FLIP))),
+            read("the roll rate has the other sign", "[columns] wx = \"-wx\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [-1.0, 1.0, 1.0]))),
+            read("the pitch rate has the other sign", "[columns] wy = \"-wy\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [1.0, -1.0, 1.0]))),
+            read("the yaw rate has the other sign", "[columns] wz = \"-wz\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [1.0, 1.0, -1.0]))),
             read("roll has the other sign", ROLL_SIGN, |i| axes(&turned(scaled(i.angles, [-1.0, 1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [-1.0, 1.0, 1.0])), i.rates)),
             read("pitch has the other sign", PITCH_SIGN, |i| axes(&turned(scaled(i.angles, [1.0, -1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.rates)),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
@@ -222,9 +229,8 @@ impl Relation {
             message: format!("{} holds", self.formula),
             set: None,
         };
-        let convincing = best.filter(|&index| {
-            nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index)
-        });
+        let convincing =
+            best.filter(|&index| nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index));
         if !nominal.is_finite() || blocks < FEW_BLOCKS {
             finding.verdict = Verdict::Undetermined;
             finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);

@@ -113,7 +113,9 @@ impl fmt::Display for CheckReport {
         writeln!(f, "{}", self.summary)?;
         writeln!(f, "{} flights, {:.0} s; accelerations {targets}", self.flights, self.duration_s)?;
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))?;
-        for (subject, title) in [(Subject::Conventions, "Conventions"), (Subject::Timing, "Timing"), (Subject::Excitation, "Excitation")] {
+        for (subject, title) in
+            [(Subject::Conventions, "Conventions"), (Subject::Timing, "Timing"), (Subject::Excitation, "Excitation")]
+        {
             writeln!(f, "\n{title}")?;
             self.findings.iter().filter(|finding| finding.subject == subject).try_for_each(|finding| writeln!(f, "{finding}"))?;
         }

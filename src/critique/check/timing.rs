@@ -162,7 +162,10 @@ impl Timing {
         let largest = samples(LARGEST_SHIFT_S).max(2);
         let shifts: Vec<isize> = (-largest..=largest).collect();
         self.step_s = Some(step_s);
-        self.pairs = PAIRS.into_iter().map(|pair| (pair, Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone() })).collect();
+        self.pairs = PAIRS
+            .into_iter()
+            .map(|pair| (pair, Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone() }))
+            .collect();
         self.delays = (samples(CONTROL_DELAYS_S[0]).min(-1)..=samples(CONTROL_DELAYS_S[1]).max(2)).collect();
         self.controls = vec![vec![BlockRegression::new(); self.delays.len()]; 4];
     }
@@ -216,7 +219,11 @@ impl Timing {
     /// Offsets between streams.
     pub fn offsets(&self) -> Vec<Finding> {
         let step_s = self.step_s.unwrap_or(1.0);
-        self.pairs.iter().filter(|(_, profile)| !profile.errors[0][0].is_empty()).map(|(pair, profile)| offset(pair, profile, step_s)).collect()
+        self.pairs
+            .iter()
+            .filter(|(_, profile)| !profile.errors[0][0].is_empty())
+            .map(|(pair, profile)| offset(pair, profile, step_s))
+            .collect()
     }
 
     /// The delay of the controls, common to all, and its profile.
@@ -255,9 +262,11 @@ impl Timing {
         let at_end = [profile.shifts.first(), profile.shifts.last()].into_iter().flatten().any(|end| *end as f64 == minimum.at);
         if high < -step_s {
             finding.verdict = Verdict::Warning;
-            finding.message = "the controls are recorded after they act, or a feedback loop drives them; look at the log's time stamps".into();
+            finding.message =
+                "the controls are recorded after they act, or a feedback loop drives them; look at the log's time stamps".into();
         } else {
-            finding.message = format!("controls act this late{}", if at_end { ", or later: the end of the range tried" } else { "" });
+            finding.message =
+                format!("controls act this late{}", if at_end { ", or later: the end of the range tried" } else { "" });
             let written = delay_s.max(0.0);
             finding.set = Some(format!("control_delay_s = {written:.3} under [data] in the model file"));
             if of_model_s.is_some_and(|model_s| model_s < low - step_s || model_s > high + step_s) {
@@ -295,7 +304,11 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
         finding.set = Some(if late {
             format!("[columns] {} as `delay(NAME, {:.3})`, with the file's names", pair.columns, minimum.at * step_s)
         } else {
-            format!("[columns] the other stream than {} as `delay(NAME, {:.3})`, with the file's names", pair.columns, -minimum.at * step_s)
+            format!(
+                "[columns] the other stream than {} as `delay(NAME, {:.3})`, with the file's names",
+                pair.columns,
+                -minimum.at * step_s
+            )
         });
     } else {
         finding.verdict = Verdict::Ok;
