@@ -11,6 +11,9 @@
 //!
 //! All but gelu take their derivative from their own output, so that the input need not be kept.
 
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
+
+use crate::elementary::{erf, exp, sigmoid, tanh};
 use crate::level::{Isa, Kernel, Level};
 use crate::rows::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
@@ -54,14 +57,72 @@ impl Activation {
     }
 }
 
+/// Replaces every number by f of it.
+#[inline(always)]
+pub(crate) fn map<T: Real, I: Isa>(kind: Activation, values: &mut [T]) {
+    let values = values.iter_mut();
+    let half = T::of(0.5);
+    match kind {
+        Activation::Identity => {}
+        Activation::Relu => values.for_each(|x| *x = if *x > T::ZERO { *x } else { T::ZERO }),
+        Activation::LeakyRelu { slope } => {
+            let slope = T::of(slope);
+            values.for_each(|x| *x = if *x > T::ZERO { *x } else { slope * *x });
+        }
+        Activation::Tanh => values.for_each(|x| *x = tanh::<T, I>(*x)),
+        Activation::Sigmoid => values.for_each(|x| *x = sigmoid::<T, I>(*x)),
+        Activation::Gelu => values.for_each(|x| *x = *x * half * (T::ONE + erf::<T, I>(*x * T::of(FRAC_1_SQRT_2)))),
+    }
+}
+
+/// f′ at one number, given x or y as [`Activation::saves`] says.
+#[inline(always)]
+fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
+    match kind {
+        Activation::Identity => T::ONE,
+        Activation::Relu => {
+            if saved > T::ZERO {
+                T::ONE
+            } else {
+                T::ZERO
+            }
+        }
+        Activation::LeakyRelu { slope } => {
+            if saved > T::ZERO {
+                T::ONE
+            } else {
+                T::of(slope)
+            }
+        }
+        Activation::Tanh => T::ONE - saved * saved,
+        Activation::Sigmoid => saved * (T::ONE - saved),
+        Activation::Gelu => {
+            let density = T::of(FRAC_1_SQRT_2 * 0.5 * FRAC_2_SQRT_PI) * exp::<T, I>(T::of(-0.5) * saved * saved);
+            T::of(0.5) * (T::ONE + erf::<T, I>(saved * T::of(FRAC_1_SQRT_2))) + saved * density
+        }
+    }
+}
+
 /// y = f(x), both [n, C].
 pub fn forward<T: Real>(level: Level, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
-    let _ = level;
-    let mut y = y;
-    for i in 0..x.rows() {
-        for (y, x) in y.row_mut(i).iter_mut().zip(x.row(i)) {
-            *y = T::of(crate::reference::activation(kind, x.f64()));
+    level.run(Forward { kind, x, y });
+}
+
+struct Forward<'a, T> {
+    kind: Activation,
+    x: Rows<'a, T>,
+    y: RowsMut<'a, T>,
+}
+
+impl<T: Real> Kernel for Forward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        for i in 0..self.x.rows() {
+            let y = self.y.row_mut(i);
+            y.copy_from_slice(self.x.row(i));
+            map::<T, I>(self.kind, y);
         }
     }
 }
@@ -86,32 +147,10 @@ impl<T: Real> Kernel for Backward<'_, T> {
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.dy.rows() {
-            for ((dx, dy), saved) in self.dx.row_mut(i).iter_mut().zip(self.dy.row(i)).zip(self.saved.row(i)) {
-                let y = *saved;
-                let slope = match self.kind {
-                    Activation::Identity => T::ONE,
-                    Activation::Relu => {
-                        if y > T::ZERO {
-                            T::ONE
-                        } else {
-                            T::ZERO
-                        }
-                    }
-                    Activation::LeakyRelu { slope } => {
-                        if y > T::ZERO {
-                            T::ONE
-                        } else {
-                            T::of(slope)
-                        }
-                    }
-                    Activation::Tanh => T::ONE - y * y,
-                    Activation::Sigmoid => y * (T::ONE - y),
-                    Activation::Gelu => T::of(crate::reference::activation_derivative(self.kind, y.f64())),
-                };
-                match self.write {
-                    Write::Set => *dx = *dy * slope,
-                    Write::Add => *dx += *dy * slope,
-                }
+            let triples = self.dx.row_mut(i).iter_mut().zip(self.dy.row(i)).zip(self.saved.row(i));
+            match self.write {
+                Write::Set => triples.for_each(|((dx, dy), saved)| *dx = *dy * derivative::<T, I>(self.kind, *saved)),
+                Write::Add => triples.for_each(|((dx, dy), saved)| *dx += *dy * derivative::<T, I>(self.kind, *saved)),
             }
         }
     }

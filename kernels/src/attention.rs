@@ -11,13 +11,110 @@
 //!
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
-use crate::dropout::Mask;
-use crate::level::Level;
+use crate::dropout::{Mask, MaskLanes};
+use crate::elementary::exp;
+use crate::level::{Isa, Kernel, Level, Tiled};
+use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
+
+/// Queries of a block: one lane each. A multiple of every level's tile in both directions.
+const QUERIES: usize = 96;
+
+/// Keys of a block. A block of scores, at most 96 x 64 numbers, stays in the first-level cache.
+const KEYS: usize = 64;
+
+/// Width of a head in padded buffers.
+const fn padded(head_size: usize) -> usize {
+    head_size.next_multiple_of(32)
+}
+
+/// Queries a block really has at a level whose tile is `NR` wide: short blocks waste less of a history of 1000.
+const fn block_of_queries<const NR: usize>() -> usize {
+    if NR > 16 { QUERIES } else { QUERIES / 2 }
+}
 
 /// Scratch, in numbers, that [`forward`] and [`backward`] need.
 pub fn scratch_len(heads: usize, queries: usize, keys: usize, head_size: usize) -> usize {
-    3 * heads * head_size * queries.max(keys)
+    let _ = (heads, queries);
+    let wide = padded(head_size);
+    3 * keys * wide + 2 * head_size * QUERIES + 3 * QUERIES * wide + 2 * KEYS * QUERIES + 3 * QUERIES
+}
+
+/// Shapes of one call.
+#[derive(Clone, Copy)]
+struct Shape {
+    heads: usize,
+    queries: usize,
+    keys: usize,
+    size: usize,
+}
+
+impl Shape {
+    fn of<T>(heads: usize, q: &Rows<'_, T>, k: &Rows<'_, T>, v: &Rows<'_, T>, o: &Rows<'_, T>, log_sum_exp: usize) -> Self {
+        assert!(
+            heads > 0 && q.cols() > 0 && q.cols().is_multiple_of(heads),
+            "attention: {heads} heads do not divide {} columns",
+            q.cols()
+        );
+        assert!(q.cols() == k.cols() && q.cols() == v.cols() && q.cols() == o.cols(), "attention: widths differ");
+        assert!(k.rows() == v.rows() && q.rows() == o.rows(), "attention: rows of k and v, or of q and o, differ");
+        assert!(k.rows() > 0, "attention: softmax over no key");
+        assert_eq!(log_sum_exp, heads * q.rows(), "attention: length of the log-sum-exp");
+        Self { heads, queries: q.rows(), keys: k.rows(), size: q.cols() / heads }
+    }
+
+    fn scale<T: Real>(&self) -> T {
+        T::of(1.0 / (self.size as f64).sqrt())
+    }
+}
+
+/// Takes `len` numbers off the front of the scratch.
+#[inline(always)]
+fn take<'a, T>(scratch: &mut &'a mut [T], len: usize) -> &'a mut [T] {
+    let (taken, rest) = std::mem::take(scratch).split_at_mut(len);
+    *scratch = rest;
+    taken
+}
+
+/// Copies the rows of a head into rows of `width` numbers, filled up with zeros, times `factor`.
+#[inline(always)]
+fn pad<T: Real>(x: Rows<'_, T>, factor: T, width: usize, padded: &mut [T]) {
+    for (i, line) in padded.chunks_exact_mut(width).enumerate() {
+        line.fill(T::ZERO);
+        if i < x.rows() {
+            line.iter_mut().zip(x.row(i)).for_each(|(y, x)| *y = factor * *x);
+        }
+    }
+}
+
+/// Panels of xᵀ for a block of rows, one row a lane, times `factor`; lanes beyond the last row are zero.
+#[inline(always)]
+fn lanes<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, panels: &mut [T]) {
+    let size = x.cols();
+    for (panel, first) in panels.chunks_exact_mut(size * NR).zip((0..).step_by(NR)) {
+        for lane in 0..NR {
+            let lines = panel.as_chunks_mut::<NR>().0.iter_mut();
+            if first + lane < x.rows() {
+                lines.zip(x.row(first + lane)).for_each(|(line, x)| line[lane] = factor * *x);
+            } else {
+                lines.for_each(|line| line[lane] = T::ZERO);
+            }
+        }
+    }
+}
+
+/// c {=, +=} rows·panels.
+#[inline(always)]
+fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>, panels: &[T], c: RowsMut<'_, T>, write: Write) {
+    let n = c.cols();
+    tile::rows::<T, I, _, _, MR, NR>(&rows, n, panels, &mut Store { c, bias: None, write });
+}
+
+/// c += sᵀ·b, s [keys, lanes], b [keys, width].
+#[inline(always)]
+fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(s: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>) {
+    let mut sink = Store { c, bias: None, write: Write::Add };
+    tile::columns::<T, I, _, MR, NR>((s.rows(), s.cols(), b.cols()), |p| s.row(p), |p| b.row(p), &mut sink);
 }
 
 /// o and `log_sum_exp` [heads, queries] from q, k, v.
@@ -35,8 +132,135 @@ pub fn forward<T: Real>(
     log_sum_exp: &mut [T],
     scratch: &mut [T],
 ) {
-    let _ = (level, scratch);
-    crate::reference::attention(heads, q, k, v, dropout, o, log_sum_exp);
+    let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp.len());
+    level.run(Forward { shape, q, k, v, dropout, o, log_sum_exp, scratch });
+}
+
+struct Forward<'a, T> {
+    shape: Shape,
+    q: Rows<'a, T>,
+    k: Rows<'a, T>,
+    v: Rows<'a, T>,
+    dropout: Option<Mask>,
+    o: RowsMut<'a, T>,
+    log_sum_exp: &'a mut [T],
+    scratch: &'a mut [T],
+}
+
+impl<T: Real> Kernel for Forward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, Self>(self);
+    }
+}
+
+impl<T: Real> Tiled<T> for Forward<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
+        let Shape { heads, queries, keys, size } = self.shape;
+        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
+        let mut scratch = self.scratch;
+        let values = take(&mut scratch, keys * wide);
+        let query_lanes = take(&mut scratch, size * block);
+        let sums = take(&mut scratch, block * wide);
+        let scores = take(&mut scratch, KEYS * block);
+        let largest = take(&mut scratch, block);
+        let total = take(&mut scratch, block);
+        let factor = take(&mut scratch, block);
+        let keep_scale = T::of(self.dropout.map_or(1.0, Mask::scale));
+        for h in 0..heads {
+            let (q, k) = (self.q.columns(h * size, size), self.k.columns(h * size, size));
+            pad(self.v.columns(h * size, size), T::ONE, wide, values);
+            for first in (0..queries).step_by(block) {
+                let end = queries.min(first + block);
+                lanes::<T, NR>(q.range(first, end), self.shape.scale(), query_lanes);
+                let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
+                largest.fill(T::NEG_INFINITY);
+                total.fill(T::ZERO);
+                sums.fill(T::ZERO);
+                for key in (0..keys).step_by(KEYS) {
+                    let key_end = keys.min(key + KEYS);
+                    let scores = &mut scores[..(key_end - key) * block];
+                    product::<T, I, MR, NR>(
+                        k.range(key, key_end),
+                        query_lanes,
+                        RowsMut::packed(scores, key_end - key, block),
+                        Write::Set,
+                    );
+                    softmax_block::<T, I, NR>(block, scores, largest, total, factor);
+                    for (row, factor) in sums.chunks_exact_mut(wide).zip(factor.iter()) {
+                        row.iter_mut().for_each(|x| *x *= *factor);
+                    }
+                    if let Some(mask) = &mask {
+                        scores.chunks_exact_mut(block).enumerate().for_each(|(j, row)| mask.drop(key + j, row));
+                    }
+                    let (scores, values) = (Rows::packed(scores, key_end - key, block), Rows::packed(values, keys, wide));
+                    transposed_product::<T, I, MR, NR>(scores, values.range(key, key_end), RowsMut::packed(sums, block, wide));
+                }
+                for i in first..end {
+                    let (lane, target) = (i - first, &mut self.o.row_mut(i)[h * size..][..size]);
+                    let normalise = keep_scale / total[lane];
+                    target.iter_mut().zip(&sums[lane * wide..]).for_each(|(o, x)| *o = *x * normalise);
+                    self.log_sum_exp[h * queries + i] = largest[lane] + total[lane].ln();
+                }
+            }
+        }
+    }
+}
+
+/// One step of the online softmax over a block of scores [keys, lanes]: scores become e^(s − m) with the new largest score m of
+/// each lane; `total` and what else was summed so far is to be multiplied with `factor` = e^(m_old − m).
+#[inline(always)]
+fn softmax_block<T: Real, I: Isa, const NR: usize>(
+    block: usize,
+    scores: &mut [T],
+    largest: &mut [T],
+    total: &mut [T],
+    factor: &mut [T],
+) {
+    let chunks = largest.as_chunks_mut::<NR>().0.iter_mut().zip(total.as_chunks_mut::<NR>().0).zip(factor.as_chunks_mut::<NR>().0);
+    for (chunk, ((largest, total), factor)) in chunks.enumerate() {
+        let mut m = *largest;
+        for row in scores.chunks_exact(block) {
+            let row = &row.as_chunks::<NR>().0[chunk];
+            for (m, s) in m.iter_mut().zip(row) {
+                *m = if *s > *m { *s } else { *m };
+            }
+        }
+        for ((factor, old), new) in factor.iter_mut().zip(*largest).zip(m) {
+            *factor = exp::<T, I>(old - new);
+        }
+        let mut sum = [T::ZERO; NR];
+        for row in scores.chunks_exact_mut(block) {
+            let row = &mut row.as_chunks_mut::<NR>().0[chunk];
+            for ((s, m), sum) in row.iter_mut().zip(&m).zip(&mut sum) {
+                *s = exp::<T, I>(*s - *m);
+                *sum += *s;
+            }
+        }
+        for ((total, factor), sum) in total.iter_mut().zip(factor).zip(sum) {
+            *total = *total * *factor + sum;
+        }
+        *largest = m;
+    }
+}
+
+/// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
+#[derive(Debug)]
+pub struct Gradients<'a, T> {
+    /// Gradient of q, [queries, heads·d_k].
+    pub dq: RowsMut<'a, T>,
+    /// Gradient of k, [keys, heads·d_k].
+    pub dk: RowsMut<'a, T>,
+    /// Gradient of v, [keys, heads·d_k].
+    pub dv: RowsMut<'a, T>,
+    /// Set or add for dq.
+    pub write_q: Write,
+    /// Set or add for dk.
+    pub write_k: Write,
+    /// Set or add for dv.
+    pub write_v: Write,
 }
 
 /// dq, dk, dv {=, +=} from do and what the forward pass took and gave.
@@ -56,41 +280,231 @@ pub fn backward<T: Real>(
     gradients: Gradients<'_, T>,
     scratch: &mut [T],
 ) {
-    let _ = (o, log_sum_exp);
-    let Gradients { dq, dk, dv, write_q, write_k, write_v } = gradients;
-    let (query, key) = (q.rows() * q.cols(), k.rows() * k.cols());
-    let (sq, rest) = scratch.split_at_mut(query);
-    let (sk, rest) = rest.split_at_mut(key);
-    let view = RowsMut::packed;
-    crate::reference::attention_backward(
-        heads,
-        q,
-        k,
-        v,
-        dropout,
-        d_o,
-        view(sq, q.rows(), q.cols()),
-        view(sk, k.rows(), k.cols()),
-        view(rest, k.rows(), k.cols()),
-    );
-    crate::rows::copy(level, Rows::packed(sq, q.rows(), q.cols()), dq, write_q);
-    crate::rows::copy(level, Rows::packed(sk, k.rows(), k.cols()), dk, write_k);
-    crate::rows::copy(level, Rows::packed(rest, k.rows(), k.cols()), dv, write_v);
+    let shape = Shape::of(heads, &q, &k, &v, &o, log_sum_exp.len());
+    crate::rows::same_shape(&o, &d_o);
+    crate::rows::same_shape(&q, &gradients.dq.view());
+    crate::rows::same_shape(&k, &gradients.dk.view());
+    crate::rows::same_shape(&v, &gradients.dv.view());
+    level.run(Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
 }
 
-/// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
-#[derive(Debug)]
-pub struct Gradients<'a, T> {
-    /// Gradient of q, [queries, heads·d_k].
-    pub dq: RowsMut<'a, T>,
-    /// Gradient of k, [keys, heads·d_k].
-    pub dk: RowsMut<'a, T>,
-    /// Gradient of v, [keys, heads·d_k].
-    pub dv: RowsMut<'a, T>,
-    /// Set or add for dq.
-    pub write_q: Write,
-    /// Set or add for dk.
-    pub write_k: Write,
-    /// Set or add for dv.
-    pub write_v: Write,
+struct Backward<'a, T> {
+    shape: Shape,
+    q: Rows<'a, T>,
+    k: Rows<'a, T>,
+    v: Rows<'a, T>,
+    dropout: Option<Mask>,
+    o: Rows<'a, T>,
+    log_sum_exp: &'a [T],
+    d_o: Rows<'a, T>,
+    gradients: Gradients<'a, T>,
+    scratch: &'a mut [T],
+}
+
+impl<T: Real> Kernel for Backward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, Self>(self);
+    }
+}
+
+impl<T: Real> Tiled<T> for Backward<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Shape { heads, queries, keys, size } = self.shape;
+        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
+        let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
+        let mut scratch = self.scratch;
+        let padded_keys = take(&mut scratch, keys * wide);
+        let key_sums = take(&mut scratch, keys * wide);
+        let value_sums = take(&mut scratch, keys * wide);
+        let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * block));
+        let [query_panels, output_panels, query_sums] = [(); 3].map(|()| take(&mut scratch, block * wide));
+        let [scores, d_scores] = [(); 2].map(|()| take(&mut scratch, KEYS * block));
+        let [log_sum_exp, means] = [(); 2].map(|()| take(&mut scratch, block));
+        let (scale, keep_scale) = (self.shape.scale::<T>(), T::of(self.dropout.map_or(1.0, Mask::scale)));
+        for h in 0..heads {
+            let (q, k, v) = (self.q.columns(h * size, size), self.k.columns(h * size, size), self.v.columns(h * size, size));
+            let (o, d_o) = (self.o.columns(h * size, size), self.d_o.columns(h * size, size));
+            pad(k, scale, wide, padded_keys);
+            key_sums.fill(T::ZERO);
+            value_sums.fill(T::ZERO);
+            for first in (0..queries).step_by(block) {
+                let end = queries.min(first + block);
+                let (q_block, d_block) = (q.range(first, end), d_o.range(first, end));
+                // The dropout scale rides on do, the score scale on q and k.
+                lanes::<T, NR>(q_block, scale, query_lanes);
+                lanes::<T, NR>(d_block, keep_scale, output_lanes);
+                panels::<T, NR>(q_block, scale, block, query_panels);
+                panels::<T, NR>(d_block, keep_scale, block, output_panels);
+                log_sum_exp.fill(T::ZERO);
+                log_sum_exp[..end - first].copy_from_slice(&self.log_sum_exp[h * queries + first..h * queries + end]);
+                means.fill(T::ZERO);
+                for (lane, mean) in means[..end - first].iter_mut().enumerate() {
+                    *mean = o.row(first + lane).iter().zip(d_block.row(lane)).map(|(o, d)| *o * *d).sum();
+                }
+                let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
+                query_sums.fill(T::ZERO);
+                for key in (0..keys).step_by(KEYS) {
+                    let (key_end, count) = (keys.min(key + KEYS), KEYS.min(keys - key));
+                    let scores = &mut scores[..count * block];
+                    let d_scores = &mut d_scores[..count * block];
+                    product::<T, I, MR, NR>(k.range(key, key_end), query_lanes, RowsMut::packed(scores, count, block), Write::Set);
+                    product::<T, I, MR, NR>(
+                        v.range(key, key_end),
+                        output_lanes,
+                        RowsMut::packed(d_scores, count, block),
+                        Write::Set,
+                    );
+                    for (j, (s, ds)) in scores.chunks_exact_mut(block).zip(d_scores.chunks_exact_mut(block)).enumerate() {
+                        if let Some(mask) = &mask {
+                            mask.drop(key + j, ds);
+                        }
+                        for (((s, ds), l), mean) in s.iter_mut().zip(ds.iter_mut()).zip(log_sum_exp.iter()).zip(means.iter()) {
+                            *s = exp::<T, I>(*s - *l);
+                            *ds = *s * (*ds - *mean);
+                        }
+                        if let Some(mask) = &mask {
+                            mask.drop(key + j, s);
+                        }
+                    }
+                    let target = |sums| RowsMut::packed(sums, count, wide);
+                    let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
+                    product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
+                    product::<T, I, MR, NR>(ds, query_panels, target(&mut key_sums[key * wide..key_end * wide]), Write::Add);
+                    let b = Rows::packed(padded_keys, keys, wide).range(key, key_end);
+                    transposed_product::<T, I, MR, NR>(ds, b, RowsMut::packed(query_sums, block, wide));
+                }
+                emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
+            }
+            emit(key_sums, wide, keys, dk.reborrow().columns(h * size, size), write_k);
+            emit(value_sums, wide, keys, dv.reborrow().columns(h * size, size), write_v);
+        }
+    }
+}
+
+/// Packs a block of rows [≤ block, size] as a right operand of depth `block`, times `factor`; missing rows are zero.
+#[inline(always)]
+fn panels<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, block: usize, panels: &mut [T]) {
+    for (panel, c) in panels.chunks_exact_mut(block * NR).zip((0..).step_by(NR)) {
+        pad(x.columns(c, NR.min(x.cols() - c)), factor, NR, panel);
+    }
+}
+
+/// Stores the first `rows` of padded sums.
+#[inline(always)]
+fn emit<T: Real>(sums: &[T], wide: usize, rows: usize, mut y: RowsMut<'_, T>, write: Write) {
+    for (i, sums) in sums.chunks_exact(wide).take(rows).enumerate() {
+        let pairs = y.row_mut(i).iter_mut().zip(sums);
+        match write {
+            Write::Set => pairs.for_each(|(y, x)| *y = *x),
+            Write::Add => pairs.for_each(|(y, x)| *y += *x),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::random::Stream;
+    use crate::reference;
+    use crate::testing::{Matrix, WRITES, assert_near, numbers};
+    use crate::tolerance::Tolerance;
+
+    fn check<T: Real>((heads, size): (usize, usize), (queries, keys): (usize, usize), rate: Option<f64>, seed: u64) {
+        let width = heads * size;
+        let dropout = rate.map(|rate| Mask::new(Stream::new(seed, 0, 0, 0), rate));
+        let (q, d_o) = (Matrix::<T>::random(seed, (queries, width)), Matrix::<T>::random(seed + 1, (queries, width)));
+        let (k, v) = (Matrix::<T>::random(seed + 2, (keys, width)), Matrix::<T>::random(seed + 3, (keys, width)));
+        let query = || Matrix::<T>::poisoned(seed, (queries, width));
+        let key = || Matrix::<T>::poisoned(seed + 1, (keys, width));
+        let (mut o_expected, mut lse_expected) = (query(), vec![T::NAN; heads * queries]);
+        reference::attention(heads, q.view(), k.view(), v.view(), dropout, o_expected.view_mut(), &mut lse_expected);
+        let mut expected = (query(), key(), key());
+        let views = (expected.0.view_mut(), expected.1.view_mut(), expected.2.view_mut());
+        reference::attention_backward(heads, q.view(), k.view(), v.view(), dropout, d_o.view(), views.0, views.1, views.2);
+        for level in Level::available() {
+            let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
+            let (mut o, mut lse) = (query(), vec![T::NAN; heads * queries]);
+            forward(level, heads, q.view(), k.view(), v.view(), dropout, o.view_mut(), &mut lse, &mut scratch);
+            o.check_gaps();
+            assert_near(&format!("o at {level}"), &o.to_vec(), &o_expected.to_vec(), Tolerance::Close);
+            assert_near(&format!("log-sum-exp at {level}"), &lse, &lse_expected, Tolerance::Close);
+            for write in WRITES {
+                let mut found = if write == Write::Set { (query(), key(), key()) } else { expected.clone() };
+                let gradients = Gradients {
+                    dq: found.0.view_mut(),
+                    dk: found.1.view_mut(),
+                    dv: found.2.view_mut(),
+                    write_q: write,
+                    write_k: write,
+                    write_v: write,
+                };
+                backward(level, heads, q.view(), k.view(), v.view(), dropout, o.view(), &lse, d_o.view(), gradients, &mut scratch);
+                let times = if write == Write::Set { T::ONE } else { T::of(2.0) };
+                let pairs = [(&found.0, &expected.0, "dq"), (&found.1, &expected.1, "dk"), (&found.2, &expected.2, "dv")];
+                for (found, expected, name) in pairs {
+                    found.check_gaps();
+                    let expected: Vec<T> = expected.to_vec().iter().map(|x| *x * times).collect();
+                    assert_near(&format!("{name} at {level}, {write:?}"), &found.to_vec(), &expected, Tolerance::Close);
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn equals_the_stored_maps(
+            heads in 1_usize..5, size in 1_usize..20, queries in 1_usize..70, keys in 1_usize..140,
+            rate in prop_oneof![Just(None), Just(Some(0.2)), Just(Some(0.9))], seed in 0_u64..1000,
+        ) {
+            check::<f32>((heads, size), (queries, keys), rate, seed);
+            check::<f64>((heads, size), (queries, keys), rate, seed);
+        }
+    }
+
+    #[test]
+    fn widths_and_lengths_around_the_blocks() {
+        for (size, queries, keys) in
+            [(16, 48, 64), (16, 49, 65), (16, 97, 128), (33, 20, 20), (64, 100, 1), (1, 1, 1), (16, 1, 200)]
+        {
+            check::<f32>((2, size), (queries, keys), Some(0.2), 5);
+            check::<f64>((2, size), (queries, keys), None, 5);
+        }
+    }
+
+    fn plain_forward(q: &[f64], k: &[f64], v: &[f64], rows: (usize, usize), width: usize) -> (Vec<f64>, Vec<f64>) {
+        let (mut o, mut lse, mut scratch) =
+            (vec![0.0; rows.0 * width], vec![0.0; rows.0], vec![0.0; scratch_len(1, rows.0, rows.1, width)]);
+        let keys = |x| Rows::packed(x, rows.1, width);
+        let o_view = RowsMut::packed(&mut o, rows.0, width);
+        forward(Level::PLAIN, 1, Rows::packed(q, rows.0, width), keys(k), keys(v), None, o_view, &mut lse, &mut scratch);
+        (o, lse)
+    }
+
+    #[test]
+    fn the_order_of_keys_does_not_matter() {
+        let (queries, keys, width) = (5, 150, 8);
+        let (q, k, v) = (numbers::<f64>(1, queries * width), numbers::<f64>(2, keys * width), numbers::<f64>(3, keys * width));
+        let turned = |x: &[f64]| -> Vec<f64> { x.chunks(width).rev().flatten().copied().collect() };
+        let (o, lse) = plain_forward(&q, &k, &v, (queries, keys), width);
+        let (o_turned, lse_turned) = plain_forward(&q, &turned(&k), &turned(&v), (queries, keys), width);
+        assert_near("o", &o_turned, &o, Tolerance::Close);
+        assert_near("log-sum-exp", &lse_turned, &lse, Tolerance::Close);
+    }
+
+    #[test]
+    fn large_scores_do_not_overflow() {
+        let (keys, width) = (100, 4);
+        let q = vec![1e4; width];
+        let k: Vec<f64> = (0..keys).flat_map(|j| [j as f64; 4]).collect();
+        let v: Vec<f64> = (0..keys).flat_map(|j| [j as f64; 4]).collect();
+        let (o, lse) = plain_forward(&q, &k, &v, (1, keys), width);
+        assert_near("o is the value of the last key", &o, &[99.0; 4], Tolerance::Close);
+        assert_near("log-sum-exp is the last score", &lse, &[99.0 * 4.0 * 1e4 / 2.0], Tolerance::Close);
+    }
 }

@@ -3,14 +3,19 @@
 //!   z[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[clamp(t + j − left, 0, n − 1), c],   t = 0 … n + left + right − taps
 //!   y = dropout(f(z))
 //!
-//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x [n, in], y [n′, out]. Only y is kept: for the leaky relu
-//! its sign tells the branch, and a dropped element is told from a kept zero by the zero's sign (dropped +0, kept −0), so the
-//! backward pass of the epilogue needs neither z nor a mask.
+//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x [n, in], y [n′, out]. The padded sequence is never made:
+//! the product reads shifted rows of x where they lie. Only y is kept: for the leaky relu its sign tells the branch, and a
+//! dropped element is told from a kept zero by the zero's sign (dropped +0, kept −0), so the backward pass of the epilogue
+//! needs neither z nor a mask.
+//!
+//!   dx̃[s, c] = Σ_{o,j} dz[s − j, o]·W[o, c, j] on the padded rows s, of which the ends fold into dx[0] and dx[n − 1]
+//!   dW[o, c, j] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
 
-use crate::activation::Activation;
+use crate::activation::{self, Activation};
 use crate::dropout::Mask;
-use crate::level::Level;
-use crate::{Real, Rows, RowsMut, Write, linear};
+use crate::level::{Isa, Kernel, Level, Tiled};
+use crate::tile::{self, LeftRows, Sink, Store};
+use crate::{Real, Rows, RowsMut, Write, linear, rows};
 
 /// How the weight lies in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,10 +71,18 @@ impl Epilogue {
 
 /// Scratch, in numbers, that any function of this file needs for n = `rows`.
 pub fn scratch_len(geometry: Geometry, rows: usize, inputs: usize, outputs: usize) -> usize {
-    (rows * inputs).max(geometry.taps * inputs * outputs)
+    let Geometry { taps, left, right, .. } = geometry;
+    let _ = rows;
+    let forward = tile::panels_len(taps * inputs, outputs);
+    let input = tile::panels_len(taps * outputs, inputs) + outputs + (left + right) * inputs;
+    let weight = taps * inputs * outputs;
+    forward.max(input).max(weight)
 }
 
 /// y = dropout(f(conv(x) + b)).
+///
+/// # Panics
+/// If shapes disagree.
 pub fn forward<T: Real>(
     level: Level,
     geometry: Geometry,
@@ -77,45 +90,187 @@ pub fn forward<T: Real>(
     weight: &[T],
     bias: Option<&[T]>,
     epilogue: Epilogue,
-    mut y: RowsMut<'_, T>,
+    y: RowsMut<'_, T>,
     scratch: &mut [T],
 ) {
-    let _ = (level, scratch);
-    crate::reference::conv1d(geometry, x, weight, bias, y.reborrow());
-    let keep = |t: usize, o: usize| epilogue.dropout.is_none_or(|mask| mask.keeps(t, o));
-    let scale = epilogue.dropout.map_or(1.0, Mask::scale);
-    for t in 0..y.rows() {
-        for (o, y) in y.row_mut(t).iter_mut().enumerate() {
-            let value = crate::reference::activation(epilogue.activation, y.f64()) * scale;
-            *y = match (keep(t, o), matches!(epilogue.activation, Activation::LeakyRelu { .. }) && value <= 0.0) {
-                (false, _) => T::ZERO,
-                (true, false) => T::of(value),
-                (true, true) => -T::of(value).abs(),
-            };
+    assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
+    assert_eq!(weight.len(), geometry.taps * x.cols() * y.cols(), "conv1d: length of the weight");
+    assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
+    level.run(Forward { geometry, x, weight, bias, epilogue, y, scratch });
+}
+
+struct Forward<'a, T> {
+    geometry: Geometry,
+    x: Rows<'a, T>,
+    weight: &'a [T],
+    bias: Option<&'a [T]>,
+    epilogue: Epilogue,
+    y: RowsMut<'a, T>,
+    scratch: &'a mut [T],
+}
+
+impl<T: Real> Kernel for Forward<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, Self>(self);
+    }
+}
+
+impl<T: Real> Tiled<T> for Forward<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Geometry { taps, left, layout, .. } = self.geometry;
+        let (inputs, outputs) = (self.x.cols(), self.y.cols());
+        let panels = &mut self.scratch[..taps * inputs * outputs.next_multiple_of(NR)];
+        if !panels.is_empty() {
+            match layout {
+                WeightLayout::TapInOut => tile::pack::<T, NR>(Rows::packed(self.weight, taps * inputs, outputs), panels),
+                WeightLayout::OutInTap => {
+                    for j in 0..taps {
+                        let row = |o: usize| &self.weight[o * inputs * taps + j..(o + 1) * inputs * taps];
+                        tile::pack_transposed::<T, NR>(
+                            inputs,
+                            outputs,
+                            taps,
+                            row,
+                            taps * inputs * NR,
+                            &mut panels[j * inputs * NR..],
+                        );
+                    }
+                }
+            }
+        }
+        let shifted = Shifted { x: self.x, taps, left, rows: self.y.rows() };
+        let scale = T::of(self.epilogue.dropout.map_or(1.0, Mask::scale));
+        let mut sink = Finish { y: self.y, bias: self.bias, epilogue: self.epilogue, scale };
+        tile::rows::<T, I, _, _, MR, NR>(&shifted, outputs, panels, &mut sink);
+    }
+}
+
+/// Output row t, tap j ↦ x[clamp(t + j − left)].
+struct Shifted<'a, T> {
+    x: Rows<'a, T>,
+    taps: usize,
+    left: usize,
+    rows: usize,
+}
+
+impl<T> Shifted<'_, T> {
+    #[inline(always)]
+    fn source(&self, t: usize, j: usize) -> usize {
+        (t + j).saturating_sub(self.left).min(self.x.rows() - 1)
+    }
+}
+
+impl<T> LeftRows<T> for Shifted<'_, T> {
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        self.rows
+    }
+    #[inline(always)]
+    fn taps(&self) -> usize {
+        self.taps
+    }
+    #[inline(always)]
+    fn depth(&self) -> usize {
+        self.x.cols()
+    }
+    #[inline(always)]
+    fn piece(&self, i: usize, tap: usize) -> &[T] {
+        self.x.row(self.source(i, tap))
+    }
+}
+
+/// y = dropout(f(sums + b)).
+struct Finish<'a, T> {
+    y: RowsMut<'a, T>,
+    bias: Option<&'a [T]>,
+    epilogue: Epilogue,
+    scale: T,
+}
+
+impl<T: Real> Sink<T> for Finish<'_, T> {
+    #[inline(always)]
+    fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]) {
+        let y = &mut self.y.row_mut(i)[j..][..sums.len()];
+        match self.bias {
+            Some(bias) => y.iter_mut().zip(sums).zip(&bias[j..]).for_each(|((y, s), b)| *y = *s + *b),
+            None => y.copy_from_slice(sums),
+        }
+        if let Activation::LeakyRelu { slope } = self.epilogue.activation {
+            let slope = T::of(slope);
+            y.iter_mut().for_each(|y| *y = if *y > T::ZERO { *y } else { -(slope * y.abs()) });
+        } else {
+            activation::map::<T, I>(self.epilogue.activation, y);
+        }
+        if let Some(mask) = self.epilogue.dropout {
+            let mask = mask.row(i);
+            y.iter_mut().enumerate().for_each(|(c, y)| *y = if mask.keeps(j + c) { *y * self.scale } else { T::ZERO });
         }
     }
 }
 
 /// dz = dy∘f′(z)∘mask/(1 − p) [n′, out], from the y that [`forward`] gave.
-pub fn backward_epilogue<T: Real>(level: Level, epilogue: Epilogue, y: Rows<'_, T>, dy: Rows<'_, T>, mut dz: RowsMut<'_, T>) {
-    let _ = level;
-    let scale = epilogue.dropout.map_or(1.0, Mask::scale);
-    for t in 0..y.rows() {
-        for (o, dz) in dz.row_mut(t).iter_mut().enumerate() {
-            let kept = epilogue.dropout.is_none_or(|mask| mask.keeps(t, o));
-            let y = y.row(t)[o].f64() / scale;
-            let slope = match epilogue.activation {
-                Activation::Tanh => 1.0 - y * y,
-                Activation::Sigmoid => y * (1.0 - y),
-                // Of the others the derivative at y is that at x.
-                other => crate::reference::activation_derivative(other, y),
-            };
-            *dz = if kept { T::of(dy.row(t)[o].f64() * slope * scale) } else { T::ZERO };
+///
+/// # Panics
+/// If shapes disagree or the activation is gelu, whose derivative y does not tell.
+pub fn backward_epilogue<T: Real>(level: Level, epilogue: Epilogue, y: Rows<'_, T>, dy: Rows<'_, T>, dz: RowsMut<'_, T>) {
+    rows::same_shape(&y, &dy);
+    rows::same_shape(&y, &dz.view());
+    assert!(epilogue.activation != Activation::Gelu, "conv1d: the derivative of gelu cannot be told from its output");
+    level.run(BackwardEpilogue { epilogue, y, dy, dz });
+}
+
+struct BackwardEpilogue<'a, T> {
+    epilogue: Epilogue,
+    y: Rows<'a, T>,
+    dy: Rows<'a, T>,
+    dz: RowsMut<'a, T>,
+}
+
+impl<T: Real> Kernel for BackwardEpilogue<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(mut self) {
+        let scale = self.epilogue.dropout.map_or(1.0, Mask::scale);
+        let (scale, unscale) = (T::of(scale), T::of(1.0 / scale));
+        for i in 0..self.y.rows() {
+            let (dz, y) = (self.dz.row_mut(i), self.y.row(i));
+            dz.copy_from_slice(self.dy.row(i));
+            let pairs = dz.iter_mut().zip(y);
+            match self.epilogue.activation {
+                Activation::LeakyRelu { slope } => {
+                    let below = scale * T::of(slope);
+                    pairs.for_each(|(dz, y)| {
+                        let negative = if y.is_sign_negative() { below } else { T::ZERO };
+                        *dz *= if *y > T::ZERO { scale } else { negative };
+                    });
+                    continue;
+                }
+                Activation::Relu => pairs.for_each(|(dz, y)| *dz = if *y > T::ZERO { *dz * scale } else { T::ZERO }),
+                Activation::Tanh => pairs.for_each(|(dz, y)| {
+                    let y = *y * unscale;
+                    *dz = *dz * scale * (T::ONE - y * y);
+                }),
+                Activation::Sigmoid => pairs.for_each(|(dz, y)| {
+                    let y = *y * unscale;
+                    *dz = *dz * scale * y * (T::ONE - y);
+                }),
+                Activation::Identity | Activation::Gelu => pairs.for_each(|(dz, _)| *dz *= scale),
+            }
+            if let Some(mask) = self.epilogue.dropout {
+                let mask = mask.row(i);
+                dz.iter_mut().enumerate().for_each(|(c, dz)| *dz = if mask.keeps(c) { *dz } else { T::ZERO });
+            }
         }
     }
 }
 
 /// dx {=, +=} the adjoint of the convolution and of its padding, applied to dz.
+///
+/// # Panics
+/// If shapes disagree.
 pub fn backward_input<T: Real>(
     level: Level,
     geometry: Geometry,
@@ -125,12 +280,106 @@ pub fn backward_input<T: Real>(
     write: Write,
     scratch: &mut [T],
 ) {
-    let (rows, cols) = (dx.rows(), dx.cols());
-    crate::reference::conv1d_backward_input(geometry, dz, weight, RowsMut::packed(scratch, rows, cols));
-    crate::rows::copy(level, Rows::packed(scratch, rows, cols), dx, write);
+    assert_eq!(dz.rows(), geometry.output_rows(dx.rows()), "conv1d: rows of dz");
+    assert_eq!(weight.len(), geometry.taps * dx.cols() * dz.cols(), "conv1d: length of the weight");
+    level.run(BackwardInput { geometry, dz, weight, dx, write, scratch });
+}
+
+struct BackwardInput<'a, T> {
+    geometry: Geometry,
+    dz: Rows<'a, T>,
+    weight: &'a [T],
+    dx: RowsMut<'a, T>,
+    write: Write,
+    scratch: &'a mut [T],
+}
+
+impl<T: Real> Kernel for BackwardInput<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, Self>(self);
+    }
+}
+
+impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
+        let Geometry { taps, left, right, layout } = self.geometry;
+        let (n, inputs, outputs) = (self.dx.rows(), self.dx.cols(), self.dz.cols());
+        if n == 0 {
+            return;
+        }
+        let (zeros, rest) = self.scratch.split_at_mut(outputs);
+        let (ends, rest) = rest.split_at_mut((left + right) * inputs);
+        let panels = &mut rest[..taps * outputs * inputs.next_multiple_of(NR)];
+        zeros.fill(T::ZERO);
+        if !panels.is_empty() {
+            let stride = taps * outputs * NR;
+            for j in 0..taps {
+                let panels = &mut panels[j * outputs * NR..];
+                match layout {
+                    WeightLayout::TapInOut => {
+                        let row = |c: usize| &self.weight[(j * inputs + c) * outputs..][..outputs];
+                        tile::pack_transposed::<T, NR>(outputs, inputs, 1, row, stride, panels);
+                    }
+                    WeightLayout::OutInTap => {
+                        let row = |c: usize| &self.weight[c * taps + j..];
+                        tile::pack_transposed::<T, NR>(outputs, inputs, inputs * taps, row, stride, panels);
+                    }
+                }
+            }
+        }
+        let part = |first, jump_at, jump, rows| Reversed { dz: self.dz, zeros, taps, first, jump_at, jump, rows };
+        let mut sink = Store { c: self.dx.reborrow(), bias: None, write: self.write };
+        tile::rows::<T, I, _, _, MR, NR>(&part(left, n, 0, n), inputs, panels, &mut sink);
+        // The padded rows in front and behind, as one operand.
+        let mut sink = Store { c: RowsMut::packed(ends, left + right, inputs), bias: None, write: Write::Set };
+        tile::rows::<T, I, _, _, MR, NR>(&part(0, left, n, left + right), inputs, panels, &mut sink);
+        for (s, end) in ends.chunks_exact(inputs.max(1)).enumerate() {
+            let target = self.dx.row_mut(if s < left { 0 } else { n - 1 });
+            target.iter_mut().zip(end).for_each(|(d, e)| *d += *e);
+        }
+    }
+}
+
+/// Row i, tap j ↦ dz[s − j] of padded row s = first + i (+ jump from row `jump_at` on), or zeros outside dz.
+struct Reversed<'a, T> {
+    dz: Rows<'a, T>,
+    zeros: &'a [T],
+    taps: usize,
+    first: usize,
+    jump_at: usize,
+    jump: usize,
+    rows: usize,
+}
+
+impl<T> LeftRows<T> for Reversed<'_, T> {
+    #[inline(always)]
+    fn rows(&self) -> usize {
+        self.rows
+    }
+    #[inline(always)]
+    fn taps(&self) -> usize {
+        self.taps
+    }
+    #[inline(always)]
+    fn depth(&self) -> usize {
+        self.dz.cols()
+    }
+    #[inline(always)]
+    fn piece(&self, i: usize, tap: usize) -> &[T] {
+        let s = self.first + i + if i < self.jump_at { 0 } else { self.jump };
+        // Before the first row the difference wraps to a huge number.
+        let t = s.wrapping_sub(tap);
+        if t < self.dz.rows() { self.dz.row(t) } else { self.zeros }
+    }
 }
 
 /// dW {=, +=} Σ_t dz[t, o]·x[clamp(t + j − left), c], in the layout of the geometry.
+///
+/// # Panics
+/// If shapes disagree.
 pub fn backward_weight<T: Real>(
     level: Level,
     geometry: Geometry,
@@ -140,12 +389,217 @@ pub fn backward_weight<T: Real>(
     write: Write,
     scratch: &mut [T],
 ) {
-    let len = dweight.len();
-    crate::reference::conv1d_backward_weight(geometry, x, dz, scratch);
-    crate::rows::copy(level, Rows::packed(scratch, 1, len), RowsMut::packed(dweight, 1, len), write);
+    let (taps, inputs, outputs) = (geometry.taps, x.cols(), dz.cols());
+    assert_eq!(dz.rows(), geometry.output_rows(x.rows()), "conv1d: rows of dz");
+    assert_eq!(dweight.len(), taps * inputs * outputs, "conv1d: length of the weight's gradient");
+    match geometry.layout {
+        WeightLayout::TapInOut => level.run(BackwardWeight { geometry, x, dz, dweight, write }),
+        WeightLayout::OutInTap => {
+            let gradient = &mut scratch[..taps * inputs * outputs];
+            level.run(BackwardWeight { geometry, x, dz, dweight: gradient, write: Write::Set });
+            for (o, target) in dweight.chunks_exact_mut((inputs * taps).max(1)).enumerate() {
+                let source = |c: usize, j: usize| gradient[(j * inputs + c) * outputs + o];
+                let places = (0..inputs).flat_map(|c| (0..taps).map(move |j| (c, j)));
+                match write {
+                    Write::Set => target.iter_mut().zip(places).for_each(|(d, (c, j))| *d = source(c, j)),
+                    Write::Add => target.iter_mut().zip(places).for_each(|(d, (c, j))| *d += source(c, j)),
+                }
+            }
+        }
+    }
+}
+
+struct BackwardWeight<'a, T> {
+    geometry: Geometry,
+    x: Rows<'a, T>,
+    dz: Rows<'a, T>,
+    dweight: &'a mut [T],
+    write: Write,
+}
+
+impl<T: Real> Kernel for BackwardWeight<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, Self>(self);
+    }
+}
+
+/// Rows of x and dz that are summed for all taps before the next ones are read: they stay in the second-level cache.
+const TIME_BLOCK: usize = 256;
+
+impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let (n, inputs, outputs) = (self.dz.rows(), self.x.cols(), self.dz.cols());
+        let shifted = Shifted { x: self.x, taps: self.geometry.taps, left: self.geometry.left, rows: n };
+        for start in (0..n.max(1)).step_by(TIME_BLOCK) {
+            let depth = TIME_BLOCK.min(n - start);
+            let write = if start == 0 { self.write } else { Write::Add };
+            for (j, dw) in self.dweight.chunks_exact_mut((inputs * outputs).max(1)).enumerate() {
+                let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
+                let (left, right) = (|p| self.x.row(shifted.source(start + p, j)), |p| self.dz.row(start + p));
+                tile::columns::<T, I, _, MR, NR>((depth, inputs, outputs), left, right, &mut sink);
+            }
+        }
+    }
 }
 
 /// db {=, +=} Σ_t dz.
 pub fn backward_bias<T: Real>(level: Level, dz: Rows<'_, T>, dbias: &mut [T], write: Write) {
     linear::backward_bias(level, dz, dbias, write);
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::random::Stream;
+    use crate::testing::{Matrix, assert_near, check_writes, inner, numbers};
+    use crate::tolerance::Tolerance;
+    use crate::{linear, reference};
+
+    const LEAKY: Activation = Activation::LeakyRelu { slope: 0.01 };
+
+    #[derive(Clone, Copy, Debug)]
+    struct Problem {
+        geometry: Geometry,
+        rows: usize,
+        inputs: usize,
+        outputs: usize,
+        seed: u64,
+    }
+
+    fn problem() -> impl Strategy<Value = Problem> {
+        let layout = prop_oneof![Just(WeightLayout::OutInTap), Just(WeightLayout::TapInOut)];
+        (1_usize..6, 0_usize..5, 0_usize..5, layout, 0_usize..40, 1_usize..35, 1_usize..35, 0_u64..1000).prop_map(
+            |(taps, left, right, layout, rows, inputs, outputs, seed)| Problem {
+                geometry: Geometry { taps, left, right, layout },
+                rows,
+                inputs,
+                outputs,
+                seed,
+            },
+        )
+    }
+
+    fn check<T: Real>(p: Problem) {
+        let Problem { geometry, rows, inputs, outputs, seed } = p;
+        let after = geometry.output_rows(rows);
+        let x = Matrix::<T>::random(seed, (rows, inputs));
+        let weight = numbers::<T>(seed + 1, geometry.taps * inputs * outputs);
+        let bias = numbers::<T>(seed + 2, outputs);
+        let dz = Matrix::<T>::random(seed + 3, (after, outputs));
+        let mut z = Matrix::<T>::poisoned(seed, (after, outputs));
+        reference::conv1d(geometry, x.view(), &weight, Some(&bias), z.view_mut());
+        let mut dx = Matrix::<T>::poisoned(seed, (rows, inputs));
+        reference::conv1d_backward_input(geometry, dz.view(), &weight, dx.view_mut());
+        let mut dw = Matrix::<T>::poisoned(0, (1, weight.len()));
+        reference::conv1d_backward_weight(geometry, x.view(), dz.view(), dw.view_mut().row_mut(0));
+        for level in Level::available() {
+            let mut scratch = vec![T::NAN; scratch_len(geometry, rows, inputs, outputs)];
+            let mut y = Matrix::<T>::poisoned(seed, (after, outputs));
+            forward(level, geometry, x.view(), &weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+            y.check_gaps();
+            assert_near(&format!("forward at {level}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
+            check_writes(&format!("dx at {level}"), &dx, Tolerance::Close, |dx, write| {
+                backward_input(level, geometry, dz.view(), &weight, dx, write, &mut scratch);
+            });
+            check_writes(&format!("dW at {level}"), &dw, Tolerance::Close, |mut dw, write| {
+                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
+            });
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn equals_its_sums(p in problem()) {
+            check::<f32>(p);
+            check::<f64>(p);
+        }
+
+        #[test]
+        fn backward_is_the_adjoint(p in problem()) {
+            let Problem { geometry, rows, inputs, outputs, seed } = p;
+            let after = geometry.output_rows(rows);
+            let (x, dz) = (numbers::<f64>(seed, rows * inputs), numbers::<f64>(seed + 1, after * outputs));
+            let weight = numbers::<f64>(seed + 2, geometry.taps * inputs * outputs);
+            for level in Level::available() {
+                let mut scratch = vec![f64::NAN; scratch_len(geometry, rows, inputs, outputs)];
+                let (mut y, mut dx) = (vec![f64::NAN; dz.len()], vec![f64::NAN; x.len()]);
+                let x_view = Rows::packed(&x, rows, inputs);
+                forward(level, geometry, x_view, &weight, None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
+                let dx_view = RowsMut::packed(&mut dx, rows, inputs);
+                backward_input(level, geometry, Rows::packed(&dz, after, outputs), &weight, dx_view, Write::Set, &mut scratch);
+                assert_near("<Ax, y> and <x, A'y>", &[inner(&y, &dz)], &[inner(&x, &dx)], Tolerance::Close);
+            }
+        }
+
+        #[test]
+        fn epilogue_and_its_gradient(p in problem(), which in 0_usize..5, rate in prop_oneof![Just(None), Just(Some(0.2))]) {
+            let Problem { geometry, rows, inputs, outputs, seed } = p;
+            let after = geometry.output_rows(rows);
+            let activation = [Activation::Identity, Activation::Relu, LEAKY, Activation::Tanh, Activation::Sigmoid][which];
+            let dropout = rate.map(|rate| Mask::new(Stream::new(seed, 1, 2, 3), rate));
+            let epilogue = Epilogue { activation, dropout };
+            let x = Matrix::<f64>::random(seed, (rows, inputs));
+            let dy = Matrix::<f64>::random(seed + 4, (after, outputs));
+            let weight = numbers::<f64>(seed + 1, geometry.taps * inputs * outputs);
+            let mut z = Matrix::<f64>::poisoned(seed, (after, outputs));
+            reference::conv1d(geometry, x.view(), &weight, None, z.view_mut());
+            let factor = |t: usize, o: usize| dropout.map_or(1.0, |mask| if mask.keeps(t, o) { mask.scale() } else { 0.0 });
+            let expected = |f: &dyn Fn(f64) -> f64, g: &dyn Fn(usize, usize) -> f64| -> Vec<f64> {
+                (0..after * outputs).map(|i| (i / outputs, i % outputs)).map(|(t, o)| f(z.view().row(t)[o]) * factor(t, o) * g(t, o)).collect()
+            };
+            let y_expected = expected(&|z| reference::activation(activation, z), &|_, _| 1.0);
+            let dz_expected = expected(&|z| reference::activation_derivative(activation, z), &|t, o| dy.view().row(t)[o]);
+            for level in Level::available() {
+                let mut scratch = vec![f64::NAN; scratch_len(geometry, rows, inputs, outputs)];
+                let (mut y, mut dz) = (Matrix::<f64>::poisoned(seed, (after, outputs)), Matrix::<f64>::poisoned(seed, (after, outputs)));
+                forward(level, geometry, x.view(), &weight, None, epilogue, y.view_mut(), &mut scratch);
+                assert_near("y", &y.to_vec(), &y_expected, Tolerance::Close);
+                backward_epilogue(level, epilogue, y.view(), dy.view(), dz.view_mut());
+                assert_near("dz", &dz.to_vec(), &dz_expected, Tolerance::Close);
+            }
+        }
+    }
+
+    #[test]
+    fn sizes_of_the_network() {
+        for layout in [WeightLayout::OutInTap, WeightLayout::TapInOut] {
+            for (rows, taps, pad) in [(500, 5, 3), (502, 3, 0), (125, 5, 3)] {
+                let geometry = Geometry { taps, left: pad, right: pad, layout };
+                check::<f32>(Problem { geometry, rows, inputs: 64, outputs: 64, seed: 1 });
+            }
+        }
+    }
+
+    #[test]
+    fn one_tap_is_a_linear_map() {
+        let geometry = Geometry { taps: 1, left: 0, right: 0, layout: WeightLayout::OutInTap };
+        let (x, weight) = (Matrix::<f64>::random(1, (30, 7)), numbers::<f64>(2, 7 * 9));
+        let (mut conv, mut map) = (Matrix::<f64>::poisoned(1, (30, 9)), Matrix::<f64>::poisoned(2, (30, 9)));
+        let mut scratch = vec![0.0; scratch_len(geometry, 30, 7, 9).max(linear::scratch_len(30, 7, 9))];
+        forward(Level::PLAIN, geometry, x.view(), &weight, None, Epilogue::NONE, conv.view_mut(), &mut scratch);
+        linear::forward(Level::PLAIN, x.view(), &weight, None, map.view_mut(), &mut scratch);
+        assert_near("conv1d with one tap", &conv.to_vec(), &map.to_vec(), Tolerance::Exact);
+    }
+
+    #[test]
+    fn a_kept_zero_still_passes_its_gradient() {
+        let geometry = Geometry { taps: 1, left: 0, right: 0, layout: WeightLayout::OutInTap };
+        let mask = Mask::new(Stream::new(5, 0, 0, 0), 0.5);
+        let epilogue = Epilogue { activation: LEAKY, dropout: Some(mask) };
+        for level in Level::available() {
+            let (x, dy) = (vec![1.0_f32; 64], vec![1.0_f32; 64]);
+            let (mut y, mut dz, mut scratch) = (vec![f32::NAN; 64], vec![f32::NAN; 64], vec![0.0; 64]);
+            forward(level, geometry, Rows::packed(&x, 64, 1), &[0.0], None, epilogue, RowsMut::packed(&mut y, 64, 1), &mut scratch);
+            backward_epilogue(level, epilogue, Rows::packed(&y, 64, 1), Rows::packed(&dy, 64, 1), RowsMut::packed(&mut dz, 64, 1));
+            let expected: Vec<f32> = (0..64).map(|t| if mask.keeps(t, 0) { 0.01 * mask.scale() as f32 } else { 0.0 }).collect();
+            assert!(y.iter().all(|y| *y == 0.0));
+            assert_near("dz of zeros", &dz, &expected, Tolerance::Close);
+        }
+    }
 }

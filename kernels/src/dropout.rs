@@ -6,7 +6,7 @@
 //! probability that this threshold realises, so that E[y] = x holds exactly.
 
 use crate::level::{Isa, Kernel, Level};
-use crate::random::Stream;
+use crate::random::{Stream, word};
 use crate::rows::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -42,6 +42,32 @@ impl Mask {
 }
 
 const TWO_POW_32: f64 = 4_294_967_296.0;
+
+/// The mask's words for up to N neighbouring rows, one row a lane.
+pub(crate) struct MaskLanes<const N: usize> {
+    low: [u32; N],
+    high: [u32; N],
+    threshold: u32,
+}
+
+impl<const N: usize> MaskLanes<N> {
+    #[inline(always)]
+    pub(crate) fn new(mask: Mask, first_row: usize) -> Self {
+        let mut lanes = Self { low: [0; N], high: [0; N], threshold: mask.threshold };
+        for (i, (low, high)) in lanes.low.iter_mut().zip(&mut lanes.high).enumerate() {
+            (*low, *high) = mask.stream.sub((first_row + i) as u64).halves();
+        }
+        lanes
+    }
+
+    /// Makes the values of dropped elements 0: lane i of `values` is element (first row + i, column).
+    #[inline(always)]
+    pub(crate) fn drop<T: Real>(&self, column: usize, values: &mut [T]) {
+        for ((x, low), high) in values.iter_mut().zip(&self.low).zip(&self.high) {
+            *x = if word(*low, *high, column as u32) >= self.threshold { *x } else { T::ZERO };
+        }
+    }
+}
 
 #[derive(Clone, Copy)]
 pub(crate) struct MaskRow {

@@ -9,6 +9,8 @@
 use std::fmt;
 use std::sync::OnceLock;
 
+use crate::Real;
+
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
 pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
 
@@ -164,21 +166,35 @@ pub(crate) trait Kernel {
     fn run<I: Isa>(self) -> Self::Output;
 }
 
+/// A kernel whose body is written for a tile of MR x NR accumulators; see [`Isa::tiled`].
+pub(crate) trait Tiled<T> {
+    /// The one body.
+    fn run<I: Isa, const MR: usize, const NR: usize>(self);
+}
+
 /// What a body may know about the level it is compiled for.
 pub(crate) trait Isa {
     /// Multiply-add is one instruction; where it is not, `mul_add` would be a call of the maths library.
     const FMA: bool;
-    /// Width of a vector register in bytes.
-    const REGISTER_BYTES: usize;
-    /// Number of vector registers.
-    const REGISTERS: usize;
+
+    /// Runs a body with the accumulator tile that fills this level's registers: two registers wide, as tall as leaves room for
+    /// two of the right operand and one of the left.
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K);
+
+    /// a·b + c, rounded once where the level can.
+    #[inline(always)]
+    fn mul_add<T: Real>(a: T, b: T, c: T) -> T {
+        if Self::FMA { a.mul_add(b, c) } else { a * b + c }
+    }
 }
 
 pub(crate) struct Plain;
 impl Isa for Plain {
     const FMA: bool = false;
-    const REGISTER_BYTES: usize = 16;
-    const REGISTERS: usize = 16;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 4, 8>() } else { kernel.run::<Self, 4, 4>() }
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -186,8 +202,10 @@ struct Avx2;
 #[cfg(target_arch = "x86_64")]
 impl Isa for Avx2 {
     const FMA: bool = true;
-    const REGISTER_BYTES: usize = 32;
-    const REGISTERS: usize = 16;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 6, 16>() } else { kernel.run::<Self, 6, 8>() }
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -195,8 +213,10 @@ struct Avx512;
 #[cfg(target_arch = "x86_64")]
 impl Isa for Avx512 {
     const FMA: bool = true;
-    const REGISTER_BYTES: usize = 64;
-    const REGISTERS: usize = 32;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 12, 32>() } else { kernel.run::<Self, 12, 16>() }
+    }
 }
 
 #[cfg(target_arch = "aarch64")]
@@ -204,8 +224,10 @@ struct Neon;
 #[cfg(target_arch = "aarch64")]
 impl Isa for Neon {
     const FMA: bool = true;
-    const REGISTER_BYTES: usize = 16;
-    const REGISTERS: usize = 32;
+    #[inline(always)]
+    fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
+        if size_of::<T>() == 4 { kernel.run::<Self, 8, 8>() } else { kernel.run::<Self, 8, 4>() }
+    }
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ pub mod adam;
 pub mod attention;
 pub mod conv1d;
 pub mod dropout;
+pub mod elementary;
 pub mod encoding;
 pub mod gemm;
 pub mod layer_norm;
@@ -26,6 +27,9 @@ pub mod reference;
 pub mod rows;
 pub mod sci;
 pub mod temporal;
+#[cfg(test)]
+mod testing;
+mod tile;
 pub mod tolerance;
 
 pub use level::Level;

@@ -15,17 +15,9 @@ pub fn scratch_len(rows: usize, inputs: usize, outputs: usize) -> usize {
 }
 
 /// y = x·Wᵀ + b.
-pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, mut y: RowsMut<'_, T>, scratch: &mut [T]) {
+pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, y: RowsMut<'_, T>, scratch: &mut [T]) {
     let weight = Rows::packed(weight, y.cols(), x.cols());
-    let write = if let Some(bias) = bias {
-        for i in 0..y.rows() {
-            y.row_mut(i).copy_from_slice(bias);
-        }
-        Write::Add
-    } else {
-        Write::Set
-    };
-    gemm::abt(level, x, weight, y, write, scratch);
+    gemm::abt_bias(level, x, weight, bias, y, Write::Set, scratch);
 }
 
 /// dx {=, +=} dy·W.

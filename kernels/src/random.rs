@@ -39,10 +39,14 @@ impl Stream {
     /// Word `index` of the stream, uniform on 0..2³².
     #[inline(always)]
     pub const fn word(self, index: u32) -> u32 {
-        let x = index ^ self.key as u32;
-        let x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
-        let x = (x ^ (x >> 13)).wrapping_add((self.key >> 32) as u32).wrapping_mul(0xc2b2_ae35);
-        x ^ (x >> 16)
+        let (low, high) = self.halves();
+        word(low, high, index)
+    }
+
+    /// The key as [`word`] takes it.
+    #[inline(always)]
+    pub(crate) const fn halves(self) -> (u32, u32) {
+        (self.key as u32, (self.key >> 32) as u32)
     }
 
     /// Uniform on [0, 1) with 53 bits, from a sub-stream of its own: for initial weights and shuffles.
@@ -64,4 +68,13 @@ pub fn permutation(count: usize, seed: u64, round: u64) -> Vec<u32> {
         order.swap(last, chosen.min(last));
     }
     order
+}
+
+/// Word `index` of the stream whose key has these halves; apart from [`Stream`] so that a loop over streams vectorises.
+#[inline(always)]
+pub(crate) const fn word(low: u32, high: u32, index: u32) -> u32 {
+    let x = index ^ low;
+    let x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
+    let x = (x ^ (x >> 13)).wrapping_add(high).wrapping_mul(0xc2b2_ae35);
+    x ^ (x >> 16)
 }

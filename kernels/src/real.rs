@@ -4,12 +4,14 @@ use std::fmt::{Debug, Display};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+use crate::elementary::Elementary;
+
 /// f32 or f64: one generic source, two instantiations.
 #[rustfmt::skip]
 pub trait Real:
     Copy + Default + Debug + Display + PartialOrd + Send + Sync + 'static + Sum
     + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-    + AddAssign + SubAssign + MulAssign + DivAssign
+    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary
 {
     /// 0
     const ZERO: Self;
@@ -35,6 +37,8 @@ pub trait Real:
     fn abs(self) -> Self;
     /// self·a + b, rounded once
     fn mul_add(self, a: Self, b: Self) -> Self;
+    /// Sign bit set: negative, or −0.
+    fn is_sign_negative(self) -> bool;
     /// Neither NaN nor infinite.
     fn is_finite(self) -> bool;
 }
@@ -77,6 +81,10 @@ macro_rules! real {
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
                 $t::mul_add(self, a, b)
+            }
+            #[inline(always)]
+            fn is_sign_negative(self) -> bool {
+                $t::is_sign_negative(self)
             }
             #[inline(always)]
             fn is_finite(self) -> bool {

@@ -78,10 +78,14 @@ pub fn activation_derivative(kind: Activation, x: f64) -> f64 {
     }
 }
 
-/// erf x = 2/√π · e^(−x²) · Σₙ 2ⁿ x²ⁿ⁺¹ / (2n+1)!!, all terms of one sign (Abramowitz & Stegun 7.1.6).
+/// erf x: below 1 the series 2/√π · e^(−x²) · Σₙ 2ⁿ x²ⁿ⁺¹ / (2n+1)!!, all terms of one sign; above, 1 − erfc x by Laplace's
+/// continued fraction (Abramowitz & Stegun 7.1.6 and 7.1.14).
 pub fn erf(x: f64) -> f64 {
-    if x.abs() > 6.5 {
-        return x.signum();
+    if x.abs() >= 1.0 {
+        const LEVELS: u32 = 200;
+        let z = x.abs();
+        let fraction = (1..=LEVELS).rev().fold(z, |below, n| z + 0.5 * f64::from(n) / below);
+        return (1.0 - (-z * z).exp() / (fraction * std::f64::consts::PI.sqrt())).copysign(x);
     }
     let (mut term, mut total, mut n) = (x, x, 1.0);
     while term.abs() > total.abs() * f64::EPSILON / 16.0 {
@@ -157,14 +161,14 @@ pub fn attention_backward<T: Real>(
         let at = |m: &Rows<'_, T>, i: usize, c: usize| m.row(i)[h * size + c].f64();
         // dS = P∘(dP − Σ_j P∘dP), where dP holds the dropout factor of each element.
         let mut d_scores = vec![vec![0.0; k.rows()]; q.rows()];
-        for i in 0..q.rows() {
+        for (i, d_scores) in d_scores.iter_mut().enumerate() {
             let d_probability = |j: usize| {
                 let factor = dropout.map_or(1.0, |mask| if mask.keeps(h * q.rows() + i, j) { mask.scale() } else { 0.0 });
                 factor * (0..size).map(|c| at(&d_o, i, c) * at(&v, j, c)).sum::<f64>()
             };
             let mean: f64 = (0..k.rows()).map(|j| map[i][j].0 * d_probability(j)).sum();
             for j in 0..k.rows() {
-                d_scores[i][j] = map[i][j].0 * (d_probability(j) - mean) * scale;
+                d_scores[j] = map[i][j].0 * (d_probability(j) - mean) * scale;
             }
         }
         for c in 0..size {

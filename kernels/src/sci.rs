@@ -5,6 +5,7 @@
 //!
 //! All [n, C], any strides. The update is [`crate::rows::add`] and [`crate::rows::subtract`]; its gradients are copies.
 
+use crate::elementary::exp;
 use crate::level::{Isa, Kernel, Level};
 use crate::rows::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
@@ -46,7 +47,7 @@ impl<T: Real> Kernel for Scale<'_, T> {
     fn run<I: Isa>(mut self) {
         for i in 0..self.x.rows() {
             for ((y, x), s) in self.y.row_mut(i).iter_mut().zip(self.x.row(i)).zip(self.s.row(i)) {
-                *y = *x * s.exp();
+                *y = *x * exp::<T, I>(*s);
             }
         }
     }
@@ -69,16 +70,12 @@ impl<T: Real> Kernel for Backward<'_, T> {
         for i in 0..self.x.rows() {
             let inputs = self.x.row(i).iter().zip(self.s.row(i)).zip(self.dy.row(i));
             let outputs = self.dx.row_mut(i).iter_mut().zip(self.ds.row_mut(i));
+            // What was there counts with 1 or not at all; a select, because 0·NaN would be NaN.
+            let (keep_x, keep_s) = (self.write_x == Write::Add, self.write_s == Write::Add);
             for (((x, s), dy), (dx, ds)) in inputs.zip(outputs) {
-                let g = *dy * s.exp();
-                match self.write_x {
-                    Write::Set => *dx = g,
-                    Write::Add => *dx += g,
-                }
-                match self.write_s {
-                    Write::Set => *ds = g * *x,
-                    Write::Add => *ds += g * *x,
-                }
+                let g = *dy * exp::<T, I>(*s);
+                *dx = g + if keep_x { *dx } else { T::ZERO };
+                *ds = g * *x + if keep_s { *ds } else { T::ZERO };
             }
         }
     }

@@ -16,10 +16,11 @@ pub fn scratch_len(history: usize, horizon: usize, channels: usize) -> usize {
 
 /// y = W·x + b.
 pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, mut y: RowsMut<'_, T>, scratch: &mut [T]) {
+    assert!(bias.is_none_or(|bias| bias.len() == y.rows()), "temporal: length of the bias");
     let weight = Rows::packed(weight, y.rows(), x.rows());
     let write = if let Some(bias) = bias {
-        for p in 0..y.rows() {
-            y.row_mut(p).fill(bias[p]);
+        for (p, bias) in bias.iter().enumerate() {
+            y.row_mut(p).fill(*bias);
         }
         Write::Add
     } else {

@@ -5,7 +5,6 @@
 //! windows into blocks and turns block sums into a mean and its 95 % interval. It does not know what is averaged.
 
 use crate::flight::{Flight, Window};
-use std::collections::BTreeMap;
 
 /// Length of a block, s. Longer than the manoeuvres and the slow attitude and speed modes of a small helicopter (1 s to 5 s).
 pub const BLOCK_S: f64 = 10.0;
@@ -33,12 +32,11 @@ impl Blocks {
             let samples = (BLOCK_S / step_s).round().max(1.0) as usize;
             (window.flight, window.last / samples)
         };
-        let mut numbers: BTreeMap<(usize, usize), usize> = windows.iter().map(|window| (key(window), 0)).collect();
-        for (number, value) in numbers.values_mut().enumerate() {
-            *value = number;
-        }
-        let of_window = windows.iter().map(|window| numbers.get(&key(window)).copied().unwrap_or(0)).collect();
-        Self { of_window, keys: numbers.into_keys().collect() }
+        let mut keys: Vec<(usize, usize)> = windows.iter().map(key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        let of_window = windows.iter().map(|window| keys.partition_point(|other| *other < key(window))).collect();
+        Self { of_window, keys }
     }
 
     /// Number of blocks.

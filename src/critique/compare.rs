@@ -6,6 +6,7 @@
 use super::blocks::{BlockMean, BlockSum, Blocks};
 use super::regime::Regime;
 use crate::error::{Error, Result};
+use crate::flight::split::Part;
 use crate::flight::{Column, Flight, Targets, Window};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,29 +18,6 @@ pub struct Row {
     pub name: String,
     /// Predicted accelerations in the order of [`Column::TARGETS`], one entry a window, in the order of the windows.
     pub predicted: Vec<[f64; 6]>,
-}
-
-/// The part of the data that the windows come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Split {
-    /// Flights that no fit and no search has seen.
-    Locked,
-    /// The test part of a split.
-    Test,
-    /// Everything, the training part included.
-    All,
-}
-
-impl Split {
-    /// Name in files and tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Locked => "locked",
-            Self::Test => "test",
-            Self::All => "all",
-        }
-    }
 }
 
 /// A number for each channel, and their arithmetic mean. `None` (JSON `null`) where there is nothing to compute it from.
@@ -156,14 +134,14 @@ pub struct Comparison {
     /// Derived if the targets of any flight among the windows were.
     pub target: Targets,
     /// Where the windows come from.
-    pub split: Split,
+    pub split: Part,
 }
 
 /// Lays the predictions of each row beside the measured targets at the last row of each window.
 ///
 /// # Errors
 /// [`Error::Shape`] if a row has not one prediction a window, or a window lies outside its flight.
-pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Split) -> Result<Comparison> {
+pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part) -> Result<Comparison> {
     let measured = measured(flights, windows)?;
     let groups = Groups::new(flights, windows);
     let derived = windows.iter().any(|window| flights[window.flight].targets == Targets::Derived);
@@ -189,6 +167,17 @@ pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f6
         message: format!("a window ends at row {} of flight {}, which is not there", window.last, window.flight),
     };
     windows.iter().map(|window| target(window).ok_or_else(|| fault(window))).collect()
+}
+
+/// Standard deviation of the measured accelerations over the windows, m/s² and rad/s²: what makes errors of different channels
+/// comparable. `None` for a channel that does not vary.
+///
+/// # Errors
+/// [`Error::Shape`] if a window lies outside its flight.
+pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<PerChannel> {
+    let measured = measured(flights, windows)?;
+    let one = |channel| Some((variation(&measured, channel)? / measured.len() as f64).sqrt());
+    Ok(PerChannel::new(std::array::from_fn(one)))
 }
 
 /// Refuses a row that has not one prediction a window.
@@ -336,7 +325,7 @@ pub(super) mod tests {
         let flights = flights(|_, sample, _| sample as f64 + 1.0)?;
         let windows: Vec<Window> = (0..4).map(|last| Window { flight: 0, last }).collect();
         let row = Row { name: "m".into(), predicted: [1.0, 1.0, 5.0, 4.0].map(|value| [value; 6]).to_vec() };
-        let found = compare(&flights, &windows, &[row], Split::All)?;
+        let found = compare(&flights, &windows, &[row], Part::All)?;
         let model = &found.models[0];
         assert!(close(model.rmse.vx_dot, (5.0_f64 / 4.0).sqrt()) && close(model.rmse.mean, (5.0_f64 / 4.0).sqrt()));
         assert!(close(model.mae.wz_dot, 0.75) && close(model.max_abs.vy_dot, 2.0) && close(model.r2.vx_dot, 0.0));
@@ -350,7 +339,7 @@ pub(super) mod tests {
         let flights = flights(|flight, sample, channel| ((flight + sample * 7 + channel) % 5) as f64)?;
         let windows = every_window(&flights);
         let row = Row { name: "paper".into(), predicted: vec![[0.0; 6]; windows.len()] };
-        let found = compare(&flights, &windows, &[row], Split::Locked)?;
+        let found = compare(&flights, &windows, &[row], Part::Locked)?;
         let json = serde_json::to_value(&found).map_err(|error| Error::Undetermined(error.to_string()))?;
         assert_eq!((&json["target"], &json["split"]), (&"recorded".into(), &"locked".into()));
         let model = &json["models"][0];
@@ -375,12 +364,12 @@ pub(super) mod tests {
     #[test]
     fn nothing_nan_and_constants_are_null() -> Result<()> {
         let flights = flights(|_, _, _| 0.1)?;
-        let empty = compare(&flights, &[], &[Row { name: "m".into(), predicted: vec![] }], Split::All)?;
+        let empty = compare(&flights, &[], &[Row { name: "m".into(), predicted: vec![] }], Part::All)?;
         assert_eq!((empty.models[0].rmse, empty.models[0].r2), (PerChannel::default(), PerChannel::default()));
         let windows = every_window(&flights);
         let mut predicted = vec![[0.0; 6]; windows.len()];
         predicted[3][2] = f64::NAN;
-        let found = compare(&flights, &windows, &[Row { name: "m".into(), predicted }], Split::All)?;
+        let found = compare(&flights, &windows, &[Row { name: "m".into(), predicted }], Part::All)?;
         let model = &found.models[0];
         assert_eq!((model.not_finite, model.rmse.vz_dot, model.mae.vz_dot, model.max_abs.vz_dot), (1, None, None, None));
         assert!(close(model.rmse.vx_dot, 0.1) && model.rmse.mean.is_none() && model.r2.vx_dot.is_none());
@@ -390,9 +379,9 @@ pub(super) mod tests {
     #[test]
     fn misfits_are_refused() -> Result<()> {
         let flights = flights(|_, _, _| 0.0)?;
-        let short = compare(&flights, &[Window { flight: 0, last: 0 }], &[Row { name: "m".into(), predicted: vec![] }], Split::All);
+        let short = compare(&flights, &[Window { flight: 0, last: 0 }], &[Row { name: "m".into(), predicted: vec![] }], Part::All);
         assert!(matches!(short, Err(Error::Shape { message, .. }) if message.contains("`m` has 0 predictions for 1 windows")));
-        let outside = compare(&flights, &[Window { flight: 0, last: 100 }], &[], Split::All);
+        let outside = compare(&flights, &[Window { flight: 0, last: 100 }], &[], Part::All);
         assert!(matches!(outside, Err(Error::Shape { message, .. }) if message.contains("row 100 of flight 0")));
         Ok(())
     }
@@ -401,7 +390,7 @@ pub(super) mod tests {
     fn one_derived_flight_makes_the_targets_derived() -> Result<()> {
         let mut flights = flights(|_, _, _| 0.0)?;
         flights[1].targets = Targets::Derived;
-        let target = |flight| Ok::<_, Error>(compare(&flights, &[Window { flight, last: 0 }], &[], Split::Test)?.target);
+        let target = |flight| Ok::<_, Error>(compare(&flights, &[Window { flight, last: 0 }], &[], Part::Test)?.target);
         assert_eq!((target(0)?, target(1)?), (Targets::Recorded, Targets::Derived));
         Ok(())
     }
@@ -415,7 +404,7 @@ pub(super) mod tests {
             let mut windows = every_window(&flights);
             let zero = Row { name: "zero".into(), predicted: vec![[0.0; 6]; 200] };
             let scaled = Row { name: "scaled".into(), predicted: errors.iter().map(|e| [e * (1.0 - scale); 6]).collect() };
-            let found = compare(&flights, &windows, &[zero.clone(), scaled], Split::All)?;
+            let found = compare(&flights, &windows, &[zero.clone(), scaled], Part::All)?;
             let [model, other] = [&found.models[0], &found.models[1]];
             // MAE ≤ RMSE ≤ largest error; errors scaled by s scale the RMSE by s.
             let [rmse, mae, largest] = [model.rmse, model.mae, model.max_abs].map(|value| value.vx_dot.unwrap_or(f64::NAN));
@@ -431,7 +420,7 @@ pub(super) mod tests {
             prop_assert!(inside);
             // The order of the windows does not matter.
             windows.rotate_left(turn);
-            let turned = compare(&flights, &windows, &[zero], Split::All)?;
+            let turned = compare(&flights, &windows, &[zero], Part::All)?;
             prop_assert!(close(turned.models[0].rmse.mean, model.rmse.mean.unwrap_or(f64::NAN)));
             prop_assert!(close(turned.models[0].r2.wz_dot, model.r2.wz_dot.unwrap_or(f64::NAN)));
         }

@@ -42,18 +42,20 @@ pub fn stretches(flights: &[Flight], windows: &[Window], row: &Row) -> Result<Op
     let channels = scale.iter().flatten().count() as f64;
     let blocks = Blocks::new(flights, windows);
     let mut sums = vec![BlockSum::default(); blocks.len()];
-    let mut ranges: Vec<Range<usize>> = vec![usize::MAX..0; blocks.len()];
+    let mut ranges: Vec<Option<Range<usize>>> = vec![None; blocks.len()];
     for (((block, window), y), p) in blocks.of_window.iter().zip(windows).zip(&measured).zip(&row.predicted) {
         let squares = y.iter().zip(p).zip(&scale).filter_map(|((y, p), scale)| Some((y - p).powi(2) / (*scale)?));
         sums[*block].samples += 1.0;
         sums[*block].sum += squares.sum::<f64>() / channels;
         let range = &mut ranges[*block];
-        *range = range.start.min(window.last)..range.end.max(window.last + 1);
+        let (start, end) = range.as_ref().map_or((window.last, window.last), |range| (range.start, range.end));
+        *range = Some(start.min(window.last)..end.max(window.last + 1));
     }
     let fullest = sums.iter().map(|block| block.samples).fold(0.0, f64::max);
     let stretch = |(number, sum): (usize, &BlockSum)| {
         let error = (sum.sum / sum.samples).sqrt();
-        let span = Span { flight: blocks.keys[number].0, start: ranges[number].start, end: ranges[number].end };
+        let Range { start, end } = ranges[number].clone()?;
+        let span = Span { flight: blocks.keys[number].0, start, end };
         (2.0 * sum.samples >= fullest && error.is_finite()).then_some(Stretch { span, error })
     };
     let mut found: Vec<Stretch> = sums.iter().enumerate().filter_map(stretch).collect();
@@ -143,51 +145,64 @@ pub struct Dependence {
     pub share: f64,
 }
 
-/// Number of bins of [`dependence`].
+/// Number of bins of [`dependences`].
 pub const BINS: usize = 14;
 
-/// The residuals of the six channels of one model against one variable, in [`BINS`] bins of equal width between the 0.5 % and
+/// The residuals of the six channels of one model against each variable, in [`BINS`] bins of equal width between the 0.5 % and
 /// the 99.5 % quantile of the variable; values beyond go into the outer bins, whose [`Bin::at`] tells where they lie.
 ///
-/// Windows where the variable was not recorded, or the prediction is not finite, are left out. `None` if nothing remains or the
-/// variable does not vary.
+/// Windows where the variable was not recorded, or the prediction is not finite, are left out; so are variables for which
+/// nothing remains or that do not vary.
 ///
 /// # Errors
 /// [`crate::Error::Shape`] if the row has not one prediction a window, or a window lies outside its flight.
-pub fn dependence(flights: &[Flight], windows: &[Window], row: &Row, variable: Variable) -> Result<Option<[Dependence; 6]>> {
+pub fn dependences(
+    flights: &[Flight],
+    windows: &[Window],
+    row: &Row,
+    variables: &[Variable],
+) -> Result<Vec<(Variable, [Dependence; 6])>> {
     check_row(row, windows)?;
     let measured = measured(flights, windows)?;
     let blocks = Blocks::new(flights, windows);
-    let used: Vec<(f64, usize, [f64; 6])> = windows
+    let residuals: Vec<Option<[f64; 6]>> = measured
         .iter()
-        .zip(&blocks.of_window)
-        .zip(measured.iter().zip(&row.predicted))
-        .filter_map(|((window, block), (y, p))| {
-            let value = variable.value(&flights[window.flight], window.last)?;
-            let residual: [f64; 6] = std::array::from_fn(|channel| y[channel] - p[channel]);
-            residual.iter().all(|value| value.is_finite()).then_some((value, *block, residual))
+        .zip(&row.predicted)
+        .map(|(y, p)| {
+            Some(std::array::from_fn(|channel| y[channel] - p[channel])).filter(|r: &[f64; 6]| r.iter().all(|r| r.is_finite()))
         })
         .collect();
+    let of = |variable: &Variable| {
+        let value = |window: &Window| variable.value(flights.get(window.flight)?, window.last);
+        let used = windows.iter().zip(&blocks.of_window).zip(&residuals);
+        let used: Vec<_> = used.filter_map(|((window, block), residual)| Some((value(window)?, *block, (*residual)?))).collect();
+        Some((*variable, bin(&used, blocks.len())?))
+    };
+    Ok(variables.iter().filter_map(of).collect())
+}
+
+/// Bins residuals that come with a variable and the number of their block.
+fn bin(used: &[(f64, usize, [f64; 6])], blocks: usize) -> Option<[Dependence; 6]> {
     let mut values: Vec<f64> = used.iter().map(|(value, ..)| *value).collect();
     let last = values.len().saturating_sub(1);
     let mut quantile = |share: f64| {
         let rank = (last as f64 * share).round() as usize;
         (!values.is_empty()).then(|| *values.select_nth_unstable_by(rank, f64::total_cmp).1)
     };
-    let (Some(low), Some(high)) = (quantile(0.005), quantile(0.995)) else { return Ok(None) };
+    let (low, high) = (quantile(0.005)?, quantile(0.995)?);
     if high <= low {
-        return Ok(None);
+        return None;
     }
-    let mut cells = vec![(BlockSum::default(), [0.0; 6]); BINS * blocks.len()];
-    for (value, block, residual) in &used {
+    let mut cells = vec![(BlockSum::default(), [0.0; 6]); BINS * blocks];
+    for (value, block, residual) in used {
         let bin = ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize;
-        let (of_variable, sums) = &mut cells[bin * blocks.len() + block];
+        let (of_variable, sums) = &mut cells[bin * blocks + block];
         of_variable.samples += 1.0;
         of_variable.sum += value;
         sums.iter_mut().zip(residual).for_each(|(sum, value)| *sum += value);
     }
-    Ok(Some(std::array::from_fn(|channel| {
-        let bins = cells.chunks_exact(blocks.len()).filter_map(|cells| {
+    Some(std::array::from_fn(|channel| {
+        let bins = cells.chunks_exact(blocks).filter_map(|cells| {
             let at = BlockMean::new(cells.iter().map(|(sum, _)| *sum))?.mean;
             let mean = BlockMean::new(cells.iter().map(|(of, sums)| BlockSum { samples: of.samples, sum: sums[channel] }))?;
             let n = cells.iter().map(|(of, _)| of.samples).sum::<f64>() as usize;
@@ -196,7 +211,7 @@ pub fn dependence(flights: &[Flight], windows: &[Window], row: &Row, variable: V
         let bins: Vec<Bin> = bins.collect();
         let share = share(&bins, used.iter().map(|(.., residual)| residual[channel]));
         Dependence { bins, share }
-    })))
+    }))
 }
 
 /// η² = Σ_bins n (mean − grand mean)² / Σ (residual − grand mean)²; 0 for a residual that does not vary.
@@ -241,15 +256,15 @@ mod tests {
         // vx rises from 0 to 9.9 m/s in both flights: the residual is 2 above 5 m/s and 0 below.
         let flights = flights(|_, sample, channel| if channel == 0 && sample >= 50 { 2.0 } else { 0.0 })?;
         let windows = every_window(&flights);
-        let found = dependence(&flights, &windows, &zero(&windows), Variable::Column(Column::Vx))?;
-        let Some([vx_dot, vy_dot, ..]) = found else { panic!("vx varies") };
+        let variables = [Column::Roll, Column::Vx].map(Variable::Column);
+        let found = dependences(&flights, &windows, &zero(&windows), &variables)?;
+        // Roll does not vary and is left out.
+        let [(Variable::Column(Column::Vx), [vx_dot, vy_dot, ..])] = found.as_slice() else { panic!("only vx varies") };
         assert_eq!(vx_dot.bins.iter().map(|bin| bin.n).sum::<usize>(), 200);
         assert!(vx_dot.bins.iter().filter(|bin| bin.at < 4.5).all(|bin| bin.mean == 0.0), "{vx_dot:?}");
         assert!(vx_dot.bins.iter().filter(|bin| bin.at > 5.5).all(|bin| (bin.mean - 2.0).abs() <= CLOSE), "{vx_dot:?}");
         assert!(vx_dot.share > 0.99 && vy_dot.share == 0.0);
         assert!(vx_dot.bins.iter().all(Bin::is_thin), "two flights give at most four blocks a bin");
-        let still = dependence(&flights, &windows, &zero(&windows), Variable::Column(Column::Roll))?;
-        assert!(still.is_none(), "roll does not vary");
         Ok(())
     }
 
@@ -259,6 +274,9 @@ mod tests {
         assert!(Variable::Height.value(&flights[0], 3).is_some_and(|height| height.to_bits() == 10.0_f64.to_bits()));
         flights[0].absent.push(Column::Z);
         assert_eq!(Variable::Height.value(&flights[0], 3), None);
+        let windows = every_window(&flights);
+        let found = dependences(&flights, &windows, &zero(&windows), &[Variable::Airspeed])?;
+        assert!(matches!(found.as_slice(), [(Variable::Airspeed, of)] if of[0].share == 0.0));
         Ok(())
     }
 
@@ -269,8 +287,8 @@ mod tests {
         fn bins_pool_to_the_mean_residual(residuals in prop::collection::vec(-3.0..3.0_f64, 200)) {
             let flights = flights(|flight, sample, _| residuals[flight * 100 + sample])?;
             let windows = every_window(&flights);
-            let found = dependence(&flights, &windows, &zero(&windows), Variable::Airspeed)?;
-            let Some(found) = found else { return Err(TestCaseError::fail("speed varies")) };
+            let found = dependences(&flights, &windows, &zero(&windows), &[Variable::Airspeed])?;
+            let [(_, found)] = found.as_slice() else { return Err(TestCaseError::fail("speed varies")) };
             let pooled: f64 = found[3].bins.iter().map(|bin| bin.n as f64 * bin.mean).sum();
             prop_assert!((pooled - residuals.iter().sum::<f64>()).abs() <= CLOSE * 600.0);
             prop_assert!(found.iter().all(|found| (0.0..=1.0).contains(&found.share)));

@@ -8,6 +8,6 @@ pub mod regime;
 pub mod table;
 pub mod yardstick;
 
-pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, Split, compare};
+pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
 pub use regime::Regime;
 pub use yardstick::{Ridge, RidgeInput, RidgeOptions, centred_difference, finite_difference};

@@ -3,6 +3,7 @@
 //! The regimes are exclusive: a sample has the first one, in the order of [`Regime::ALL`], whose rule holds. They depend on
 //! the recorded state alone, never on a model. Manoeuvre classes, which a person gives, are another matter.
 
+use crate::flight::attitude::{rotate, rotation_body_to_inertial};
 use crate::flight::{Column, Flight};
 
 /// Rotation rate above which a sample is `rotation`, rad/s (57°/s: beyond station-keeping and cruise turns).
@@ -83,9 +84,9 @@ impl Regime {
             let values = flight.column(column);
             values.get(sample).or(values.last()).copied().unwrap_or(0.0)
         };
-        let (sin_roll, cos_roll) = at(Column::Roll).sin_cos();
-        let (sin_pitch, cos_pitch) = at(Column::Pitch).sin_cos();
-        if cos_roll * cos_pitch < 0.0 {
+        // Body to level axes: along the heading, to its right, and down.
+        let level = rotation_body_to_inertial(at(Column::Roll), at(Column::Pitch), 0.0);
+        if level[2][2] < 0.0 {
             return Self::Inverted;
         }
         if norm([at(Column::Wx), at(Column::Wy), at(Column::Wz)]) >= ROTATION_RAD_S {
@@ -94,16 +95,12 @@ impl Regime {
         if !flight.absent.contains(&Column::Z) && -at(Column::Z) < LOW_M {
             return Self::Low;
         }
-        let [vx, vy, vz] = [at(Column::Vx), at(Column::Vy), at(Column::Vz)];
-        let speed = norm([vx, vy, vz]);
+        let velocity = [at(Column::Vx), at(Column::Vy), at(Column::Vz)];
+        let speed = norm(velocity);
         if speed < HOVER_M_S {
             return Self::Hover;
         }
-        // Velocity in level axes: along the heading, to its right, and down (ZYX Euler angles with the yaw left out).
-        let across = sin_roll * vy + cos_roll * vz;
-        let ahead = cos_pitch * vx + sin_pitch * across;
-        let right = cos_roll * vy - sin_roll * vz;
-        let down = cos_pitch * across - sin_pitch * vx;
+        let [ahead, right, down] = rotate(&level, velocity);
         if down <= -STEEP * speed {
             Self::Climb
         } else if down >= STEEP * speed {

@@ -4,6 +4,7 @@
 
 use super::compare::{Comparison, ModelError, PerChannel};
 use super::regime::Regime;
+use crate::flight::split::Part;
 use crate::flight::{Column, Targets};
 use std::fmt;
 
@@ -77,9 +78,9 @@ impl Comparison {
             Targets::Derived => "accelerations derived from the recorded velocity and rates",
         };
         let part = match self.split {
-            super::Split::Locked => "the locked flights",
-            super::Split::Test => "the test part",
-            super::Split::All => "all flights, those used for fitting included",
+            Part::Locked => "the locked flights",
+            Part::Test => "the test part",
+            Part::All => "all flights, those used for fitting included",
         };
         format!("{windows} windows of {part}, against {target}")
     }
@@ -94,7 +95,7 @@ impl fmt::Display for Comparison {
         for (title, words, kind, measure) in MEASURES {
             let mut columns = channels.clone();
             if kind == Kind::Share {
-                columns.iter_mut().for_each(|(_, unit)| *unit = "1".to_owned());
+                columns.iter_mut().for_each(|(_, unit)| unit.clear());
             }
             columns.push(("mean".to_owned(), String::new()));
             let values = self.models.iter().map(|model| {
@@ -198,7 +199,7 @@ fn grid(
 mod tests {
     use super::*;
     use crate::critique::compare::tests::{every_window, flights};
-    use crate::critique::{Row, Split, compare};
+    use crate::critique::{Row, compare};
     use crate::error::Result;
     use proptest::prelude::*;
 
@@ -215,7 +216,7 @@ mod tests {
         let flights = flights(|_, sample, _| (sample % 7) as f64)?;
         let windows = every_window(&flights);
         let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![[value; 6]; windows.len()] };
-        let text = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Split::All)?.to_string();
+        let text = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Part::All)?.to_string();
         assert!(text.starts_with("200 windows of all flights"), "{text}");
         assert!(text.contains("rad/s²") && text.contains("RMSE by manoeuvre") && text.contains("forward"), "{text}");
         let rmse: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("RMSE")).skip(3).take(2).collect();

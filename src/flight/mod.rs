@@ -3,12 +3,42 @@
 //! This file holds the plain types. Reading files, checking them, deriving accelerations, cutting into blocks and windows
 //! are in the sibling files. No physics here: a [`Flight`] knows what was recorded, not why.
 
+#[cfg(feature = "files")]
+mod assemble;
 pub mod atomic;
 pub mod attitude;
 mod column;
+#[cfg(feature = "files")]
+mod convert;
+pub mod derived;
+pub mod differentiate;
+#[cfg(feature = "files")]
+mod hypotheses;
+mod local_polynomial;
+#[cfg(feature = "parquet")]
+mod parquet;
+#[cfg(feature = "files")]
+pub mod read;
+#[cfg(feature = "files")]
+mod repair;
+#[cfg(feature = "files")]
+mod resample;
+#[cfg(feature = "files")]
+mod schema;
 pub mod split;
+#[cfg(feature = "files")]
+pub mod stanford;
+#[cfg(feature = "files")]
+mod table;
+#[cfg(feature = "files")]
+mod timing;
+#[cfg(feature = "files")]
+mod units;
 pub mod windows;
+#[cfg(feature = "files")]
+pub mod write;
 
+pub use attitude::Axes;
 pub use column::Column;
 
 use crate::error::{Error, Result};

@@ -20,11 +20,12 @@ const TRAINING_SHARE: f64 = 0.7;
 const VALIDATION_SHARE: f64 = 0.2;
 
 /// How samples are divided.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Protocol {
     /// Random 10-s segments, 70 % training, 20 % validation, 10 % test (paper section 4.1). Leftovers shorter than 10 s at the
     /// end of a flight belong to no partition. Written `segments`.
+    #[default]
     Segments,
     /// The first share of every flight trains, the rest tests; no validation. Written `first 0.75`.
     First(f64),
@@ -84,13 +85,14 @@ pub enum Part {
     All,
 }
 
-impl fmt::Display for Part {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl Part {
+    /// Name in files and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
             Self::Locked => "locked",
             Self::Test => "test",
             Self::All => "all",
-        })
+        }
     }
 }
 

@@ -40,6 +40,20 @@ pub struct Worst {
     pub relative_error: f64,
 }
 
+impl std::fmt::Display for Parity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        writeln!(f, "largest absolute difference over largest absolute reference value, computed in {}", self.precision)?;
+        for group in ["output", "loss", "grad.input.", "grad.param.", "adam1.param."] {
+            let errors = self.relative_error.iter().filter(|(tensor, _)| tensor.starts_with(group));
+            let (count, largest) = errors.fold((0, 0.0_f64), |(count, largest), (_, error)| (count + 1, largest.max(*error)));
+            if count > 0 {
+                writeln!(f, "  {:<14} {count:>4} tensors   largest {largest:.2e}", group.trim_end_matches('.'))?;
+            }
+        }
+        write!(f, "worst: {} {:.2e}", self.worst.tensor, self.worst.relative_error)
+    }
+}
+
 /// Computes everything in a parity file again and compares.
 ///
 /// # Errors

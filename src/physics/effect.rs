@@ -1,5 +1,6 @@
 //! An effect: one named piece of physics, as terms in the formula grammar. Data only; evaluation is in `evaluate`.
 
+use super::evaluate::standard_names;
 use crate::error::{Error, Result};
 use crate::flight::Column;
 use crate::formula::Formula;
@@ -150,6 +151,9 @@ impl Effect {
             if !self.terms.iter().any(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
                 return fault(&coefficient.name, "listed but used by no term".into(), "a coefficient that a term multiplies");
             }
+        }
+        if let Some(parameter) = self.parameters.iter().find(|parameter| standard_names().contains(&parameter.name.as_str())) {
+            return fault(&parameter.name, "a parameter with the name of a column".into(), "a name that no column has");
         }
         match self.parameters.iter().find(|parameter| !parameter.value.is_finite()) {
             Some(parameter) => fault(&parameter.name, parameter.value.to_string(), "a finite number"),

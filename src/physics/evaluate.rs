@@ -21,7 +21,9 @@ enum Derived {
     Airspeed,
     Alpha,
     Beta,
-    Gravity(usize),
+    GravityX,
+    GravityY,
+    GravityZ,
 }
 
 /// Names of the derived quantities: `t` s; `height` m, `-z`; `airspeed` m/s, the length of `v` (still air); `alpha` rad,
@@ -32,21 +34,26 @@ const DERIVED: [(&str, Derived); 8] = [
     ("airspeed", Derived::Airspeed),
     ("alpha", Derived::Alpha),
     ("beta", Derived::Beta),
-    ("g_x", Derived::Gravity(0)),
-    ("g_y", Derived::Gravity(1)),
-    ("g_z", Derived::Gravity(2)),
+    ("g_x", Derived::GravityX),
+    ("g_y", Derived::GravityY),
+    ("g_z", Derived::GravityZ),
 ];
 
 impl Derived {
-    fn value(self, time_s: f64, state: &impl Fn(Column) -> f64) -> f64 {
-        let (vx, vy, vz) = (state(Column::Vx), state(Column::Vy), state(Column::Vz));
+    /// Appends the values at consecutive samples to `out`; `state` holds their columns in the order of [`Column::STATE`].
+    fn extend(self, state: &[&[f64]; 16], time_s: &dyn Fn(usize) -> f64, samples: usize, out: &mut Vec<f64>) {
+        let of = |column: Column| state.get(column as usize).copied().unwrap_or_default().iter().copied();
+        let velocity = || of(Column::Vx).zip(of(Column::Vy)).zip(of(Column::Vz));
+        let attitude = || of(Column::Roll).zip(of(Column::Pitch));
         match self {
-            Self::Time => time_s,
-            Self::Height => -state(Column::Z),
-            Self::Airspeed => vx.hypot(vy).hypot(vz),
-            Self::Alpha => vz.atan2(vx),
-            Self::Beta => vy.atan2(vx.hypot(vz)),
-            Self::Gravity(axis) => gravity_body(state(Column::Roll), state(Column::Pitch)).get(axis).copied().unwrap_or_default(),
+            Self::Time => out.extend((0..samples).map(time_s)),
+            Self::Height => out.extend(of(Column::Z).map(|z| -z)),
+            Self::Airspeed => out.extend(velocity().map(|((vx, vy), vz)| vx.hypot(vy).hypot(vz))),
+            Self::Alpha => out.extend(velocity().map(|((vx, _), vz)| vz.atan2(vx))),
+            Self::Beta => out.extend(velocity().map(|((vx, vy), vz)| vy.atan2(vx.hypot(vz)))),
+            Self::GravityX => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[0])),
+            Self::GravityY => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[1])),
+            Self::GravityZ => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[2])),
         }
     }
 
@@ -55,7 +62,7 @@ impl Derived {
             Self::Time => &[],
             Self::Height => &[Column::Z],
             Self::Airspeed | Self::Alpha | Self::Beta => &[Column::Vx, Column::Vy, Column::Vz],
-            Self::Gravity(_) => &[Column::Roll, Column::Pitch],
+            Self::GravityX | Self::GravityY | Self::GravityZ => &[Column::Roll, Column::Pitch],
         }
     }
 }
@@ -71,17 +78,21 @@ pub fn quantity(flight: &Flight, name: &str) -> Option<Vec<f64>> {
         return Some(column.to_vec());
     }
     let derived = DERIVED.iter().find(|entry| entry.0 == name)?.1;
-    let value = |sample: usize| {
-        derived.value(flight.time_s(sample), &|column| flight.column(column).get(sample).copied().unwrap_or_default())
-    };
-    Some((0..flight.len()).map(value).collect())
+    let mut values = Vec::with_capacity(flight.len());
+    derived.extend(&state_columns(flight, 0..flight.len()), &|sample| flight.time_s(sample), flight.len(), &mut values);
+    Some(values)
 }
 
 /// A standard quantity of one sample by name, for streams; `state` in the order of [`Column::STATE`].
 pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
-    let of_state = |column: Column| state.get(column as usize).copied().unwrap_or_default();
-    let column = Column::STATE.iter().find(|column| column.name() == name).map(|column| of_state(*column));
-    column.or_else(|| DERIVED.iter().find(|entry| entry.0 == name).map(|entry| entry.1.value(time_s, &of_state)))
+    if let Some(column) = Column::STATE.iter().find(|column| column.name() == name) {
+        return state.get(*column as usize).copied();
+    }
+    let derived = DERIVED.iter().find(|entry| entry.0 == name)?.1;
+    let columns = std::array::from_fn(|index| state.get(index..=index).unwrap_or_default());
+    let mut value = Vec::with_capacity(1);
+    derived.extend(&columns, &|_| time_s, 1, &mut value);
+    value.first().copied()
 }
 
 /// A formula of standard quantities on a whole flight.
@@ -91,6 +102,16 @@ pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
 pub fn evaluate(formula: &Formula, flight: &Flight) -> Result<Vec<f64>> {
     formula.evaluate(flight.len(), flight.step_s, &|name| quantity(flight, name).map(Value::from))
 }
+
+/// The state columns of some samples of a flight.
+fn state_columns(flight: &Flight, range: Range<usize>) -> [&[f64]; 16] {
+    std::array::from_fn(|index| {
+        Column::STATE.get(index).and_then(|column| flight.column(*column).get(range.clone())).unwrap_or_default()
+    })
+}
+
+/// What is done with a block: its range of samples, and one column a term.
+pub(super) type Visit<'a> = dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()> + 'a;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {
@@ -204,12 +225,7 @@ impl Program {
     }
 
     /// Runs from the flight's first sample to `end`, and hands over each block's range and its values, one column a term.
-    pub(super) fn run(
-        &mut self,
-        flight: &Flight,
-        end: usize,
-        visit: &mut dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()>,
-    ) -> Result<()> {
+    pub(super) fn run(&mut self, flight: &Flight, end: usize, visit: &mut Visit<'_>) -> Result<()> {
         let end = end.min(flight.len());
         let Self { sources, extras, terms, .. } = self;
         let whole: Vec<&[f64]> = sources
@@ -224,12 +240,11 @@ impl Program {
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); terms.len()];
         for start in (0..end).step_by(BLOCK) {
             let range = start..(start + BLOCK).min(end);
+            let state = state_columns(flight, range.clone());
             for (buffer, source) in derived.iter_mut().zip(sources.iter()) {
                 if let Source::Derived(kind) = source {
-                    let state =
-                        |sample: usize| move |column: Column| flight.column(column).get(sample).copied().unwrap_or_default();
                     buffer.clear();
-                    buffer.extend(range.clone().map(|sample| kind.value(flight.time_s(sample), &state(sample))));
+                    kind.extend(&state, &|sample| flight.time_s(start + sample), range.len(), buffer);
                 }
             }
             let mut columns: Vec<&[f64]> = Vec::new();
@@ -288,12 +303,21 @@ pub struct StreamingModel {
     program: Program,
     start_s: f64,
     samples: usize,
+    /// One number a source.
+    values: Vec<f64>,
+    /// One number an input of the term at hand.
     inputs: Vec<f64>,
 }
 
 impl StreamingModel {
     pub(super) fn new(model: &Model, step_s: f64) -> Result<Self> {
-        Ok(Self { program: Program::compile(model, step_s, None)?, start_s: 0.0, samples: 0, inputs: Vec::new() })
+        Ok(Self {
+            program: Program::compile(model, step_s, None)?,
+            start_s: 0.0,
+            samples: 0,
+            values: Vec::new(),
+            inputs: Vec::new(),
+        })
     }
 
     /// Names of the log's further columns that the model reads; [`StreamingModel::push_with`] takes them in this order. Empty
@@ -329,18 +353,19 @@ impl StreamingModel {
         }
         let time_s = self.start_s + *step_s * self.samples as f64;
         self.samples += 1;
-        let of_state = |column: Column| state.get(column as usize).copied().unwrap_or_default();
+        let columns: [&[f64]; 16] = std::array::from_fn(|index| state.get(index..=index).unwrap_or_default());
+        self.values.clear();
+        for source in sources.iter() {
+            match source {
+                Source::State(column) => self.values.push(state.get(*column as usize).copied().unwrap_or_default()),
+                Source::Derived(derived) => derived.extend(&columns, &|_| time_s, 1, &mut self.values),
+                Source::Extra(index) => self.values.push(extra.get(*index).copied().unwrap_or_default()),
+            }
+        }
         let mut predicted = [0.0; 6];
         for term in terms {
             self.inputs.clear();
-            for &input in &term.inputs {
-                self.inputs.push(match sources.get(input) {
-                    Some(Source::State(column)) => of_state(*column),
-                    Some(Source::Derived(derived)) => derived.value(time_s, &of_state),
-                    Some(Source::Extra(index)) => extra.get(*index).copied().unwrap_or_default(),
-                    None => 0.0,
-                });
-            }
+            self.inputs.extend(term.inputs.iter().map(|&input| self.values.get(input).copied().unwrap_or_default()));
             let value = term.formula.push(&self.inputs)?;
             if let Some(sum) = predicted.get_mut(term.place.channel) {
                 *sum += term.factor * value;

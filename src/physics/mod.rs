@@ -4,11 +4,19 @@
 //! a user's own formulas are therefore one type: they evaluate on whole flights or one sample at a time, and print as formulas.
 
 mod baseline;
+mod calibrate;
 mod effect;
 mod evaluate;
+mod least_squares;
 mod model;
+#[cfg(feature = "files")]
+mod model_file;
+mod student;
+#[cfg(feature = "files")]
+mod toml_section;
 
 pub use baseline::{PAPER, built_in, kinds};
+pub use calibrate::{Calibration, Estimate, calibrate};
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};
 pub use model::{Entry, Model, ModelData};

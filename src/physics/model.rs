@@ -5,6 +5,7 @@ use super::baseline;
 use super::effect::Effect;
 use super::evaluate::{self, StreamingModel};
 use crate::error::{Error, Result};
+use crate::flight::split::Protocol;
 use crate::flight::{Accelerations, Column, Flight};
 use crate::formula::Formula;
 use std::collections::BTreeMap;
@@ -34,6 +35,8 @@ pub struct ModelData {
     pub control_delay_s: f64,
     /// Manoeuvre classes or flights that no search may see.
     pub locked: Vec<String>,
+    /// How the flights are divided where none is locked.
+    pub split: Protocol,
 }
 
 /// A first-principles model of an unmanned helicopter: predicted acceleration = sum of the terms of its enabled effects.
@@ -57,7 +60,7 @@ pub struct Model {
 
 impl Model {
     /// Names of the model's own numbers, usable in every formula: `mass_kg`, `ix iy iz` (kg m²), `rotor_radius_m`,
-    /// `control_delay_s`.
+    /// `control_delay_s`. They come before a further column of the log of the same name.
     pub const CONSTANTS: [&'static str; 6] = ["mass_kg", "ix", "iy", "iz", "rotor_radius_m", "control_delay_s"];
 
     /// The paper's baseline (eqs. 14-15) with all coefficients zero and no control delay.

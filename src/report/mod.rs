@@ -1,1 +1,12 @@
-//! Figures and pages.
+//! Reports: self-contained HTML pages with interactive figures, for people without this program.
+//!
+//! Numbers come in finished from the critique; nothing is computed here that a table or a JSON file would not also say.
+
+pub mod colour;
+pub mod compare;
+pub mod figures;
+pub mod page;
+
+pub use compare::{CompareReport, compare_page};
+pub use figures::Figure;
+pub use page::{Cell, Map, MapCell, Page, Part, Section, Table, page};

@@ -17,6 +17,15 @@ use std::fmt;
 /// Step of the central difference for operands of order one: truncation h⁴/30·f⁽⁵⁾ and rounding ε·f/h are both near 1e-13.
 const STEP: f64 = 1e-3;
 
+/// Step for a whole graph along a direction of unit length: small, because thousands of rectifiers have their kinks somewhere.
+const GRAPH_STEP: f64 = 3e-5;
+
+/// Draws at ever smaller steps: the step is divided by three up to this many times, then starts again.
+const STEP_SIZES: u64 = 3;
+
+/// Smallest gradient norm that the derivative along a tensor is measured in: below it, rounding of the loss would show.
+const SMALLEST_NORM: f64 = 1e-3;
+
 /// Points drawn before giving up on finding one away from every kink.
 const ATTEMPTS: u64 = 8;
 
@@ -59,7 +68,7 @@ fn numbers<T: Real>(stream: Stream, count: usize) -> Vec<T> {
     (0..count as u64).map(|index| T::of(f64::from(number(index) as f32))).collect()
 }
 
-/// Largest difference over the largest reference magnitude, never below one unit; infinite for NaN or other lengths.
+/// Largest difference over the largest reference magnitude, never below one unit; infinite, never NaN, for numbers that are not finite or other lengths.
 fn distance<A: Real, B: Real>(found: &[A], expected: &[B]) -> f64 {
     if found.len() != expected.len() {
         return f64::INFINITY;
@@ -69,7 +78,8 @@ fn distance<A: Real, B: Real>(found: &[A], expected: &[B]) -> f64 {
         let difference = (a.f64() - b.f64()).abs();
         if difference.is_nan() { f64::INFINITY } else { worst.max(difference) }
     };
-    found.iter().zip(expected).fold(0.0, worst) / scale
+    let relative = found.iter().zip(expected).fold(0.0, worst) / scale;
+    if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
 /// One operation at fixed shapes: plain calls without graph or session.
@@ -148,14 +158,14 @@ impl<'a, T: Real> Trial<'a, T> {
 }
 
 /// Four-point central difference of a vector function along the line ε ↦ f(ε); `None` where two steps disagree.
-fn derivative(f: &mut dyn FnMut(f64) -> Vec<f64>) -> Option<Vec<f64>> {
+fn derivative(step: f64, f: &mut dyn FnMut(f64) -> Vec<f64>) -> Option<Vec<f64>> {
     let mut at = |h: f64| -> Vec<f64> {
         let (near, far) = ([f(h), f(-h)], [f(2.0 * h), f(-2.0 * h)]);
         let [plus, minus] = &near;
         let [far_plus, far_minus] = &far;
         (0..plus.len()).map(|i| (8.0 * (plus[i] - minus[i]) - (far_plus[i] - far_minus[i])) / (12.0 * h)).collect()
     };
-    let (coarse, fine) = (at(STEP), at(STEP / 2.0));
+    let (coarse, fine) = (at(step), at(step / 2.0));
     // Half the bound of the comparison is left to the backward pass.
     (distance(&fine, &coarse) < Tolerance::Approximate.relative_f64() / 2.0).then_some(fine)
 }
@@ -194,7 +204,7 @@ fn jacobian(trial: &Trial<'_, f64>) -> Checked {
         let found = (0..ATTEMPTS).find_map(|attempt| {
             let x = trial.operands(attempt);
             let along = |direction: &Vec<f64>| {
-                derivative(&mut |step| {
+                derivative(STEP, &mut |step| {
                     let mut moved = x.clone();
                     moved[operand].iter_mut().zip(direction).for_each(|(x, direction)| *x += step * direction);
                     trial.forward(&moved).0
@@ -215,7 +225,7 @@ fn jacobian(trial: &Trial<'_, f64>) -> Checked {
             let analytic: Vec<f64> = directions.iter().map(|direction| dot(&dx[operand], direction)).collect();
             let expected: Vec<f64> = numeric.iter().map(|column| dot(column, dy)).collect();
             let off = distance(&analytic, &expected);
-            if !(off <= Tolerance::Approximate.relative_f64()) {
+            if off > Tolerance::Approximate.relative_f64() {
                 let kind = if full { "Jacobian row" } else { "directional derivative" };
                 return Err(
                     trial.fault(format!("operand {operand}, {kind} {row}: off by {off:e}: {analytic:?} against {expected:?}"))
@@ -241,7 +251,7 @@ fn rules(trial: &Trial<'_, f64>) -> Checked {
         let combined: Vec<f64> = set.iter().zip(&other[operand]).map(|(a, b)| 2.0 * a - 3.0 * b).collect();
         for (rule, found, expected) in [("set, then add", &twice[operand], double), ("linear in dy", &mixed[operand], combined)] {
             let off = distance(found, &expected);
-            if !(off <= Tolerance::Close.relative_f64()) {
+            if off > Tolerance::Close.relative_f64() {
                 return Err(trial.fault(format!("operand {operand}: {rule}: off by {off:e}")));
             }
         }
@@ -267,8 +277,8 @@ fn precision(double: &Trial<'_, f64>, single: &Trial<'_, f32>) -> Checked {
 /// Gradients of a whole graph's mean loss: directional derivatives along each parameter tensor, and along all at once.
 ///
 /// # Errors
-/// The first [`Disagreement`], naming the parameter; also if a parameter's gradient is zero or not finite, except those
-/// named in `zero` (a bias of keys, for example: softmax does not see it).
+/// The first [`Disagreement`], naming the parameter; also if a parameter's gradient is not finite, or is zero where `zero` of
+/// its name is false, or the reverse (a bias of keys, for example, has none: softmax does not see it).
 #[expect(clippy::too_many_arguments, reason = "a check is a function of all that a step is")]
 pub fn graph(
     graph: &Graph<f64>,
@@ -277,48 +287,55 @@ pub fn graph(
     samples: usize,
     dropout: Option<DropoutKey>,
     fill: Fill<'_, f64>,
-    zero: &[&str],
+    zero: &dyn Fn(&str) -> bool,
     seed: u64,
 ) -> Checked {
     let mut session = Session::train(graph, loss, &[], Threads(1))?;
     session.set_poison(true);
     session.step(parameters, samples, dropout, fill)?;
     let gradients = session.gradients().to_vec();
+    // The loss is computed by the other plan, which keeps nothing for a backward pass.
+    let mut values = Session::infer(graph, &[loss], Threads(1))?;
+    values.set_poison(true);
     let mut moved = parameters.to_vec();
     let tensors = graph.parameters().iter().map(|parameter| (parameter.name.as_str(), parameter.range()));
     for (index, (name, range)) in tensors.chain([("all parameters", 0..parameters.len())]).enumerate() {
         let fault = |message: String| Disagreement { subject: name.to_owned(), message };
         let own = &gradients[range.clone()];
         let is_zero = own.iter().all(|value| value.abs() < Tolerance::Close.relative_f64());
-        if own.iter().any(|value| !value.is_finite()) || is_zero != zero.contains(&name) {
+        if own.iter().any(|value| !value.is_finite()) || is_zero != zero(name) {
             return Err(fault("the gradient is not finite, or is zero where it must not be (or the reverse)".into()));
         }
-        // Scaled to unit length, so that tensors of any size move the loss by the same order.
+        // Half along the gradient, so that the derivative is of its order, half at random; of unit length.
+        let norm = if is_zero { 1.0 } else { dot(own, own).sqrt().max(SMALLEST_NORM) };
         let direction = |attempt: u64| {
-            let raw: Vec<f64> = numbers(Stream::new(seed, index as u64, attempt, 0), range.len());
-            let length = dot(&raw, &raw).sqrt();
-            raw.into_iter().map(|value| value / length).collect::<Vec<f64>>()
+            let random: Vec<f64> = numbers(Stream::new(seed, index as u64, attempt, 0), range.len());
+            let length = dot(&random, &random).sqrt();
+            let mixed: Vec<f64> = own.iter().zip(&random).map(|(own, random)| own / norm + random / length).collect();
+            let length = dot(&mixed, &mixed).sqrt();
+            mixed.into_iter().map(|value| value / length).collect::<Vec<f64>>()
         };
         let mut result = None;
         for attempt in 0..ATTEMPTS {
             let direction = direction(attempt);
             let mut failure = None;
-            let numeric = derivative(&mut |step| {
+            let step = GRAPH_STEP / 3_f64.powi((attempt % STEP_SIZES) as i32);
+            let numeric = derivative(step, &mut |step| {
                 for ((to, from), direction) in moved[range.clone()].iter_mut().zip(&parameters[range.clone()]).zip(&direction) {
                     *to = from + step * direction;
                 }
-                let loss = session.step(&moved, samples, dropout, fill);
-                vec![loss.unwrap_or_else(|error| {
+                if let Err(error) = values.step(&moved, samples, dropout, fill) {
                     failure = Some(error);
-                    f64::NAN
-                })]
+                }
+                let sum: f64 = (0..samples).flat_map(|sample| values.output(0, sample)).sum();
+                vec![sum / (samples as f64 * norm)]
             });
             moved[range.clone()].copy_from_slice(&parameters[range.clone()]);
             if let Some(error) = failure {
                 return Err(error.into());
             }
             if let Some(numeric) = numeric {
-                result = Some((dot(own, &direction), numeric));
+                result = Some((dot(own, &direction) / norm, numeric));
                 break;
             }
         }
@@ -326,7 +343,7 @@ pub fn graph(
             return Err(fault(format!("no smooth direction in {ATTEMPTS} draws")));
         };
         let off = distance(&[analytic], &numeric);
-        if !(off <= Tolerance::Approximate.relative_f64()) {
+        if off > Tolerance::Approximate.relative_f64() {
             return Err(fault(format!("directional derivative off by {off:e}: {analytic:e} against {numeric:?}")));
         }
     }
@@ -472,7 +489,7 @@ mod tests {
                 }
             };
             let parameters = numbers::<f64>(Stream::new(3, 0, 0, 0), recorded.parameter_count());
-            let checked = graph(&recorded, loss, &parameters, 3, None, &fill, &[], 1);
+            let checked = graph(&recorded, loss, &parameters, 3, None, &fill, &|_| false, 1);
             assert_eq!(checked.is_ok(), fine, "{fault:?}: {checked:?}");
         }
         Ok(())

@@ -1,8 +1,10 @@
 //! Planning: from a graph to two flat lists of steps and one slab in which every buffer has a fixed place.
 //!
-//! 1. Keep what the loss and the outputs need. 2. Derive the backward list: the operations on a path from a parameter (or an
-//! input whose gradient is asked for) to the loss, in reverse. 3. The first writer of each gradient sets, later ones add: no
-//! pass fills zeros. 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
+//! 1. Keep what the loss and the outputs need.
+//! 2. Derive the backward list: the operations on a path from a parameter (or an input whose gradient is asked for) to the loss,
+//!    in reverse.
+//! 3. The first writer of each gradient sets, later ones add: no pass fills zeros.
+//! 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
 //!
 //! A plan holds no numbers; `session` replays it.
 
@@ -79,7 +81,7 @@ pub(crate) struct Plan<T> {
     pub parameter_len: usize,
     /// Parameters that no path joins to the loss: their gradient is zero.
     pub unreached: Vec<Range<usize>>,
-    #[cfg_attr(not(test), expect(dead_code, reason = "the lifetimes are checked by tests"))]
+    #[cfg(test)]
     pub buffers: Vec<Buffer>,
 }
 
@@ -283,6 +285,7 @@ impl<T: Real> Plan<T> {
             slab_len,
             parameter_len: graph.parameter_count(),
             unreached,
+            #[cfg(test)]
             buffers: lifetimes.buffers,
         })
     }
@@ -335,4 +338,140 @@ fn paths<T: Real>(graph: &Graph<T>, loss: Var) -> Result<Vec<bool>> {
         return Err(Error::Shape { operation: "train", message });
     }
     Ok(from_parameter.iter().zip(&to_loss).map(|(from, to)| *from && *to).collect())
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::super::graph::Graph;
+    use super::super::op::{Forward, Op};
+    use super::super::ops::{Activation, Add, Half, Interleave, Linear, ScaleExp, SquaredError, Subtract};
+    use super::*;
+    use phyture_kernels::activation::Activation as Kind;
+    use proptest::prelude::*;
+
+    /// Rows and channels of every value of a random graph.
+    const SHAPE: [usize; 2] = [6, 3];
+
+    /// A graph of one operation for each number, on operands that the other two numbers choose among the earlier values.
+    pub(crate) fn random_graph(recipe: &[(u8, usize, usize)]) -> Result<(Graph<f64>, Var, Vec<Var>)> {
+        let mut graph = Graph::<f64>::new();
+        let mut values = vec![graph.input_with_gradient("x", &SHAPE)?];
+        for (index, &(kind, a, b)) in recipe.iter().enumerate() {
+            let (a, b) = (values[a % values.len()], values[b % values.len()]);
+            let value = match kind % 6 {
+                0 => graph.apply(Add, &[a, b])?,
+                1 => graph.apply(Subtract, &[a, b])?,
+                2 => graph.apply(Activation { kind: Kind::Tanh }, &[a])?,
+                3 => {
+                    let bounded = graph.apply(Activation { kind: Kind::Tanh }, &[b])?;
+                    graph.apply(ScaleExp, &[a, bounded])?
+                }
+                4 => {
+                    let halves = (graph.apply(Half::Even, &[a])?, graph.apply(Half::Odd, &[b])?);
+                    graph.apply(Interleave, &[halves.1, halves.0])?
+                }
+                _ => {
+                    let weight = graph.parameter(&format!("{index}.weight"), &[SHAPE[1], SHAPE[1]])?;
+                    let bias = graph.parameter(&format!("{index}.bias"), &[SHAPE[1]])?;
+                    graph.apply(Linear, &[a, weight, bias])?
+                }
+            };
+            values.push(value);
+        }
+        let target = graph.input("target", &SHAPE)?;
+        let last = values[values.len() - 1];
+        // Bounded, so that no chain of sums and exponentials leaves the range in which differences are exact enough.
+        let bounded = graph.apply(Activation { kind: Kind::Tanh }, &[last])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[bounded, target])?;
+        values.remove(0);
+        Ok((graph, loss, values))
+    }
+
+    pub(crate) fn recipe() -> impl Strategy<Value = Vec<(u8, usize, usize)>> {
+        proptest::collection::vec((0_u8..6, 0_usize..64, 0_usize..64), 1..24)
+    }
+
+    fn overlap(a: &Range<usize>, b: &Range<usize>) -> bool {
+        a.start < b.end && b.start < a.end
+    }
+
+    fn sound(plan: &Plan<f64>) -> Result<(), TestCaseError> {
+        let used: Vec<&Buffer> = plan.buffers.iter().filter(|buffer| buffer.len > 0).collect();
+        for (index, a) in used.iter().enumerate() {
+            prop_assert_eq!(a.offset % alignment::<f64>(), 0);
+            prop_assert!(a.offset + a.len <= plan.slab_len);
+            for b in &used[index + 1..] {
+                let together = a.first <= b.last && b.first <= a.last;
+                let meet = overlap(&(a.offset..a.offset + a.len), &(b.offset..b.offset + b.len));
+                prop_assert!(!(together && meet), "{:?} and {:?}", a, b);
+            }
+        }
+        for step in plan.forward.iter().chain(&plan.backward) {
+            for pieces in [&step.pieces, &step.parameter_gradients] {
+                prop_assert!(pieces.windows(2).all(|pair| pair[0].start + pair[0].len <= pair[1].start));
+            }
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn live_buffers_never_overlap_and_gradients_are_set_once(recipe in recipe()) {
+            let (graph, loss, values) = random_graph(&recipe)?;
+            let train = Plan::train(&graph, loss, &values[..1])?;
+            sound(&train)?;
+            sound(&Plan::infer(&graph, &values)?)?;
+            // Every gradient is first set, then added to.
+            let mut seen = std::collections::BTreeSet::new();
+            for step in &train.backward {
+                for piece in &step.parameter_gradients {
+                    let first = seen.insert(piece.start);
+                    prop_assert_eq!(matches!(piece.role, Role::Dx(_, Write::Set)), first);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn inference_needs_less_memory_than_training() -> Result<()> {
+        let chain: Vec<_> = (0..20).map(|at| (2, at, 0)).collect();
+        let (graph, loss, values) = random_graph(&chain)?;
+        let train = Plan::train(&graph, loss, &[])?.slab_len;
+        let infer = Plan::infer(&graph, &values[values.len() - 1..])?.slab_len;
+        // A chain needs an operand and a result at a time, beside the inputs.
+        assert!(infer * 4 < train, "{infer} against {train}");
+        Ok(())
+    }
+
+    struct OneWay;
+
+    impl Op<f64> for OneWay {
+        fn name(&self) -> &'static str {
+            "one_way"
+        }
+        fn shape(&self, operands: &[Shape]) -> Result<Shape> {
+            super::super::op::exactly::<1>("one_way", operands, "one").map(|[x]| x)
+        }
+        fn forward(&self, io: Forward<'_, f64>) {
+            io.y.copy_from_slice(io.x[0]);
+        }
+    }
+
+    #[test]
+    fn an_operation_without_backward_is_refused_by_name_only_where_it_matters() -> Result<()> {
+        let mut graph = Graph::<f64>::new();
+        let (x, target) = (graph.input("x", &[2, 2])?, graph.input("target", &[2, 2])?);
+        let weight = graph.parameter("weight", &[2, 2])?;
+        let constant = graph.apply(OneWay, &[x])?;
+        let y = graph.apply(Linear, &[constant, weight])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[y, target])?;
+        assert!(Plan::train(&graph, loss, &[]).is_ok(), "before the parameters it does no harm");
+        let lost = graph.apply(OneWay, &[y])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[lost, target])?;
+        assert!(matches!(Plan::train(&graph, loss, &[]), Err(Error::Shape { operation: "one_way", .. })));
+        assert!(Plan::infer(&graph, &[lost]).is_ok());
+        assert!(Plan::train(&graph, y, &[]).is_err(), "a loss of four numbers was accepted");
+        assert!(Plan::infer(&graph, &[weight]).is_err(), "a parameter is no output");
+        Ok(())
+    }
 }

@@ -427,3 +427,143 @@ fn carve<'a, T>(slab: &'a mut [T], pieces: &[Piece], mut take: impl FnMut(Role, 
         position = piece.start + piece.len;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gradcheck;
+    use super::super::ops::{Dropout, Linear, SquaredError};
+    use super::super::plan::tests::{random_graph, recipe};
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    const KEY: Option<DropoutKey> = Some(DropoutKey { seed: 4, step: 2 });
+
+    fn fill<T: Real>(sample: usize, inputs: &mut [&mut [T]]) {
+        for (index, input) in inputs.iter_mut().enumerate() {
+            let stream = Stream::new(1, 0, index as u64, sample as u64);
+            input.iter_mut().enumerate().for_each(|(at, value)| *value = T::of(stream.uniform(at as u64) - 0.5));
+        }
+    }
+
+    fn parameters<T: Real>(count: usize) -> Vec<T> {
+        let stream = Stream::new(2, 0, 0, 0);
+        (0..count).map(|at| T::of(stream.uniform(at as u64) - 0.5)).collect()
+    }
+
+    /// Linear, dropout, linear with the same weight, squared error; and a parameter that nothing reads.
+    fn shared_weight<T: Real>() -> Result<(Graph<T>, Var, Var)> {
+        let mut graph = Graph::<T>::new();
+        let (x, target) = (graph.input_with_gradient("x", &[5, 4])?, graph.input("target", &[5, 4])?);
+        graph.parameter("unused", &[3])?;
+        let (weight, bias) = (graph.parameter("weight", &[4, 4])?, graph.parameter("bias", &[4])?);
+        let first = graph.apply(Linear, &[x, weight, bias])?;
+        let dropped = graph.apply(Dropout { rate: 0.3 }, &[first])?;
+        let second = graph.apply(Linear, &[dropped, weight, bias])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[second, target])?;
+        Ok((graph, loss, second))
+    }
+
+    fn bits(values: &[f32]) -> Vec<u32> {
+        values.iter().map(|value| value.to_bits()).collect()
+    }
+
+    #[test]
+    fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
+        let (graph, loss, output) = shared_weight::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        // Fewer samples than shards, as many, more, and not a multiple.
+        for samples in [1, 3, SHARDS, 29] {
+            let mut found = Vec::new();
+            for threads in [1, 2, 16] {
+                let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
+                let loss = session.step(&parameters, samples, KEY, &fill)?;
+                let outputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.output(0, sample))).collect();
+                let inputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.input_gradient(0, sample))).collect();
+                assert!(session.input_gradient(1, 0).is_empty(), "a target has no gradient");
+                found.push((loss.to_bits(), bits(session.gradients()), outputs, inputs));
+            }
+            assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_batch_is_the_mean_of_its_samples_and_a_shared_weight_sums() -> Result<()> {
+        let (graph, loss, _) = shared_weight::<f64>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut session = Session::train(&graph, loss, &[], Threads(2))?;
+        // More samples first, so that nothing of them may show later.
+        session.step(&parameters, 11, None, &fill)?;
+        let whole = session.step(&parameters, 5, None, &fill)?;
+        let gradients = session.gradients().to_vec();
+        let (mut sum, mut sums) = (0.0, vec![0.0; gradients.len()]);
+        for sample in 0..5 {
+            sum += session.step(&parameters, 1, None, &|_, inputs: &mut [&mut [f64]]| fill(sample, inputs))?;
+            sums.iter_mut().zip(session.gradients()).for_each(|(sum, value)| *sum += value);
+        }
+        assert!((whole - sum / 5.0).abs() < Tolerance::Close.relative_f64());
+        assert!(gradients.iter().zip(&sums).all(|(whole, sum)| (whole - sum / 5.0).abs() < Tolerance::Close.relative_f64()));
+        assert_eq!(gradients[..3], [0.0; 3], "a parameter that nothing reads has gradient zero");
+        gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &|name| name == "unused", 3)
+            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+    }
+
+    #[test]
+    fn dropout_follows_its_key_and_is_off_without_one() -> Result<()> {
+        let (graph, loss, output) = shared_weight::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut train = Session::train(&graph, loss, &[output], Threads(1))?;
+        let mut run = |key| {
+            train.step(&parameters, 2, key, &fill)?;
+            Ok::<_, Error>(bits(train.output(0, 1)))
+        };
+        let (first, again, off) = (run(KEY)?, run(KEY)?, run(None)?);
+        let other = run(Some(DropoutKey { seed: 4, step: 3 }))?;
+        assert_eq!(first, again);
+        assert!(first != other && first != off);
+        let mut order = Vec::new();
+        let mut infer = Session::infer(&graph, &[output], Threads(2))?;
+        infer.predict(&parameters, 3, &fill, &mut |sample, output| {
+            order.push(sample);
+            assert!(sample != 1 || bits(output) == off, "inference differs from training without dropout");
+        })?;
+        assert_eq!(order, [0, 1, 2]);
+        assert!(infer.gradients().is_empty());
+        assert!(infer.step(&parameters[1..], 1, None, &fill).is_err(), "too few parameters were accepted");
+        Ok(())
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+        #[test]
+        fn random_graphs_have_exact_gradients_and_read_nothing_unwritten(recipe in recipe()) {
+            let (graph, loss, values) = random_graph(&recipe)?;
+            let parameters = parameters(graph.parameter_count());
+            let mut plain = Session::train(&graph, loss, &values, Threads(1))?;
+            let mut poisoned = Session::train(&graph, loss, &values, Threads(1))?;
+            poisoned.set_poison(true);
+            // The second step meets the first one's numbers, or NaN.
+            for _ in 0..2 {
+                let (a, b) = (plain.step(&parameters, 3, None, &fill)?, poisoned.step(&parameters, 3, None, &fill)?);
+                prop_assert_eq!(a.to_bits(), b.to_bits());
+                prop_assert_eq!(plain.gradients(), poisoned.gradients());
+                prop_assert_eq!(plain.input_gradient(0, 2), poisoned.input_gradient(0, 2));
+                for index in 0..values.len() {
+                    prop_assert_eq!(plain.output(index, 1), poisoned.output(index, 1));
+                }
+            }
+            // Keeping outputs alive changes the places of buffers, not the numbers.
+            let mut lean = Session::train(&graph, loss, &[], Threads(1))?;
+            lean.step(&parameters, 3, None, &fill)?;
+            prop_assert_eq!(lean.gradients(), plain.gradients());
+            // A parameter whose value nothing reads on has no gradient; that the others have the right one is checked.
+            let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(|value| *value == 0.0);
+            let zero = |name: &str| graph.parameters().iter().any(|parameter| parameter.name == name && still(parameter));
+            if !graph.parameters().iter().all(still) {
+                let checked = gradcheck::graph(&graph, loss, &parameters, 2, None, &fill, &zero, 5);
+                prop_assert!(checked.is_ok(), "{:?}", checked);
+            }
+        }
+    }
+}

@@ -68,7 +68,9 @@ pub enum Command {
         quick: bool,
     },
     /// Flights of the built-in truth helicopter
-    #[command(after_help = "Examples:\n  phyture simulate flights --minutes 30 --seed 7\n  phyture simulate flights --baseline --hide ground_effect --hide cyclic_lag=0.5\n  phyture simulate flights --like stanford")]
+    #[command(
+        after_help = "Examples:\n  phyture simulate flights --minutes 30 --seed 7\n  phyture simulate flights --baseline --hide ground_effect --hide cyclic_lag=0.5\n  phyture simulate flights --like stanford"
+    )]
     Simulate {
         /// Folder to write
         dir: PathBuf,
@@ -129,9 +131,9 @@ pub enum Command {
         /// Folder for the HTML page
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
-        /// Samples between evaluated windows
-        #[arg(long, default_value_t = phyture::flight::windows::TEST_STRIDE)]
-        stride: usize,
+        /// Samples between evaluated windows [default: 100 with a network, 1 without]
+        #[arg(long)]
+        stride: Option<usize>,
         /// Evaluate every flight, also those that were trained on
         #[arg(long)]
         all: bool,
@@ -142,8 +144,10 @@ pub enum Command {
         #[command(flatten)]
         division: Division,
     },
-    /// Trains the residual network; crash-safe checkpoints, Ctrl-C saves
-    #[command(after_help = "Example:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume")]
+    /// Train the residual network; crash-safe checkpoints, Ctrl-C saves
+    #[command(
+        after_help = "Example:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume"
+    )]
     Train {
         /// Flights.
         #[command(flatten)]

@@ -11,7 +11,8 @@ use std::time::{Duration, Instant};
 /// Writes the machine-readable result, to standard output for `-`.
 pub fn json(target: Option<&Path>, value: &impl Serialize) -> Result<()> {
     let Some(path) = target else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(value).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+    let mut text =
+        serde_json::to_string_pretty(value).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
     text.push('\n');
     if path == Path::new("-") {
         return std::io::stdout().write_all(text.as_bytes()).map_err(Error::io(path));
@@ -45,7 +46,10 @@ impl Progress {
     /// A bar of `steps` steps, `done` of which are behind already.
     pub fn new(what: &str, steps: u64, done: u64) -> Self {
         let plain = !std::io::stderr().is_terminal();
-        let bar = ProgressBar::with_draw_target(Some(steps), if plain { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() });
+        let bar = ProgressBar::with_draw_target(
+            Some(steps),
+            if plain { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() },
+        );
         if let Ok(style) = ProgressStyle::with_template("{prefix} {wide_bar} {pos}/{len}  {msg}  {elapsed} gone, {eta} left") {
             bar.set_style(style);
         }

@@ -1,0 +1,73 @@
+//! `calibrate`: least squares of the model's coefficients on the training part, and a model file to go on with.
+
+use super::{Context, data_sha256};
+use crate::arguments::{Data, Division};
+use phyture::flight::split::Split;
+use phyture::flight::{Column, DataSet};
+use phyture::physics::{Calibration, Entry, Model, calibrate};
+use phyture::{Error, Result};
+use serde::Serialize;
+use serde_json::{Map, Value};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Output {
+    #[serde(flatten)]
+    calibration: Calibration,
+    rmse: Map<String, Value>,
+}
+
+/// Calibrates `model` on the training part and writes it to `output`.
+pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, division: &Division) -> Result<ExitCode> {
+    let set = context.flights(data, 1)?;
+    let model = context.model(model)?;
+    let split = context.split(&set.flights, &model, division)?;
+    let (mut calibrated, calibration, rmse) = fit(context, &set, &model, &split)?;
+    calibrated.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
+    calibrated.data.split = division.split.clone().unwrap_or(calibrated.data.split);
+    let mut note = |key: &str, text: String| calibrated.provenance.insert(key.into(), Entry::Text(text));
+    note("data_sha256", data_sha256(data)?);
+    note("seed", context.seed().to_string());
+    note("version", env!("CARGO_PKG_VERSION").into());
+    note("calibrated_on", format!("{} of {} s", spans_s(&set, &split.training), set.duration_s().round()));
+    calibrated.write(output)?;
+    context.say(format!("\nwritten to {}", output.display()));
+    context.json(&Output { calibration, rmse })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn spans_s(set: &DataSet, spans: &[phyture::flight::Span]) -> f64 {
+    spans.iter().map(|span| (span.end - span.start) as f64 * set.flights[span.flight].step_s).sum::<f64>().round()
+}
+
+/// Calibrates, prints coefficients and errors, and gives the errors by part as JSON.
+pub fn fit(context: &Context, set: &DataSet, model: &Model, split: &Split) -> Result<(Model, Calibration, Map<String, Value>)> {
+    let (calibrated, calibration) = calibrate(model, &set.flights, &split.training)?;
+    context.say(format!("\n{calibration}"));
+    let parts = [
+        ("train", &split.training),
+        ("validation", &split.validation),
+        (if split.tested == phyture::flight::split::Part::Locked { "locked" } else { "test" }, &split.test),
+    ];
+    let mut rmse = Map::new();
+    context.say(format!("\nRMSE        {}", Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat()));
+    for (part, spans) in parts.into_iter().filter(|(_, spans)| !spans.is_empty()) {
+        let errors = calibrated.rmse(&set.flights, spans)?;
+        context.say(format!("{part:<11} {}", errors.map(|error| format!("{error:>9.3}")).concat()));
+        rmse.insert(part.into(), per_channel(&errors)?);
+    }
+    Ok((calibrated, calibration, rmse))
+}
+
+/// Six numbers by channel name, with their mean.
+fn per_channel(values: &[f64; 6]) -> Result<Value> {
+    let mean = values.iter().sum::<f64>() / 6.0;
+    let pairs = Column::TARGETS.iter().map(|column| column.name()).zip(values.iter().copied()).chain([("mean", mean)]);
+    pairs.map(|(name, value)| Ok((name.to_owned(), number(value)?))).collect::<Result<Map<_, _>>>().map(Value::Object)
+}
+
+fn number(value: f64) -> Result<Value> {
+    serde_json::to_value(value).map_err(|error| Error::Undetermined(error.to_string()))
+}

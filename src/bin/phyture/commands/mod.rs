@@ -1,0 +1,178 @@
+//! One file a command; here the dispatch and what several commands share: reading flights, models and splits.
+
+mod calibrate;
+mod check;
+mod compare;
+mod demo;
+mod parity;
+mod predict;
+mod simulate;
+mod train;
+
+use crate::arguments::{Arguments, Command, Common, Data, Division};
+use crate::output;
+use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::split::{BENCHMARK_SEED, Split};
+use phyture::flight::{DataSet, Flight};
+use phyture::physics::Model;
+use phyture::tape::Threads;
+use phyture::{Error, Result};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Exit code of a check that failed.
+const CHECK_FAILED: u8 = 3;
+
+/// Runs the command that was asked for.
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let context = Context { common: &arguments.common };
+    context.limit_threads();
+    match &arguments.command {
+        Command::Demo { out, quick } => demo::run(&context, out, *quick),
+        Command::Simulate { dir, minutes, hide, baseline, like, layout } => {
+            let wanted = simulate::Wanted { minutes: *minutes, hide, baseline: *baseline, like: like.as_deref(), layout };
+            simulate::run(&context, dir, &wanted)
+        }
+        Command::Check { data, model } => check::run(&context, data, model.as_deref()),
+        Command::Calibrate { data, model, output, division } => calibrate::run(&context, data, model.as_deref(), output, division),
+        Command::Compare { data, model, network, report, stride, all, ridge, division } => {
+            let wanted = compare::Wanted {
+                models: model,
+                networks: network,
+                report: report.as_deref(),
+                stride: *stride,
+                all: *all,
+                ridge: *ridge,
+            };
+            compare::run(&context, data, &wanted, division)
+        }
+        Command::Train { data, model, output, config, resume, division } => {
+            train::run(&context, data, &train::Wanted { model, output, config: config.as_deref(), resume: *resume }, division)
+        }
+        Command::Predict { data, model, network, output, stride } => {
+            predict::run(&context, data, &predict::Wanted { model: model.as_deref(), network, output, stride: *stride })
+        }
+        Command::Parity { file } => parity::run(&context, file),
+    }
+}
+
+/// The options of every command, and the ways of speaking that follow from them.
+pub struct Context<'a> {
+    common: &'a Common,
+}
+
+impl Context<'_> {
+    /// Text for a person.
+    pub fn say(&self, text: impl std::fmt::Display) {
+        output::say(self.common.json.as_deref(), text);
+    }
+
+    /// The machine-readable result.
+    pub fn json(&self, value: &impl serde::Serialize) -> Result<()> {
+        output::json(self.common.json.as_deref(), value)
+    }
+
+    /// Threads of a session; 0 is all cores.
+    pub fn threads(&self) -> Threads {
+        Threads(self.common.threads.unwrap_or(0))
+    }
+
+    /// The seed, or the paper's.
+    pub fn seed(&self) -> u64 {
+        self.common.seed.unwrap_or(BENCHMARK_SEED)
+    }
+
+    fn limit_threads(&self) {
+        if let Some(threads) = self.common.threads.filter(|threads| *threads > 0) {
+            // It can be built once in a process; this is the once.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+        }
+    }
+
+    /// Reads the flights, and says what the reader has to say.
+    pub fn flights(&self, data: &Data, history: usize) -> Result<DataSet> {
+        let options = ReadOptions {
+            minimum_rows: history,
+            split_at_gaps: data.split_at_gaps,
+            dataset: data.dataset.clone(),
+            ..ReadOptions::default()
+        };
+        let set = data_set(&data.data, &options)?;
+        self.say(format!(
+            "{}: {} flights, {} manoeuvre classes, {:.0} s at {:.0} Hz",
+            data.data.display(),
+            set.flights.len(),
+            set.manoeuvres().len(),
+            set.duration_s(),
+            1.0 / set.flights.first().map_or(f64::NAN, |flight| flight.step_s)
+        ));
+        set.notes.iter().for_each(|note| self.say(format!("  note: {note}")));
+        Ok(set)
+    }
+
+    /// The model of a file; without one, the paper's baseline for the vehicle of the paper.
+    pub fn model(&self, path: Option<&Path>) -> Result<Model> {
+        match path {
+            Some(path) => Model::read(path),
+            None => Model::from_toml("[model]\nbaseline = \"paper\"\n", Path::new("paper")),
+        }
+    }
+
+    /// Divides the flights as the command line and the model file say.
+    pub fn split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
+        let mut locked = model.data.locked.clone();
+        locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
+        let protocol = division.split.clone().unwrap_or_else(|| model.data.split.clone());
+        if division.split.is_some() && !locked.is_empty() {
+            return Err(Error::Config {
+                place: "command line".into(),
+                field: "--split".into(),
+                found: format!("`{protocol}` with locked flights ({})", locked.join(", ")),
+                expected: "one or the other: locked flights are the test part and all others train".into(),
+            });
+        }
+        Split::new(flights, &locked, &protocol, self.seed())
+    }
+}
+
+/// SHA-256 of the names and contents of all files of a data set, and of the description they are read by.
+pub fn data_sha256(data: &Data) -> Result<String> {
+    let mut files = Vec::new();
+    list(&data.data, &mut files)?;
+    files.extend(data.dataset.iter().cloned());
+    files.sort();
+    let mut digest = Sha256::new();
+    for file in files {
+        let bytes = std::fs::read(&file).map_err(Error::io(&file))?;
+        digest.update(file.strip_prefix(&data.data).unwrap_or(Path::new("")).to_string_lossy().as_bytes());
+        digest.update((bytes.len() as u64).to_le_bytes());
+        digest.update(&bytes);
+    }
+    Ok(digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+fn list(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
+    if !path.is_dir() {
+        files.push(path.into());
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(path).map_err(Error::io(path))? {
+        let entry = entry.map_err(Error::io(path))?.path();
+        if !entry.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')) {
+            list(&entry, files)?;
+        }
+    }
+    Ok(())
+}
+
+/// A flag that Ctrl-C (and a polite kill) raises. Installed once.
+pub fn interruption() -> Result<Arc<AtomicBool>> {
+    let flag = Arc::new(AtomicBool::new(false));
+    let raised = Arc::clone(&flag);
+    ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))
+        .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
+    Ok(flag)
+}

@@ -1,0 +1,161 @@
+//! `train`: the residual network of a calibrated model.
+
+use super::{Context, data_sha256, interruption};
+use crate::arguments::{Data, Division};
+use crate::output::Progress;
+use phyture::flight::split::Split;
+use phyture::flight::windows::windows;
+use phyture::flight::{DataSet, Window};
+use phyture::hybrid::{Description, Hybrid, sequence};
+use phyture::physics::Model;
+use phyture::train::{Outcome, RunFolder, TrainConfig, Trainer};
+use phyture::{Error, Result};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// What was asked for.
+pub struct Wanted<'a> {
+    /// Model file.
+    pub model: &'a Path,
+    /// Run folder.
+    pub output: &'a Path,
+    /// Training configuration.
+    pub config: Option<&'a Path>,
+    /// Go on from the checkpoint.
+    pub resume: bool,
+}
+
+/// What `--json` writes.
+#[derive(Serialize)]
+struct Output {
+    network: PathBuf,
+    parameters: usize,
+    windows: usize,
+    steps: u64,
+    /// Mean loss over the steps of the last epoch, (m/s²)² + (rad/s²)².
+    last_epoch_loss: f64,
+    seconds: f64,
+}
+
+/// Trains on the training part, with checkpoints, until the end or Ctrl-C.
+pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
+    let mut config = wanted.config.map_or_else(|| Ok(TrainConfig::default()), TrainConfig::read)?;
+    config.seed = context.common.seed.unwrap_or(config.seed);
+    let set = context.flights(data, config.network.history)?;
+    let model = Model::read(wanted.model)?;
+    let split = context.split(&set.flights, &model, division)?;
+    let identity = format!("{}\n{}\n{split:?}", data_sha256(data)?, model.to_toml()?);
+    let interrupted = interruption()?;
+    let output = fit(context, &set, &split, &model, &config, &identity, wanted, &interrupted)?;
+    context.json(&output)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The run itself; `identity` tells one set of training data from another when a run is resumed.
+fn fit(
+    context: &Context,
+    set: &DataSet,
+    split: &Split,
+    model: &Model,
+    config: &TrainConfig,
+    identity: &str,
+    wanted: &Wanted,
+    interrupted: &AtomicBool,
+) -> Result<Output> {
+    let begun = Instant::now();
+    let job = Job::new(set, split, model, config)?;
+    let folder = RunFolder::create(wanted.output)?;
+    let digest = Sha256::digest(identity.as_bytes());
+    let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    let state = wanted.resume.then(|| folder.resume(config, digest)).transpose()?;
+    let network = job.description.network(config.standardise_loss)?;
+    let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
+    context.say(format!(
+        "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs",
+        network.graph().parameter_count(),
+        job.windows.len(),
+        config.network.history,
+        trainer.steps(),
+        config.batch,
+        config.epochs
+    ));
+    let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
+    let (mut sum, mut count, mut epoch) = (0.0, 0_u32, 0);
+    let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
+        if report.step.epoch != epoch {
+            (sum, count, epoch) = (0.0, 0, report.step.epoch);
+        }
+        sum += report.step.loss;
+        count += 1;
+        progress.at(report.step.step, || format!("loss {:.4}  rate {:.2e}", sum / f64::from(count), report.step.rate));
+        !interrupted.load(Ordering::Relaxed)
+    })?;
+    drop(progress);
+    if outcome == Outcome::Stopped {
+        let saved = format!(
+            "saved after step {} of {} in {}; go on with --resume",
+            trainer.state().step,
+            trainer.steps(),
+            folder.checkpoint().display()
+        );
+        return Err(Error::Interrupted { saved });
+    }
+    let hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
+    hybrid.write(&folder.network())?;
+    let last_epoch_loss = sum / f64::from(count.max(1));
+    context.say(format!(
+        "trained in {:.0} s, mean loss of the last epoch {last_epoch_loss:.4}; written to {}",
+        begun.elapsed().as_secs_f64(),
+        folder.network().display()
+    ));
+    Ok(Output {
+        network: folder.network(),
+        parameters: network.graph().parameter_count(),
+        windows: job.windows.len(),
+        steps: trainer.steps(),
+        last_epoch_loss,
+        seconds: begun.elapsed().as_secs_f64(),
+    })
+}
+
+/// Training data and what the hybrid will be, but for its weights.
+struct Job {
+    description: Description,
+    sequences: Vec<sequence::Sequence>,
+    windows: Vec<Window>,
+}
+
+impl Job {
+    fn new(set: &DataSet, split: &Split, model: &Model, config: &TrainConfig) -> Result<Self> {
+        config.check()?;
+        let scaling = sequence::scaling(&set.flights, &split.training, model, &config.inputs, &config.network)?;
+        let sequences = sequence::sequences(&set.flights, model, &config.inputs, &scaling, &config.network)?;
+        let description = Description {
+            model: model.clone(),
+            config: config.network.clone(),
+            inputs: config.inputs.clone(),
+            scaling,
+            step_s: set.flights.first().map_or(0.01, |flight| flight.step_s),
+        };
+        Ok(Self { description, sequences, windows: windows(&split.training, config.network.history, config.stride) })
+    }
+}
+
+/// Trains without files to read: the demo's way in.
+pub fn train_in(
+    context: &Context,
+    set: &DataSet,
+    split: &Split,
+    model: &Model,
+    config: &TrainConfig,
+    output: &Path,
+    interrupted: &AtomicBool,
+) -> Result<Hybrid> {
+    let wanted = Wanted { model: Path::new(""), output, config: None, resume: false };
+    fit(context, set, split, model, config, "", &wanted, interrupted)?;
+    Hybrid::read(&RunFolder::create(output)?.network())
+}

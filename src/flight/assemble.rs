@@ -1,0 +1,297 @@
+//! From one raw table to flights: timing, repair, conversion, resampling, derivation, row filter, cuts, in this order.
+//!
+//! Each step's arithmetic is in its own file; here stands the order, and what a person is told about it.
+
+use super::convert::{Columns, check_finite, convert, source};
+use super::derived::{DERIVED, derived};
+use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
+use super::resample::Resampler;
+use super::schema::Schema;
+use super::table::RawTable;
+use super::timing::{Part, parts};
+use super::{Column, Flight, Targets, attitude, repair};
+use crate::error::Result;
+use crate::formula::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// What the reader's options say about each flight.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cuts {
+    pub minimum_rows: usize,
+    pub split_at_gaps: bool,
+}
+
+/// The flights of one file and what was done to them.
+#[derive(Debug, Default)]
+pub(super) struct Assembled {
+    pub flights: Vec<Flight>,
+    /// Sentences about this file alone, which start with its flight's name.
+    pub own_notes: Vec<String>,
+    /// Sentences that may hold for many files alike.
+    pub common_notes: BTreeSet<String>,
+}
+
+/// Makes the flights of one table.
+///
+/// # Errors
+/// [`Error::Cell`](crate::Error::Cell) and [`Error::Log`](crate::Error::Log) for everything that [`super::read`] lists; [`Error::Formula`](crate::Error::Formula), [`Error::Config`](crate::Error::Config) for what
+/// the description asks of this file in vain.
+pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
+    let covered = schema.repairs.iter().flat_map(|rule| rule.columns.iter().map(String::as_str)).collect();
+    check_finite(&table, &covered)?;
+    let Some((time_s, time_name)) = source(&table, schema, 1.0, "t")? else {
+        return Err(table.cell_of_header("t", "no such column in the header", "time in s, or under `columns` what gives it"));
+    };
+    let parts = parts(&table, &time_name, &time_s, schema.resample_hz.is_some(), cuts.split_at_gaps)?;
+    let mut done = Assembled::default();
+    let mut pieces = Vec::new();
+    for part in &parts {
+        if part.gap_before_s > 0.0 {
+            let gap = format!("`{name}`: cut at a jump of {:.3} s before t = {:.3} s", part.gap_before_s, part.start_s);
+            done.own_notes.push(gap);
+        }
+        if parts.len() > 1 && too_short(part.rows.len(), part.step_s, schema, cuts) {
+            done.own_notes.push(left_out(name, part.rows.len(), part.start_s, part.step_s));
+            continue;
+        }
+        let rows = if parts.len() == 1 { table.clone() } else { table.slice(part.rows.clone()) };
+        let times = time_s.get(part.rows.clone()).unwrap_or_default();
+        let made = of_part(rows, times, part, (name, manoeuvre, pieces.len()), schema, cuts, &mut done)?;
+        pieces.extend(made);
+    }
+    let uncut = parts.len() == 1 && schema.rows.is_empty();
+    if let [only] = pieces.as_slice()
+        && uncut
+        && only.len() < cuts.minimum_rows
+    {
+        let expected = format!("at least {}, the length of the history", cuts.minimum_rows);
+        return Err(table.fault(format!("{} samples", only.len()), expected));
+    }
+    if let [only] = pieces.as_mut_slice() {
+        only.name = name.to_owned();
+    }
+    done.flights = pieces;
+    Ok(done)
+}
+
+fn too_short(rows: usize, step_s: f64, schema: &Schema, cuts: Cuts) -> bool {
+    rows < cuts.minimum_rows.max(1) || (rows as f64) * step_s < schema.minimum_length_s
+}
+
+fn left_out(name: &str, rows: usize, start_s: f64, step_s: f64) -> String {
+    let length_s = rows as f64 * step_s;
+    format!(
+        "`{name}`: the piece of {length_s:.2} s ({rows} sample{}) from t = {start_s:.2} s on is left out as too short",
+        if rows == 1 { "" } else { "s" }
+    )
+}
+
+/// The flights of a part without jumps, numbered on from those made before.
+fn of_part(
+    mut table: RawTable,
+    time_s: &[f64],
+    part: &Part,
+    (name, manoeuvre, made_before): (&str, &str, usize),
+    schema: &Schema,
+    cuts: Cuts,
+    done: &mut Assembled,
+) -> Result<Vec<Flight>> {
+    if let Some(note) = repair::repair(&mut table, &schema.repairs, part.step_s)? {
+        done.own_notes.push(format!("`{name}`: {note}"));
+    }
+    let mut columns = convert(&table, schema, part.step_s)?;
+
+    let (mut start_s, mut step_s) = (part.start_s, part.step_s);
+    let mut new_times = None;
+    if let Some(hz) = schema.resample_hz {
+        let resampler = Resampler::new(time_s, 1.0 / hz).map_err(|error| table.fault(error.to_string(), "a longer flight"))?;
+        resample(&mut columns, &resampler);
+        done.common_notes.insert(format!("resampled from {:.2} Hz to {hz} Hz with a local cubic", 1.0 / part.step_s));
+        (start_s, step_s) = (time_s.first().copied().unwrap_or(start_s), 1.0 / hz);
+        new_times = Some(resampler.time_s);
+    }
+    let row_of = |sample: usize| match &new_times {
+        Some(times) => time_s.partition_point(|&time| time < times[sample]).min(time_s.len().saturating_sub(1)),
+        None => sample,
+    };
+    let absent = fill_absent(&mut columns, schema, step_s, done);
+    let targets = derive(&table, &mut columns, schema, step_s, done)?;
+    let samples = columns.get(Column::Vx).map_or(0, <[f64]>::len);
+
+    let used = rows_in_use(&columns, &absent, schema, samples, step_s)?;
+    let runs = runs(&used);
+    if !schema.rows.is_empty() {
+        let kept = used.iter().filter(|&&used| used).count();
+        done.own_notes.push(format!(
+            "`{name}`: `use` keeps {kept} of {samples} samples, in {} piece{}",
+            runs.len(),
+            if runs.len() == 1 { "" } else { "s" }
+        ));
+    }
+    let mut flights = Vec::new();
+    let whole = runs.len() == 1 && runs[0].len() == samples;
+    for run in runs {
+        let run_start_s = start_s + step_s * run.start as f64;
+        if !whole && too_short(run.len(), step_s, schema, cuts) {
+            done.own_notes.push(left_out(name, run.len(), run_start_s, step_s));
+            continue;
+        }
+        check_used(&table, &columns, &run, &row_of)?;
+        let cut = |values: &[f64]| values.get(run.clone()).unwrap_or_default().to_vec();
+        let canonical = std::array::from_fn(|column| columns.canonical[column].as_deref().map(cut).unwrap_or_default());
+        let number = made_before + flights.len() + 1;
+        let mut flight = Flight::new(format!("{name}[{number}]"), manoeuvre, run_start_s, step_s, canonical, targets)?;
+        flight.absent = absent.clone();
+        flight.extra = columns.extra.iter().map(|(name, values)| (name.clone(), cut(values))).collect();
+        flights.push(flight);
+    }
+    Ok(flights)
+}
+
+/// Every column to the new times; attitude as a quaternion, so that wrapped angles and loops cost nothing.
+fn resample(columns: &mut Columns, resampler: &Resampler) {
+    let angles = [Column::Roll, Column::Pitch, Column::Yaw];
+    let no_yaw = columns.get(Column::Yaw).is_none();
+    let (roll, pitch) = (columns.get(Column::Roll).unwrap_or_default(), columns.get(Column::Pitch).unwrap_or_default());
+    let mut parts: [Vec<f64>; 4] = Default::default();
+    let mut before = [0.0, 0.0, 0.0, 1.0];
+    for (row, (&roll, &pitch)) in roll.iter().zip(pitch).enumerate() {
+        let yaw = columns.get(Column::Yaw).and_then(|yaw| yaw.get(row)).copied().unwrap_or(0.0);
+        let mut quaternion = attitude::euler_to_quaternion(roll, pitch, yaw);
+        // q and -q are one attitude: stay on the side of the sample before.
+        if quaternion.iter().zip(before).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
+            quaternion = quaternion.map(|part| -part);
+        }
+        before = quaternion;
+        parts.iter_mut().zip(quaternion).for_each(|(values, part)| values.push(part));
+    }
+    let parts = parts.map(|values| resampler.apply(&values));
+    let mut euler: [Vec<f64>; 3] = Default::default();
+    for sample in 0..parts[0].len() {
+        let angles = attitude::quaternion_to_euler([parts[0][sample], parts[1][sample], parts[2][sample], parts[3][sample]]);
+        euler.iter_mut().zip(angles).for_each(|(values, angle)| values.push(angle));
+    }
+    for column in Column::ALL.into_iter().filter(|column| !angles.contains(column)) {
+        let values = &mut columns.canonical[column as usize];
+        *values = values.take().map(|values| resampler.apply(&values));
+    }
+    for (column, values) in angles.into_iter().zip(euler) {
+        columns.canonical[column as usize] = (column != Column::Yaw || !no_yaw).then_some(values);
+    }
+    columns.extra.values_mut().for_each(|values| *values = resampler.apply(values));
+}
+
+/// Position that a log lacks is zero; heading is the integral of the Euler yaw rate from zero.
+fn fill_absent(columns: &mut Columns, schema: &Schema, step_s: f64, done: &mut Assembled) -> Vec<Column> {
+    let absent: Vec<Column> =
+        [Column::X, Column::Y, Column::Z, Column::Yaw].into_iter().filter(|&column| columns.get(column).is_none()).collect();
+    let samples = columns.get(Column::Vx).map_or(0, <[f64]>::len);
+    for &column in &absent {
+        if column != Column::Yaw {
+            columns.canonical[column as usize] = Some(vec![0.0; samples]);
+            done.common_notes.insert(format!("`{}` is not in the logs and is zero", column.name()));
+        }
+    }
+    if absent.contains(&Column::Yaw) {
+        let column = |column| columns.get(column).unwrap_or_default();
+        let (roll, pitch) = (column(Column::Roll), column(Column::Pitch));
+        let (p, q, r) = (column(Column::Wx), column(Column::Wy), column(Column::Wz));
+        let rate = |row: usize| attitude::euler_rates(roll[row], pitch[row], [p[row], q[row], r[row]])[2];
+        let mut yaw = vec![0.0; samples];
+        for row in 1..samples {
+            yaw[row] = yaw[row - 1] + 0.5 * step_s * (rate(row - 1) + rate(row));
+        }
+        columns.canonical[Column::Yaw as usize] = Some(yaw);
+        done.common_notes.insert("`yaw` is not in the logs and is the integral of the Euler yaw rate from zero".into());
+    }
+    debug_assert!(schema.missing.len() >= absent.len());
+    absent
+}
+
+/// Accelerations that the log lacks, by the differentiator.
+fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64, done: &mut Assembled) -> Result<Targets> {
+    let mut targets = schema.target_origin;
+    if targets == Targets::Derived {
+        done.common_notes.insert("the accelerations in the logs were derived from v and w, as dataset.toml says".into());
+    }
+    for (kind, first, of) in [("linear", Column::VxDot, Column::Vx), ("angular", Column::WxDot, Column::Wx)] {
+        if columns.get(first).is_some() {
+            continue;
+        }
+        let cutoff_hz = schema.cutoff_hz.unwrap_or(DEFAULT_CUTOFF_HZ.min(HIGHEST_CUTOFF / step_s));
+        let differentiator = Differentiator::new(step_s, cutoff_hz)?;
+        for axis in 0..3 {
+            let values = columns.canonical[of as usize + axis].as_deref().unwrap_or_default();
+            let derivative =
+                differentiator.derivative(values).map_err(|error| table.fault(error.to_string(), "a longer flight"))?;
+            columns.canonical[first as usize + axis] = Some(derivative);
+        }
+        let symbol = if of == Column::Vx { "v" } else { "w" };
+        done.common_notes.insert(format!(
+            "{kind} accelerations are derived from {symbol} by a zero-phase differentiator (-3 dB at {cutoff_hz} Hz)"
+        ));
+        targets = Targets::Derived;
+    }
+    Ok(targets)
+}
+
+/// Which samples the filter keeps; all without one.
+fn rows_in_use(columns: &Columns, absent: &[Column], schema: &Schema, samples: usize, step_s: f64) -> Result<Vec<bool>> {
+    let mut used = vec![true; samples];
+    let canonical = |column: Column| if absent.contains(&column) { None } else { columns.get(column) };
+    let get = |name: &str| -> Option<Value> {
+        if let Some(column) = Column::from_name(name) {
+            return canonical(column).map(Value::from);
+        }
+        columns.extra.get(name).map(Value::from).or_else(|| derived(name, &canonical).map(Value::from))
+    };
+    for formula in &schema.rows {
+        let names = Column::ALL.map(Column::name).into_iter().chain(columns.extra.keys().map(String::as_str));
+        let known: Vec<&str> = names.chain(DERIVED.map(|entry| entry.0)).filter(|name| get(name).is_some()).collect();
+        formula.check_names(&known)?;
+        let holds = formula.evaluate(samples, step_s, &get)?;
+        used.iter_mut().zip(holds).for_each(|(used, holds)| *used &= holds.is_finite() && holds != 0.0);
+    }
+    Ok(used)
+}
+
+/// Runs of true.
+fn runs(used: &[bool]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for at in (0..used.len()).filter(|&at| used[at]) {
+        match runs.last_mut() {
+            Some(run) if run.end == at => run.end += 1,
+            _ => runs.push(at..at + 1),
+        }
+    }
+    runs
+}
+
+/// Refuses a row in use with a cell that no rule could repair, or a formula that gives no number.
+fn check_used(table: &RawTable, columns: &Columns, run: &Range<usize>, row_of: &dyn Fn(usize) -> usize) -> Result<()> {
+    let canonical = Column::ALL.into_iter().filter_map(|column| columns.get(column).map(|values| (column.name(), values)));
+    for (name, values) in canonical.chain(columns.extra.iter().map(|(name, values)| (name.as_str(), values.as_slice()))) {
+        let part = values.get(run.clone()).unwrap_or_default();
+        if let Some(at) = part.iter().position(|value| !value.is_finite()) {
+            let found = "no number, in a row that `use` keeps".to_owned();
+            let expected = "a value that the repair rules can bridge and the formulas give; widen `max_gap_s` or narrow `use`";
+            return Err(table.cell(row_of(run.start + at), name, found, expected));
+        }
+    }
+    Ok(())
+}
+
+/// Common notes of many files, each with the flights it holds for.
+pub(super) fn gather(notes: BTreeMap<String, Vec<String>>, files: usize) -> Vec<String> {
+    let mut sentences = Vec::new();
+    for (note, names) in notes {
+        let which = match names.as_slice() {
+            names if names.len() == files && files > 1 => format!("all {files} logs"),
+            [first, second, third, _, ..] => format!("`{first}`, `{second}`, `{third}` and {} more", names.len() - 3),
+            few => few.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "),
+        };
+        sentences.push(format!("{which}: {note}"));
+    }
+    sentences
+}

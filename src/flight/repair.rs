@@ -1,0 +1,107 @@
+//! Known-bad cells of sensor columns, bridged by rules that the dataset description states, and counted. Nothing else is mended.
+
+use super::schema::Repair;
+use super::table::RawTable;
+use crate::error::Result;
+use crate::formula::Value;
+
+/// Applies the rules: runs of bad cells up to the rule's length are interpolated linearly between their good neighbours; bad
+/// cells that cannot be (longer runs, ends of the record) become NaN, to be refused if a row in use holds them.
+///
+/// Returns what was found and done, in words; `None` if no cell was bad.
+///
+/// # Errors
+/// [`Error::Cell`](crate::Error::Cell) if a rule's column is not in the file.
+pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Result<Option<String>> {
+    let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
+    for rule in rules {
+        for name in &rule.columns {
+            let Some(index) = table.index(name) else {
+                let known = table.names.join(", ");
+                let found = "no such column, though a repair rule of dataset.toml names it";
+                return Err(table.cell_of_header(name, found, format!("one of {known}")));
+            };
+            let values = &mut table.columns[index];
+            let mut bad: Vec<bool> = values.iter().map(|value| !value.is_finite()).collect();
+            for formula in &rule.valid {
+                let holds = formula.evaluate(values.len(), step_s, &|_| Some(Value::from(values.as_slice())))?;
+                // Not equal to one, so that a comparison with NaN counts as bad.
+                bad.iter_mut().zip(holds).for_each(|(bad, holds)| *bad |= holds != 1.0);
+            }
+            let count = bridge(values, &bad, rule.max_gap_s / step_s);
+            found += count.found;
+            longest = longest.max(count.longest_bridged);
+            if count.bridged > 0 {
+                bridged.push(format!("{} of `{name}`", count.bridged));
+            }
+            if count.found > count.bridged {
+                left.push(format!("{} of `{name}`", count.found - count.bridged));
+            }
+        }
+    }
+    if found == 0 {
+        return Ok(None);
+    }
+    let mut sentences = Vec::new();
+    if !bridged.is_empty() {
+        let longest_s = longest as f64 * step_s;
+        sentences.push(format!("bad cells interpolated linearly, longest run {longest_s:.3} s: {}", bridged.join(", ")));
+    }
+    if !left.is_empty() {
+        sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
+    }
+    Ok(Some(sentences.join("; ")))
+}
+
+#[derive(Default)]
+struct Count {
+    found: usize,
+    bridged: usize,
+    longest_bridged: usize,
+}
+
+fn bridge(values: &mut [f64], bad: &[bool], longest: f64) -> Count {
+    let mut count = Count::default();
+    let mut start = 0;
+    while let Some(offset) = bad[start..].iter().position(|&bad| bad) {
+        let first = start + offset;
+        let length = bad[first..].iter().position(|&bad| !bad).unwrap_or(bad.len() - first);
+        let end = first + length;
+        count.found += length;
+        // A hundredth of a sample for the rounding of the quotient.
+        if first > 0 && end < values.len() && length as f64 <= longest + 0.01 {
+            let (before, after) = (values[first - 1], values[end]);
+            for (step, value) in values[first..end].iter_mut().enumerate() {
+                *value = before + (after - before) * (step + 1) as f64 / (length + 1) as f64;
+            }
+            count.bridged += length;
+            count.longest_bridged = count.longest_bridged.max(length);
+        } else {
+            values[first..end].fill(f64::NAN);
+        }
+        start = end;
+    }
+    count
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formula::Formula;
+
+    #[test]
+    fn short_runs_are_bridged_long_ones_and_ends_are_not() -> Result<()> {
+        let nan = f64::NAN;
+        let values = vec![nan, 1.0, nan, 9999.0, 4.0, 5.0, -1.0, nan, nan, 9.0];
+        let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
+        let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
+        let rule = Repair { columns: vec!["m1".into()], valid, max_gap_s: 0.02 };
+        let note = repair(&mut table, &[rule], 0.01)?;
+        let found = &table.columns[0];
+        assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert!(found[0].is_nan() && found[6..9].iter().all(|value| value.is_nan()));
+        let expected = "bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`; bad cells left without a value: 4 of `m1`";
+        assert_eq!(note.as_deref(), Some(expected));
+        Ok(())
+    }
+}

@@ -1,0 +1,109 @@
+//! Resampling of a log to another constant rate, also from stamps that jitter.
+//!
+//! The value at each new time is that of a local cubic with a cos² window (see `local_polynomial`) whose half-width is 2.5 of the
+//! longer of the two steps: zero-phase, exact on cubics, and band-limiting when the new rate is the lower one (−3 dB near 0.37,
+//! under 10 % beyond 0.7 of the new rate).
+
+use super::local_polynomial::{Quantity, weights};
+use crate::error::{Error, Result};
+
+/// Half-width of the window in steps.
+const HALF_WIDTH_STEPS: f64 = 2.5;
+
+/// New times and, for each, the first old sample and the weights that give the value there.
+pub(super) struct Resampler {
+    /// The new times, s.
+    pub time_s: Vec<f64>,
+    taps: Vec<(usize, Vec<f64>)>,
+}
+
+impl Resampler {
+    /// From samples at increasing `time_s` to one every `step_s` from the first time on.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] for fewer than four samples.
+    pub fn new(time_s: &[f64], step_s: f64) -> Result<Self> {
+        let few = || Error::Undetermined(format!("{} samples are too few to resample; four are needed", time_s.len()));
+        let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else { return Err(few()) };
+        if time_s.len() < 4 {
+            return Err(few());
+        }
+        let old_step_s = (last - first) / (time_s.len() - 1) as f64;
+        // Rounding must not lose the last sample.
+        let count = ((last - first) / step_s * (1.0 + 4.0 * f64::EPSILON)) as usize + 1;
+        let new_s: Vec<f64> = (0..count).map(|sample| first + step_s * sample as f64).collect();
+        let taps = new_s.iter().map(|&at| taps(time_s, at, HALF_WIDTH_STEPS * step_s.max(old_step_s)).ok_or_else(few));
+        Ok(Self { taps: taps.collect::<Result<_>>()?, time_s: new_s })
+    }
+
+    /// One column at the new times.
+    pub fn apply(&self, values: &[f64]) -> Vec<f64> {
+        let dot = |(start, weights): &(usize, Vec<f64>)| weights.iter().zip(&values[*start..]).map(|(w, y)| w * y).sum();
+        self.taps.iter().map(dot).collect()
+    }
+}
+
+/// Near an end, or where stamps are sparse, the window is widened until the cubic is determined.
+fn taps(time_s: &[f64], at: f64, half_width_s: f64) -> Option<(usize, Vec<f64>)> {
+    let mut half_width_s = half_width_s;
+    for _ in 0..40 {
+        let start = time_s.partition_point(|&time| time <= at - half_width_s);
+        let end = time_s.partition_point(|&time| time < at + half_width_s);
+        if end >= start + 4 {
+            let offsets: Vec<f64> = time_s[start..end].iter().map(|time| time - at).collect();
+            if let Some(weights) = weights(&offsets, half_width_s, 3, Quantity::Value) {
+                return Some((start, weights));
+            }
+        }
+        half_width_s *= 1.3;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+    use std::f64::consts::PI;
+
+    proptest! {
+        #[test]
+        fn cubics_are_exact_to_the_ends(
+            b in prop::array::uniform4(-2.0..2.0), jitter in prop::collection::vec(-0.3..0.3, 60), hz in 20.0..400.0,
+        ) {
+            let times: Vec<f64> = jitter.iter().enumerate().map(|(k, jitter)| 0.0081 * (k as f64 + jitter)).collect();
+            let value = |t: f64| b[0] + t * (b[1] + t * (b[2] + t * b[3]));
+            let resampler = Resampler::new(&times, 1.0 / hz)?;
+            let values: Vec<f64> = times.iter().map(|&t| value(t)).collect();
+            for (found, &at) in resampler.apply(&values).iter().zip(&resampler.time_s) {
+                prop_assert!((found - value(at)).abs() <= Tolerance::Approximate.relative_f64());
+            }
+        }
+    }
+
+    #[test]
+    fn the_same_rate_keeps_every_sample_time_and_almost_the_values() -> Result<()> {
+        let times: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
+        let resampler = Resampler::new(&times, 0.01)?;
+        assert_eq!(resampler.time_s.len(), 100);
+        let wave: Vec<f64> = times.iter().map(|t| (2.0 * PI * 5.0 * t).sin()).collect();
+        // 5 Hz at 100 Hz: the cubic's gain differs from 1 by less than 1 %.
+        assert!(resampler.apply(&wave).iter().zip(&wave).all(|(a, b)| (a - b).abs() < 0.01));
+        Ok(())
+    }
+
+    #[test]
+    fn what_the_lower_rate_cannot_show_is_stopped() -> Result<()> {
+        let times: Vec<f64> = (0..2000).map(|k| 0.001 * f64::from(k)).collect();
+        let resampler = Resampler::new(&times, 0.01)?;
+        let amplitude = |hz: f64| {
+            let wave: Vec<f64> = times.iter().map(|t| (2.0 * PI * hz * t).cos()).collect();
+            let found = resampler.apply(&wave);
+            found[10..found.len() - 10].iter().fold(0.0_f64, |largest, value| largest.max(value.abs()))
+        };
+        // As stated at the head of the file; 100 Hz is the new rate, where a plain choice of samples would give 1.
+        assert!(amplitude(70.0) < 0.1 && amplitude(100.0) < 0.1, "{} {}", amplitude(70.0), amplitude(100.0));
+        Ok(())
+    }
+}

@@ -1,0 +1,433 @@
+//! `dataset.toml`: how logs that are not in the canonical form are to be read. Strict: an unknown key is an error.
+//!
+//! This file parses the description and checks what can be checked without a log; applying it is `assemble`'s. The keys:
+//!
+//! | key | meaning |
+//! | --- | --- |
+//! | `axes` | `"NED/FRD"` (default), `"ENU/FLU"`, `"NWU/FLU"`: axes of position, attitude, velocity, rates and accelerations |
+//! | `velocity` | `"body"` (default) or `"inertial"`: components of `vx vy vz` |
+//! | `targets` | what `vx_dot vy_dot vz_dot` hold: `"derivative"` (default) of the body components; `"specific_force"`, as an accelerometer; `"inertial"`, the derivative of the inertial velocity in inertial axes; `"body_acceleration"`, the same in body axes |
+//! | `target_origin` | `"recorded"` (default) or `"derived"`: accelerations in the file that were computed from `v` and `w` |
+//! | `[columns]` | `vx = "v_nose"`, a column of the file, or a formula of its columns, or a list of which the first that the file can give is taken |
+//! | `[units]` | unit by column or group: `angles = "deg"`, `rates = "deg/s"`, `acceleration = "g"`, `vx = "ft/s"` |
+//! | `missing` | columns the logs lack: position, `yaw`, accelerations |
+//! | `use` | rows to use: a formula with a comparison, or a list that must all hold, in canonical and further columns and `height airspeed alpha beta g_x g_y g_z` |
+//! | `minimum_length_s` | pieces that `use` or gaps leave shorter than this are left out, with a note |
+//! | `resample_hz` | rate to resample to |
+//! | `cutoff_hz` | −3 dB frequency of the differentiator where accelerations are derived |
+//! | `manoeuvre` | `"folder"` (default), or `{ separator = "_", part = 1 }` of the file's name |
+//! | `exclude` | sub-folders or files that are not flights of this set |
+//! | `ignore`, `extra` | columns not to read; the only further columns to keep |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `max_gap_s`: bad cells to interpolate linearly |
+//! | `notes` | sentences to carry to every reader of the data |
+
+use super::attitude::Axes;
+use super::{Column, Targets, units};
+use crate::error::{Error, Result};
+use crate::formula::Formula;
+use crate::suggest::did_you_mean;
+use std::collections::BTreeMap;
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Components the file's velocity is written in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Frame {
+    Body,
+    Inertial,
+}
+
+/// What the file's `vx_dot vy_dot vz_dot` hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum TargetKind {
+    /// Derivative of the body components of velocity.
+    Derivative,
+    /// Accelerometer: non-gravitational force by mass, body axes.
+    SpecificForce,
+    /// Derivative of the inertial velocity, inertial axes.
+    Inertial,
+    /// Derivative of the inertial velocity, body axes.
+    BodyAcceleration,
+}
+
+/// How a flight's manoeuvre is named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Manoeuvre {
+    /// After the folder the file is in.
+    Folder,
+    /// After one part (counted from 1) of the file's name without its ending.
+    FilePart { separator: String, part: usize },
+}
+
+/// A rule for known-bad cells of some columns of the file.
+#[derive(Clone, Debug)]
+pub(super) struct Repair {
+    pub columns: Vec<String>,
+    /// All must be true of `value`, else the cell is bad. NaN is bad always.
+    pub valid: Vec<Formula>,
+    /// Longest run of bad cells that is bridged, s.
+    pub max_gap_s: f64,
+}
+
+/// A parsed `dataset.toml`; the default is the canonical form.
+#[derive(Clone, Debug)]
+pub(super) struct Schema {
+    pub axes: Axes,
+    pub velocity: Frame,
+    pub targets: TargetKind,
+    pub target_origin: Targets,
+    /// Alternatives by canonical name: columns of the file, or formulas.
+    pub columns: BTreeMap<String, Vec<String>>,
+    /// Factor to SI by canonical name; 1 if absent.
+    pub factors: BTreeMap<&'static str, f64>,
+    pub missing: Vec<Column>,
+    pub rows: Vec<Formula>,
+    pub minimum_length_s: f64,
+    pub resample_hz: Option<f64>,
+    /// −3 dB frequency of the differentiator; `None` for its default, lowered where the rate demands it.
+    pub cutoff_hz: Option<f64>,
+    pub manoeuvre: Manoeuvre,
+    pub exclude: Vec<String>,
+    pub ignore: Vec<String>,
+    pub extra: Option<Vec<String>>,
+    pub repairs: Vec<Repair>,
+    pub notes: Vec<String>,
+}
+
+impl Default for Schema {
+    fn default() -> Self {
+        Self {
+            axes: Axes::NedFrd,
+            velocity: Frame::Body,
+            targets: TargetKind::Derivative,
+            target_origin: Targets::Recorded,
+            columns: BTreeMap::new(),
+            factors: BTreeMap::new(),
+            missing: Vec::new(),
+            rows: Vec::new(),
+            minimum_length_s: 0.0,
+            resample_hz: None,
+            cutoff_hz: None,
+            manoeuvre: Manoeuvre::Folder,
+            exclude: Vec::new(),
+            ignore: Vec::new(),
+            extra: None,
+            repairs: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+}
+
+const FRAMES: [(&str, Frame); 2] = [("body", Frame::Body), ("inertial", Frame::Inertial)];
+const ORIGINS: [(&str, Targets); 2] = [("recorded", Targets::Recorded), ("derived", Targets::Derived)];
+const TARGETS: [(&str, TargetKind); 4] = [
+    ("derivative", TargetKind::Derivative),
+    ("specific_force", TargetKind::SpecificForce),
+    ("inertial", TargetKind::Inertial),
+    ("body_acceleration", TargetKind::BodyAcceleration),
+];
+/// Canonical columns that a log may lack besides the six accelerations.
+const MAY_LACK: [Column; 4] = [Column::X, Column::Y, Column::Z, Column::Yaw];
+
+impl Schema {
+    /// Reads a `dataset.toml`.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::File`] for text that is not TOML; [`Error::Config`] by key; [`Error::Formula`] for a filter.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::parse(&text, &path.display().to_string())
+    }
+
+    fn parse(text: &str, place: &str) -> Result<Self> {
+        let table: Table = text.parse().map_err(|error: toml::de::Error| Error::File {
+            path: place.into(),
+            message: format!("is not TOML: {}", error.to_string().trim_end()),
+        })?;
+        let mut keys = Keys::new(place, "", table);
+        let mut schema = Self {
+            axes: keys.choice("axes", &Axes::NAMES)?.unwrap_or_default(),
+            velocity: keys.choice("velocity", &FRAMES)?.unwrap_or(Frame::Body),
+            targets: keys.choice("targets", &TARGETS)?.unwrap_or(TargetKind::Derivative),
+            target_origin: keys.choice("target_origin", &ORIGINS)?.unwrap_or(Targets::Recorded),
+            rows: formulas(keys.texts("use")?.unwrap_or_default())?,
+            minimum_length_s: keys.number("minimum_length_s", 0.0)?.unwrap_or(0.0),
+            resample_hz: keys.number("resample_hz", f64::MIN_POSITIVE)?,
+            cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?,
+            exclude: keys.texts("exclude")?.unwrap_or_default(),
+            ignore: keys.texts("ignore")?.unwrap_or_default(),
+            extra: keys.texts("extra")?,
+            notes: keys.texts("notes")?.unwrap_or_default(),
+            manoeuvre: manoeuvre(&mut keys)?,
+            ..Self::default()
+        };
+        for name in keys.texts("missing")?.unwrap_or_default() {
+            let allowed = || MAY_LACK.into_iter().chain(Column::TARGETS);
+            let Some(column) = allowed().find(|column| column.name() == name) else {
+                let names: Vec<&str> = allowed().map(Column::name).collect();
+                return Err(keys.fault("missing", format!("`{name}`"), format!("one of {}", names.join(", "))));
+            };
+            schema.missing.push(column);
+        }
+        if let Some(mut columns) = keys.section("columns")? {
+            for name in units::column_names() {
+                if let Some(sources) = columns.texts(name)? {
+                    if sources.is_empty() {
+                        return Err(columns.fault(name, "an empty list".into(), "a column's name or a formula".into()));
+                    }
+                    schema.columns.insert(name.into(), sources);
+                }
+            }
+            columns.finish()?;
+        }
+        if let Some(units) = keys.section("units")? {
+            schema.factors = factors(units)?;
+        }
+        for mut rule in keys.sections("repair")? {
+            let columns = rule.texts("columns")?.unwrap_or_default();
+            let valid = formulas(rule.texts("valid")?.unwrap_or_default())?;
+            let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
+            let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
+                let expected = "`columns` and `max_gap_s`; `valid` if NaN is not the only sign of a bad cell";
+                return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
+            };
+            for formula in &valid {
+                formula.check_names(&["value"])?;
+            }
+            rule.finish()?;
+            schema.repairs.push(Repair { columns, valid, max_gap_s });
+        }
+        keys.finish()?;
+        Ok(schema)
+    }
+
+    /// Factor to SI of a canonical column.
+    pub fn factor(&self, column: &str) -> f64 {
+        self.factors.get(column).copied().unwrap_or(1.0)
+    }
+
+    /// Whether a column of a file is to be read at all.
+    pub fn wants(&self, name: &str) -> bool {
+        if self.ignore.iter().any(|ignored| ignored == name) {
+            return false;
+        }
+        let Some(extra) = &self.extra else { return true };
+        let names = |formula: &Formula| formula.names().contains(&name);
+        extra.iter().any(|kept| kept == name)
+            || units::column_names().any(|canonical| canonical == name)
+            || self.columns.values().flatten().any(|source| source == name || Formula::parse(source).is_ok_and(|f| names(&f)))
+            || self.rows.iter().any(names)
+            || self.repairs.iter().any(|rule| rule.columns.iter().any(|column| column == name))
+    }
+}
+
+fn formulas(texts: Vec<String>) -> Result<Vec<Formula>> {
+    texts.iter().map(|text| Formula::parse(text)).collect()
+}
+
+fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
+    const EXPECTED: &str = "\"folder\", or { separator = \"_\", part = 1 } with a part counted from 1";
+    match keys.take("manoeuvre") {
+        None => Ok(Manoeuvre::Folder),
+        Some(Value::String(text)) if text == "folder" => Ok(Manoeuvre::Folder),
+        Some(Value::Table(table)) => {
+            let mut rule = Keys::new(&keys.place, "manoeuvre.", table);
+            let separator = rule.text("separator")?.unwrap_or_else(|| "_".into());
+            let part = rule.number("part", 1.0)?.unwrap_or(1.0);
+            rule.finish()?;
+            if separator.is_empty() || part.fract() != 0.0 {
+                return Err(keys.fault("manoeuvre", format!("separator `{separator}`, part {part}"), EXPECTED.into()));
+            }
+            Ok(Manoeuvre::FilePart { separator, part: part as usize })
+        }
+        Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
+    }
+}
+
+/// `[units]`: a group's word first, a single column's unit over it.
+fn factors(mut keys: Keys) -> Result<BTreeMap<&'static str, f64>> {
+    let mut factors = BTreeMap::new();
+    for single in [false, true] {
+        for group in units::GROUPS {
+            let words: &[&'static str] = if single { group.columns } else { &[group.name] };
+            for &word in words {
+                let Some(unit) = keys.text(word)? else { continue };
+                let Some(factor) = group.factor(&unit) else {
+                    return Err(keys.fault(word, format!("`{unit}`"), format!("one of {}", group.unit_names().join(", "))));
+                };
+                let columns: &[&'static str] = if single { &[word] } else { group.columns };
+                factors.extend(columns.iter().map(|&column| (column, factor)));
+            }
+        }
+    }
+    keys.finish()?;
+    Ok(factors)
+}
+
+/// A TOML table whose keys are taken one by one; what is left at the end is unknown.
+struct Keys {
+    place: String,
+    prefix: &'static str,
+    table: Table,
+    known: Vec<&'static str>,
+}
+
+impl Keys {
+    fn new(place: &str, prefix: &'static str, table: Table) -> Self {
+        Self { place: place.into(), prefix, table, known: Vec::new() }
+    }
+
+    fn fault(&self, key: &str, found: String, expected: String) -> Error {
+        Error::Config { place: self.place.clone(), field: format!("{}{key}", self.prefix), found, expected }
+    }
+
+    fn take(&mut self, key: &'static str) -> Option<Value> {
+        self.known.push(key);
+        self.table.remove(key)
+    }
+
+    fn text(&mut self, key: &'static str) -> Result<Option<String>> {
+        match self.take(key) {
+            None => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text)),
+            Some(other) => Err(self.fault(key, other.to_string(), "a text in quotes".into())),
+        }
+    }
+
+    fn texts(&mut self, key: &'static str) -> Result<Option<Vec<String>>> {
+        let value = self.take(key);
+        let one = |value| match value {
+            Value::String(text) => Ok(text),
+            other => Err(self.fault(key, other.to_string(), "a text in quotes, or a list of such".into())),
+        };
+        match value {
+            None => Ok(None),
+            Some(Value::Array(values)) => values.into_iter().map(one).collect::<Result<_>>().map(Some),
+            Some(value) => Ok(Some(vec![one(value)?])),
+        }
+    }
+
+    fn number(&mut self, key: &'static str, least: f64) -> Result<Option<f64>> {
+        let number = match self.take(key) {
+            None => return Ok(None),
+            Some(Value::Float(number)) => number,
+            Some(Value::Integer(number)) => number as f64,
+            Some(other) => return Err(self.fault(key, other.to_string(), "a number".into())),
+        };
+        if number.is_finite() && number >= least {
+            return Ok(Some(number));
+        }
+        let expected = if least == f64::MIN_POSITIVE { "a number above 0".into() } else { format!("a number of at least {least}") };
+        Err(self.fault(key, number.to_string(), expected))
+    }
+
+    fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> Result<Option<T>> {
+        let Some(text) = self.text(key)? else { return Ok(None) };
+        if let Some(choice) = choices.iter().find(|choice| choice.0 == text) {
+            return Ok(Some(choice.1));
+        }
+        let names: Vec<&str> = choices.iter().map(|choice| choice.0).collect();
+        let hint = did_you_mean(&text, names.iter().copied());
+        Err(self.fault(key, format!("`{text}`"), format!("one of {}{hint}", names.join(", "))))
+    }
+
+    fn section(&mut self, key: &'static str) -> Result<Option<Self>> {
+        let prefix = match key {
+            "columns" => "columns.",
+            "units" => "units.",
+            _ => "repair.",
+        };
+        match self.take(key) {
+            None => Ok(None),
+            Some(Value::Table(table)) => Ok(Some(Self::new(&self.place, prefix, table))),
+            Some(other) => Err(self.fault(key, other.to_string(), format!("a table, [{key}]"))),
+        }
+    }
+
+    /// `[[key]]`, any number of times, or `[key]` once.
+    fn sections(&mut self, key: &'static str) -> Result<Vec<Self>> {
+        let values = match self.take(key) {
+            None => Vec::new(),
+            Some(Value::Array(values)) => values,
+            Some(value) => vec![value],
+        };
+        let single = |value| Self::new(&self.place, "", Table::from_iter([(key.to_owned(), value)])).section(key);
+        values.into_iter().filter_map(|value| single(value).transpose()).collect()
+    }
+
+    fn finish(self) -> Result<()> {
+        let Some(key) = self.table.keys().next() else { return Ok(()) };
+        let hint = did_you_mean(key, self.known.iter().copied());
+        let expected = format!("one of {}{hint}", self.known.join(", "));
+        Err(self.fault(key, "an unknown key".into(), expected))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> String {
+        Schema::parse(text, "dataset.toml").map_or_else(|error| error.to_string(), |_| "accepted".into())
+    }
+
+    #[test]
+    fn every_key_is_understood() -> Result<()> {
+        let schema = Schema::parse(
+            r#"
+            axes = "ENU/FLU"
+            velocity = "inertial"
+            targets = "specific_force"
+            target_origin = "derived"
+            missing = ["x", "y", "z"]
+            use = ["height > 0.25", "airspeed < 30"]
+            minimum_length_s = 2
+            resample_hz = 100
+            cutoff_hz = 8.0
+            manoeuvre = { separator = "-", part = 2 }
+            exclude = "parquet"
+            ignore = ["comment"]
+            extra = ["Vbat"]
+            notes = "Heading is derived."
+            [columns]
+            vx = ["v_nose", "vn"]
+            u4 = "1e-10 * (m1^2 + m2^2)"
+            [units]
+            angles = "deg"
+            yaw = "rad"
+            [[repair]]
+            columns = ["m1", "m2"]
+            valid = ["value > 0", "value < 170000"]
+            max_gap_s = 0.1
+            "#,
+            "dataset.toml",
+        )?;
+        assert_eq!((schema.axes, schema.velocity, schema.targets), (Axes::EnuFlu, Frame::Inertial, TargetKind::SpecificForce));
+        assert_eq!((schema.rows.len(), schema.repairs.len(), schema.missing.len()), (2, 1, 3));
+        assert_eq!(schema.manoeuvre, Manoeuvre::FilePart { separator: "-".into(), part: 2 });
+        assert_eq!((schema.factor("yaw"), schema.factor("roll")), (1.0, std::f64::consts::PI / 180.0));
+        assert!(schema.wants("Vbat") && schema.wants("m2") && schema.wants("vn"));
+        assert!(!schema.wants("comment") && !schema.wants("gyro_temperature"));
+        Ok(())
+    }
+
+    #[test]
+    fn slips_are_named_with_what_would_be_right() {
+        for (text, part) in [
+            ("axis = \"NED/FRD\"", "`axis` is an unknown key"),
+            ("axis = \"NED/FRD\"", "did you mean `axes`?"),
+            ("axes = \"NED\"", "one of NED/FRD, ENU/FLU, NWU/FLU"),
+            ("[columns]\nvxx = \"a\"", "`columns.vxx` is an unknown key"),
+            ("[units]\nangles = \"degrees\"", "`units.angles` is `degrees`, expected one of rad, deg"),
+            ("missing = [\"vx\"]", "`missing` is `vx`, expected one of x, y, z, yaw"),
+            ("resample_hz = 0", "`resample_hz` is 0, expected a number above 0"),
+            ("[[repair]]\ncolumns = [\"m1\"]", "an incomplete rule"),
+            ("[repair]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nvalid = \"m1 > 0\"", "unknown name `m1`"),
+            ("manoeuvre = \"file\"", "`manoeuvre` is \"file\", expected \"folder\""),
+            ("use = \"height >\"", "formula"),
+            ("use = ", "is not TOML"),
+        ] {
+            assert!(message(text).contains(part), "{text:?} gave: {}", message(text));
+        }
+    }
+}

@@ -1,0 +1,307 @@
+//! The model file: a [`Model`] as TOML, read strictly and written so that it reads back the same.
+
+use super::baseline::{self, PAPER};
+use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
+use super::model::{Entry, Model, ModelData};
+use super::toml_section::{Section, line_of, number};
+use crate::error::{Error, Result};
+use crate::flight::{Column, atomic};
+use crate::suggest::did_you_mean;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+/// Aircraft of the paper's data, for a file that gives no numbers of its own: an N9-class helicopter of 4.58 kg with 720 mm
+/// blades, and the usual ratios of the inertia of small helicopters (only the ratios enter the baseline).
+const NOMINAL_MASS_KG: f64 = 4.58;
+const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
+const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
+
+impl Model {
+    /// Reads a model file.
+    ///
+    /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
+    /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m), the name to the file's, and without `baseline` the model holds
+    /// the listed effects alone. An `[[effect]]` that `baseline` already holds sets that effect's numbers.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::File`] if it is no TOML; [`Error::Config`] with line and suggestion at an unknown key, kind or
+    /// coefficient or a value of the wrong form; [`Error::Formula`] pointing at the character.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        Self::from_toml(&std::fs::read_to_string(path).map_err(Error::io(path))?, path)
+    }
+
+    /// Reads the text of a model file; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Model::read`].
+    pub fn from_toml(text: &str, path: &Path) -> Result<Self> {
+        let parsed = DeTable::parse(text).map_err(|error| {
+            let line = error.span().map_or(1, |span| line_of(text, span.start));
+            Error::File { path: path.into(), message: format!("line {line}: {}; a model file is TOML", error.message()) }
+        })?;
+        let file = Section { path, text, name: "", table: parsed.get_ref() };
+        file.allow(&["model", "data", "effect", "provenance"])?;
+        let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
+        model.allow(&["name", "mass_kg", "inertia", "rotor_radius_m", "baseline"])?;
+        let mut effects = match model.text("baseline")? {
+            None => Vec::new(),
+            Some(PAPER) => baseline::paper(),
+            Some(other) => {
+                return Err(model.fault("baseline", format!("`{other}`{}", did_you_mean(other, [PAPER])), "`paper`, or none"));
+            }
+        };
+        let mut listed: Vec<String> = Vec::new();
+        for section in file.sections("effect", "effect")? {
+            let effect = read_effect(&section)?;
+            if listed.contains(&effect.name) {
+                return Err(section.fault(
+                    "kind",
+                    format!("a second effect `{}`", effect.name),
+                    "effects with names of their own; set `name`",
+                ));
+            }
+            listed.push(effect.name.clone());
+            match effects.iter_mut().find(|known| known.name == effect.name) {
+                Some(known) if known.kind != effect.kind => {
+                    let found = format!("`{}`, the name of an effect of the baseline", effect.name);
+                    return Err(section.fault("name", found, "another name"));
+                }
+                Some(known) => *known = effect,
+                None => effects.push(effect),
+            }
+        }
+        let mut data = ModelData::default();
+        if let Some(section) = file.section("data", "data")? {
+            section.allow(&["control_delay_s", "locked", "split"])?;
+            data = ModelData {
+                control_delay_s: section.number("control_delay_s")?.unwrap_or_default(),
+                locked: section.texts("locked")?,
+                split: section.text("split")?.map(str::parse).transpose()?.unwrap_or_default(),
+            };
+        }
+        let provenance = match file.section("provenance", "provenance")? {
+            Some(section) => entries(section.table),
+            None => BTreeMap::new(),
+        };
+        let stem = path.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
+        let result = Self {
+            name: model.text("name")?.map_or(stem, str::to_owned),
+            mass_kg: model.number("mass_kg")?.unwrap_or(NOMINAL_MASS_KG),
+            inertia: model.numbers("inertia")?.unwrap_or(NOMINAL_INERTIA),
+            rotor_radius_m: model.number("rotor_radius_m")?.unwrap_or(NOMINAL_ROTOR_RADIUS_M),
+            effects,
+            data,
+            provenance,
+        };
+        result.check_in(&path.display().to_string())?;
+        Ok(result)
+    }
+
+    /// Writes a model file, in one step: a reader sees the old file or the new one.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; as [`Model::to_toml`].
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
+        let text = self.to_toml()?;
+        atomic::write_atomically(path, |out| out.write_all(text.as_bytes()))
+    }
+
+    /// The model as the text of a model file, every effect written out.
+    ///
+    /// # Errors
+    /// [`Error::Config`] if the model would not read back the same: an effect that is neither built in nor a single formula.
+    pub fn to_toml(&self) -> Result<String> {
+        let mut text = String::new();
+        let [ix, iy, iz] = self.inertia;
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "[model]\nname = {}\nmass_kg = {:?}", quoted(&self.name), self.mass_kg);
+        let _ = writeln!(text, "inertia = [{ix:?}, {iy:?}, {iz:?}]\nrotor_radius_m = {:?}", self.rotor_radius_m);
+        let locked: Vec<String> = self.data.locked.iter().map(|name| quoted(name)).collect();
+        let _ = writeln!(text, "\n[data]\ncontrol_delay_s = {:?}\nlocked = [{}]", self.data.control_delay_s, locked.join(", "));
+        let _ = writeln!(text, "split = {}", quoted(&self.data.split.to_string()));
+        for effect in &self.effects {
+            write_effect(&mut text, effect);
+        }
+        if !self.provenance.is_empty() {
+            let table = toml::Table::from_iter([("provenance".to_owned(), Entry::Table(self.provenance.clone()).to_toml())]);
+            let _ = write!(text, "\n{table}");
+        }
+        let again = Self::from_toml(&text, Path::new(&self.name))?;
+        if again != *self {
+            let different = self.effects.iter().zip(&again.effects).find(|(left, right)| left != right);
+            let field = different.map_or("provenance".into(), |pair| format!("effect `{}`", pair.0.name));
+            let expected = "an effect that a model file can hold: a built-in kind, or one formula with one coefficient".into();
+            return Err(Error::Config { place: format!("model `{}`", self.name), field, found: "another form".into(), expected });
+        }
+        Ok(text)
+    }
+}
+
+fn read_effect(section: &Section<'_>) -> Result<Effect> {
+    let missing = |key: &str| section.fault(key, "nothing", format!("`{key} = …` in this [[effect]]"));
+    let kind = section.text("kind")?.ok_or_else(|| missing("kind"))?;
+    let common = ["kind", "name", "enabled", "ci95", "added_by", "parameters"];
+    let mut effect = if kind == FORMULA_KIND {
+        section.allow(&[&common[..], &["channel", "formula", "coefficient", "unit"]].concat())?;
+        let name = section.text("name")?.ok_or_else(|| missing("name"))?;
+        let channel = section.text("channel")?.ok_or_else(|| missing("channel"))?;
+        let names = Column::TARGETS.map(Column::name);
+        let index = names.iter().position(|name| *name == channel).ok_or_else(|| {
+            section.fault(
+                "channel",
+                format!("`{channel}`{}", did_you_mean(channel, names)),
+                format!("one of `{}`", names.join("`, `")),
+            )
+        })?;
+        let formula = section.text("formula")?.ok_or_else(|| missing("formula"))?;
+        let value = section.number("coefficient")?.unwrap_or_default();
+        let mut effect = Effect::formula(name, index, formula, value).map_err(|error| located(section, name, error))?;
+        if let (Some(unit), Some(coefficient)) = (section.text("unit")?, effect.coefficient_mut(FORMULA_COEFFICIENT)) {
+            coefficient.unit = unit.into();
+        }
+        if let Some(parameters) = section.section("parameters", "effect.parameters")? {
+            for name in parameters.keys() {
+                let value = parameters.number(name)?.unwrap_or_default();
+                effect.parameters.push(Parameter { name: name.into(), value, unit: String::new(), fixed: true });
+            }
+        }
+        effect
+    } else {
+        let mut effect = baseline::built_in(kind).ok_or_else(|| {
+            let known: Vec<&str> = baseline::kinds().chain([FORMULA_KIND]).collect();
+            let found = format!("`{kind}`{}", did_you_mean(kind, known.iter().copied()));
+            section.fault("kind", found, format!("one of `{}`", known.join("`, `")))
+        })?;
+        section.allow(&[&common[..], &["coefficients"]].concat())?;
+        if let Some(name) = section.text("name")? {
+            effect.name = name.into();
+        }
+        if let Some(values) = section.section("coefficients", "effect.coefficients")? {
+            values.allow(&names(&effect))?;
+            for coefficient in &mut effect.coefficients {
+                coefficient.value = values.number(&coefficient.name)?.unwrap_or_default();
+            }
+        }
+        if let Some(values) = section.section("parameters", "effect.parameters")? {
+            values.allow(&effect.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>())?;
+            for parameter in &mut effect.parameters {
+                parameter.value = values.number(&parameter.name)?.unwrap_or(parameter.value);
+            }
+        }
+        effect
+    };
+    if let Some(intervals) = section.section("ci95", "effect.ci95")? {
+        intervals.allow(&names(&effect))?;
+        for coefficient in &mut effect.coefficients {
+            coefficient.ci95 = intervals.numbers(&coefficient.name)?;
+            if let Some([low, high]) = coefficient.ci95.filter(|interval| interval[0] > interval[1]) {
+                return Err(intervals.fault(&coefficient.name, format!("[{low}, {high}]"), "the lower end first"));
+            }
+        }
+    }
+    effect.enabled = section.flag("enabled")?.unwrap_or(true);
+    effect.added_by = section.text("added_by")?.map(str::to_owned);
+    effect.check(&section.path.display().to_string()).map_err(|error| located(section, &effect.name, error))?;
+    Ok(effect)
+}
+
+fn names(effect: &Effect) -> Vec<&str> {
+    effect.coefficients.iter().map(|coefficient| coefficient.name.as_str()).collect()
+}
+
+/// Puts file and line before a formula error.
+fn located(section: &Section<'_>, effect: &str, error: Error) -> Error {
+    let Error::Formula { message, formula, at } = error else { return error };
+    match section.fault("formula", "", "") {
+        Error::Config { place, .. } => Error::Formula { message: format!("{place}, effect `{effect}`: {message}"), formula, at },
+        other => other,
+    }
+}
+
+fn write_effect(text: &mut String, effect: &Effect) {
+    text.push_str("\n[[effect]]\n");
+    let mut line = |key: &str, value: String| {
+        let _ = writeln!(text, "{key} = {value}");
+    };
+    line("kind", quoted(&effect.kind));
+    if effect.name != effect.kind {
+        line("name", quoted(&effect.name));
+    }
+    if !effect.enabled {
+        line("enabled", "false".into());
+    }
+    if let Some(added_by) = &effect.added_by {
+        line("added_by", quoted(added_by));
+    }
+    let table = |entries: Vec<(&str, String)>| {
+        let entries: Vec<String> = entries.into_iter().map(|(name, value)| format!("{} = {value}", key(name))).collect();
+        format!("{{ {} }}", entries.join(", "))
+    };
+    if effect.kind == FORMULA_KIND {
+        if let (Some(term), Some(coefficient)) = (effect.terms.first(), effect.coefficients.first()) {
+            line("channel", quoted(Column::TARGETS.get(term.channel).map_or("", |column| column.name())));
+            line("formula", quoted(&term.regressor.to_string()));
+            line("coefficient", format!("{:?}", coefficient.value));
+            line("unit", quoted(&coefficient.unit));
+        }
+    } else if !effect.coefficients.is_empty() {
+        line("coefficients", table(effect.coefficients.iter().map(|c| (c.name.as_str(), format!("{:?}", c.value))).collect()));
+    }
+    if !effect.parameters.is_empty() {
+        line("parameters", table(effect.parameters.iter().map(|p| (p.name.as_str(), format!("{:?}", p.value))).collect()));
+    }
+    let intervals: Vec<(&str, String)> = effect
+        .coefficients
+        .iter()
+        .filter_map(|c| c.ci95.map(|[low, high]| (c.name.as_str(), format!("[{low:?}, {high:?}]"))))
+        .collect();
+    if !intervals.is_empty() {
+        line("ci95", table(intervals));
+    }
+}
+
+/// Text as a TOML string.
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.into()).to_string()
+}
+
+/// A key, quoted if it must be.
+fn key(name: &str) -> String {
+    let bare = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+    if bare { name.into() } else { quoted(name) }
+}
+
+fn entries(table: &DeTable<'_>) -> BTreeMap<String, Entry> {
+    table.iter().map(|(key, value)| (key.get_ref().to_string(), Entry::from_toml(value.get_ref()))).collect()
+}
+
+impl Entry {
+    fn from_toml(value: &DeValue<'_>) -> Self {
+        match value {
+            DeValue::String(text) => Self::Text(text.to_string()),
+            DeValue::Boolean(flag) => Self::Boolean(*flag),
+            DeValue::Datetime(datetime) => Self::Text(datetime.to_string()),
+            DeValue::Integer(integer) => match i64::from_str_radix(integer.as_str(), integer.radix()) {
+                Ok(integer) => Self::Integer(integer),
+                Err(_) => Self::Text(integer.to_string()),
+            },
+            DeValue::Float(float) => number(value).map_or_else(|| Self::Text(float.as_str().into()), Self::Number),
+            DeValue::Array(values) => Self::List(values.iter().map(|value| Self::from_toml(value.get_ref())).collect()),
+            DeValue::Table(table) => Self::Table(entries(table)),
+        }
+    }
+
+    fn to_toml(&self) -> toml::Value {
+        match self {
+            Self::Text(text) => toml::Value::String(text.clone()),
+            Self::Integer(integer) => toml::Value::Integer(*integer),
+            Self::Number(number) => toml::Value::Float(*number),
+            Self::Boolean(flag) => toml::Value::Boolean(*flag),
+            Self::List(values) => toml::Value::Array(values.iter().map(Self::to_toml).collect()),
+            Self::Table(table) => toml::Value::Table(table.iter().map(|(key, value)| (key.clone(), value.to_toml())).collect()),
+        }
+    }
+}

@@ -1,0 +1,321 @@
+//! The page of `compare`: what the models get wrong, in words, tables, maps, traces and residuals.
+//!
+//! Arranges the numbers of [`Comparison`] and of `critique::locate` on a [`Page`]; computes none of its own but percentages.
+
+use super::figures::{self, BinnedPanel, LineData, PANELS};
+use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
+use crate::critique::compare::deviation;
+use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
+use crate::critique::table::{Kind, MEASURES, significant};
+use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row};
+use crate::error::{Error, Result};
+use crate::flight::{Column, Flight, Targets, Window};
+
+/// What [`compare_page`] shows.
+#[derive(Clone, Copy, Debug)]
+pub struct CompareReport<'a> {
+    /// The numbers.
+    pub comparison: &'a Comparison,
+    /// The flights that the windows point into.
+    pub flights: &'a [Flight],
+    /// The windows of the comparison.
+    pub windows: &'a [Window],
+    /// The predictions of the comparison, in its order.
+    pub rows: &'a [Row],
+    /// Index of the model whose errors the maps, traces and residuals show.
+    pub focus: usize,
+    /// Index of the yardstick (finite difference), which the verdict measures the model against.
+    pub yardstick: Option<usize>,
+    /// Where the numbers come from: (what, value), such as the hash of the data, the seed, the model files.
+    pub provenance: &'a [(String, String)],
+}
+
+/// The page of one comparison.
+///
+/// # Errors
+/// [`Error::Shape`] if `focus` is not a row, or rows and windows do not fit; with the inputs of the comparison they do.
+pub fn compare_page(report: &CompareReport<'_>) -> Result<Page> {
+    let nothing = || Error::Shape { operation: "report", message: format!("there is no model {} among the rows", report.focus) };
+    let row = report.rows.get(report.focus).ok_or_else(nothing)?;
+    let model = report.comparison.models.get(report.focus).ok_or_else(nothing)?;
+    let deviation = deviation(report.flights, report.windows)?;
+    let located = stretches(report.flights, report.windows, row)?;
+    let mut sections = vec![Section { title: "Error per channel".into(), parts: error_tables(report.comparison) }];
+    sections.push(maps(model, &deviation));
+    let mut traces = Vec::new();
+    if let Some(found) = located {
+        traces.push(Part::Text(
+            "Drag to zoom: all panels follow; double-click to go back; click a name to hide or show its line.".into(),
+        ));
+        for (title, stretch) in [("Worst ten seconds", found.worst), ("Typical ten seconds", found.typical)] {
+            traces.push(Part::Figure(trace_figure(title, report, &stretch)));
+        }
+    } else {
+        traces.push(Part::Text("There is no stretch to show: no windows, or no measured channel varies.".into()));
+    }
+    sections.push(Section { title: "Measured and predicted".into(), parts: traces });
+    sections.push(residuals(report, row)?);
+    sections.push(Section { title: "Where these numbers come from".into(), parts: vec![Part::Table(provenance(report))] });
+    Ok(Page { title: format!("Measured against predicted: {}", model.name), summary: summary(report, model, &deviation), sections })
+}
+
+/// The verdict in words.
+fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChannel) -> Vec<String> {
+    let channels = model.rmse.channels();
+    let relative: Vec<(usize, f64)> =
+        (0..6).filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?))).collect();
+    let name = |channel: usize| Column::TARGETS[channel].name();
+    let mut out = vec![format!("{}.", report.comparison.basis())];
+    if model.not_finite > 0 {
+        out.push(format!(
+            "Beware: {} of {} predictions of {} are not finite numbers. The channels they hit have no error measure.",
+            model.not_finite, model.windows, model.name
+        ));
+    }
+    let worst = relative.iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let finest = relative.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+    if let (Some(worst), Some(finest)) = (worst, finest) {
+        let says = |(channel, share): &(usize, f64)| {
+            let unit = Column::TARGETS[*channel].unit();
+            let rmse = channels[*channel].map_or_else(String::new, |rmse| significant(rmse, 3));
+            format!("{} (RMSE {rmse} {unit}, {:.0} % of the channel's standard deviation)", name(*channel), 100.0 * share)
+        };
+        out.push(format!("{} predicts {} best and {} worst.", model.name, says(finest), says(worst)));
+    }
+    let mean = |model: &ModelError| model.rmse.mean;
+    let judged = report.comparison.models.iter().enumerate().filter(|(index, _)| report.yardstick != Some(*index));
+    let best = judged.filter_map(|(index, model)| Some((index, model, mean(model)?))).min_by(|a, b| a.2.total_cmp(&b.2));
+    if let (Some((index, best, error)), Some(own)) = (best, mean(model))
+        && index != report.focus
+    {
+        let [error, own] = [error, own].map(|value| significant(value, 3));
+        out.push(format!("Of the models here, {} has the smallest mean RMSE ({error}; {} {own}).", best.name, model.name));
+    }
+    if let Some(other) =
+        report.yardstick.filter(|index| *index != report.focus).and_then(|index| report.comparison.models.get(index))
+    {
+        let wins: Vec<&str> =
+            (0..6).filter(|c| other.rmse.channels()[*c] > channels[*c] && channels[*c].is_some()).map(name).collect();
+        out.push(match wins.len() {
+            0 => format!("It beats the yardstick “{}” in no channel.", other.name),
+            6 => format!("It beats the yardstick “{}” in all six channels.", other.name),
+            _ => format!("It beats the yardstick “{}” in {} of 6 channels: {}.", other.name, wins.len(), wins.join(", ")),
+        });
+    }
+    let worst_part = |parts: &std::collections::BTreeMap<String, PartError>| {
+        let score = |part: &PartError| normalised(part, deviation).into_iter().flatten().reduce(f64::max);
+        let scored = parts.iter().filter_map(|(name, part)| Some((name.clone(), score(part)?)));
+        scored.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| parts.values().filter(|part| part.n > 0).count() > 1)
+    };
+    let manoeuvre =
+        worst_part(&model.by_manoeuvre).map(|(name, score)| format!("manoeuvre {name} ({score:.1} standard deviations)"));
+    let regime = worst_part(&model.by_regime).map(|(name, score)| format!("regime {name} ({score:.1})"));
+    let places: Vec<String> = [manoeuvre, regime].into_iter().flatten().collect();
+    if !places.is_empty() {
+        out.push(format!("The largest error of any channel lies in {}.", places.join(" and in ")));
+    }
+    if report.comparison.target == Targets::Derived {
+        out.push(
+            "The accelerations were not recorded but derived from velocity and rates: their noise is part of every error here."
+                .into(),
+        );
+    }
+    out
+}
+
+/// RMSE over the standard deviation of the channel.
+fn normalised(part: &PartError, deviation: &PerChannel) -> [Option<f64>; 6] {
+    std::array::from_fn(|channel| Some(part.rmse.channels()[channel]? / deviation.channels()[channel]?))
+}
+
+fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, String)> {
+    let unit = |column: &Column| if share { "" } else { column.unit() }.to_owned();
+    let channels = Column::TARGETS.iter().map(|column| (column.name().to_owned(), unit(column)));
+    let last = mean.then(|| ("mean".to_owned(), String::new()));
+    [(first.to_owned(), String::new())].into_iter().chain(channels).chain(last).collect()
+}
+
+fn error_tables(comparison: &Comparison) -> Vec<Part> {
+    let table = |(title, words, kind, measure): (&str, &str, Kind, fn(&ModelError) -> PerChannel)| {
+        let values: Vec<Vec<Option<f64>>> = comparison.models.iter().map(|model| with_mean(&measure(model))).collect();
+        let best: Vec<Vec<usize>> = (0..7)
+            .map(|column| kind.best(&values.iter().map(|row| row.get(column).copied().flatten()).collect::<Vec<_>>()))
+            .collect();
+        let rows = comparison.models.iter().zip(&values).enumerate().map(|(row, (model, values))| {
+            let cells = values.iter().zip(&best).map(|(value, best)| Cell { text: kind.text(*value), best: best.contains(&row) });
+            [Cell::from(model.name.clone())].into_iter().chain(cells).collect()
+        });
+        Part::Table(Table {
+            caption: format!("{title}, {words}"),
+            columns: channel_columns("model", kind == Kind::Share, true),
+            rows: rows.collect(),
+        })
+    };
+    let note =
+        "* best of the column. The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.";
+    MEASURES.into_iter().map(table).chain([Part::Text(note.into())]).collect()
+}
+
+fn with_mean(values: &PerChannel) -> Vec<Option<f64>> {
+    values.channels().into_iter().chain([values.mean]).collect()
+}
+
+/// Manoeuvre × channel and regime × channel.
+fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
+    let row = |name: &str, part: &PartError| {
+        let shades = normalised(part, deviation);
+        let cells =
+            part.rmse.channels().into_iter().zip(part.rmse_ci95.channels()).zip(shades).map(|((rmse, ci95), value)| MapCell {
+                text: Kind::Error.text(rmse),
+                detail: ci95.map_or_else(String::new, |[low, high]| format!("{} … {}", significant(low, 2), significant(high, 2))),
+                value,
+            });
+        (name.to_owned(), format!("n = {} in {} blocks", part.n, part.blocks), cells.collect())
+    };
+    let map = |what: &str, rows: Vec<(String, String, Vec<MapCell>)>| {
+        Part::Map(Map {
+            caption: format!("RMSE of {} by {what}, 95 % interval below", model.name),
+            shade: "RMSE over the standard deviation of the channel; 1 is as bad as predicting its mean".into(),
+            columns: channel_columns(what, false, false),
+            rows,
+        })
+    };
+    let flown: Vec<(&Regime, &PartError)> = Regime::ALL
+        .iter()
+        .filter_map(|regime| Some((regime, model.by_regime.get(regime.name())?)))
+        .filter(|(_, part)| part.n > 0)
+        .collect();
+    let missing: Vec<&str> =
+        Regime::ALL.iter().filter(|regime| flown.iter().all(|(other, _)| other != regime)).map(|regime| regime.name()).collect();
+    let rules: Vec<String> = Regime::ALL.iter().map(|regime| format!("{}: {}", regime.name(), regime.rule())).collect();
+    let mut parts = vec![
+        map("manoeuvre", model.by_manoeuvre.iter().map(|(name, part)| row(name, part)).collect()),
+        map("regime", flown.iter().map(|(regime, part)| row(regime.name(), part)).collect()),
+        Part::Text(format!("A sample has the first regime whose rule holds. {}.", rules.join("; "))),
+    ];
+    if !missing.is_empty() {
+        parts.push(Part::Text(format!("Not in these windows: {}.", missing.join(", "))));
+    }
+    parts.push(Part::Text(
+        "n counts windows. Intervals rest on blocks of ten seconds, as neighbouring samples are not independent; without one there is a single block.".into(),
+    ));
+    Section { title: "Where the error lies".into(), parts }
+}
+
+fn channel_panels() -> Vec<(String, String)> {
+    Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect()
+}
+
+fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &Stretch) -> figures::Figure {
+    let span = stretch.span;
+    let flight = &report.flights[span.flight];
+    let mut at: Vec<(usize, usize)> = report
+        .windows
+        .iter()
+        .enumerate()
+        .filter_map(|(index, window)| {
+            (window.flight == span.flight && (span.start..span.end).contains(&window.last)).then_some((window.last, index))
+        })
+        .collect();
+    at.sort_unstable();
+    let time = |samples: &mut dyn Iterator<Item = usize>| samples.map(|sample| flight.time_s(sample)).collect::<Vec<_>>();
+    let measured = LineData {
+        name: "measured".into(),
+        x: time(&mut (span.start..span.end)),
+        y: Column::TARGETS.iter().map(|column| flight.column(*column)[span.start..span.end].to_vec()).collect(),
+        hidden: false,
+    };
+    // The model in focus first, so that it has the same look on every page.
+    let others = (0..report.rows.len()).filter(|index| *index != report.focus);
+    let order = [report.focus].into_iter().chain(others).filter_map(|index| Some((index, report.rows.get(index)?)));
+    let predicted = order.map(|(index, row)| LineData {
+        name: row.name.clone(),
+        x: time(&mut at.iter().map(|(sample, _)| *sample)),
+        y: (0..6).map(|channel| at.iter().map(|(_, index)| row.predicted[*index][channel]).collect()).collect(),
+        hidden: report.yardstick == Some(index) && index != report.focus,
+    });
+    let caption = format!(
+        "Flight {}, manoeuvre {}, {:.1} s to {:.1} s. Normalised error {:.2} (1 is as bad as predicting the mean).",
+        flight.name,
+        flight.manoeuvre,
+        flight.time_s(span.start),
+        flight.time_s(span.end),
+        stretch.error
+    );
+    let data: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
+    figures::lines(title, &caption, "time, s", &channel_panels(), &data)
+}
+
+/// Share of a residual below which no variable is drawn: 14 bins of pure noise reach it in a few minutes of flight.
+const SHARE_SHOWN: f64 = 0.01;
+
+/// Which variables the residual goes with, and how.
+fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
+    let found = dependences(report.flights, report.windows, row, &Variable::ALL)?;
+    let title = "Residual against variables".to_owned();
+    if found.is_empty() {
+        return Ok(Section { title, parts: vec![Part::Text("No recorded variable varies in these windows.".into())] });
+    }
+    let rows = found.iter().map(|(variable, of)| {
+        let cells = of.iter().map(|one| MapCell {
+            text: format!("{:.0} %", 100.0 * one.share),
+            detail: String::new(),
+            value: Some(one.share),
+        });
+        (figures::with_unit(variable.name(), variable.unit()), String::new(), cells.collect())
+    });
+    let mut parts = vec![
+        Part::Text(
+            "The residual is measured − predicted. A model that has all the physics leaves one that goes with nothing.".into(),
+        ),
+        Part::Map(Map {
+            caption: format!("Share of the residual of {} that goes with one variable alone", row.name),
+            shade: "correlation ratio η² of binned means".into(),
+            columns: channel_columns("variable", true, false).into_iter().map(|(name, _)| (name, String::new())).collect(),
+            rows: rows.collect(),
+        }),
+    ];
+    for (channel, column) in Column::TARGETS.iter().enumerate() {
+        let panel = |(variable, of): &'_ (Variable, [Dependence; 6])| (*variable, of[channel].share);
+        let mut order: Vec<(usize, (Variable, f64))> = found.iter().map(panel).enumerate().collect();
+        order.sort_by(|a, b| b.1.1.total_cmp(&a.1.1));
+        let largest = order.first().map_or(0.0, |(_, (_, share))| *share);
+        if largest < SHARE_SHOWN {
+            let text = "no variable accounts for 1 % of it; there is nothing to show";
+            parts.push(Part::Text(format!("Residual of {}: {text}.", column.name())));
+            continue;
+        }
+        let panels: Vec<BinnedPanel<'_>> = order
+            .iter()
+            .take(PANELS)
+            .filter_map(|(index, (variable, _))| {
+                let dependence = &found.get(*index)?.1[channel];
+                Some(BinnedPanel { variable: variable.name(), unit: variable.unit(), dependence, curve: None })
+            })
+            .collect();
+        let caption = "The variables it goes with most, share of the residual's variance in brackets.";
+        parts.push(Part::Figure(figures::binned(&format!("Residual of {}", column.name()), caption, column.unit(), &panels)));
+    }
+    Ok(Section { title, parts })
+}
+
+fn provenance(report: &CompareReport<'_>) -> Table {
+    let target = match report.comparison.target {
+        Targets::Recorded => "recorded",
+        Targets::Derived => "derived from velocity and rates by a zero-phase differentiator",
+    };
+    let own = [
+        ("split", report.comparison.split.name().to_owned()),
+        ("targets", target.to_owned()),
+        ("windows", report.windows.len().to_string()),
+        ("flights", report.flights.len().to_string()),
+        ("phyture", env!("CARGO_PKG_VERSION").to_owned()),
+    ];
+    let own = own.into_iter().map(|(what, value)| (what.to_owned(), value));
+    let rows = own.chain(report.provenance.iter().cloned()).map(|(what, value)| vec![what.into(), value.into()]);
+    Table {
+        caption: String::new(),
+        columns: vec![("what".into(), String::new()), ("value".into(), String::new())],
+        rows: rows.collect(),
+    }
+}

@@ -1,0 +1,365 @@
+//! Reading flight logs: what is refused and how it is said, and every key of `dataset.toml`.
+#![cfg(feature = "files")]
+
+mod support;
+
+use phyture::flight::attitude::{Axes, cross, euler_to_quaternion, gravity_body, rotate, rotation_body_to_inertial};
+use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::{Column, Targets};
+use phyture_kernels::Tolerance;
+use std::f64::consts::{FRAC_PI_2, PI};
+use support::*;
+
+const CLOSE: f64 = Tolerance::Close.relative_f64();
+const V: [&str; 3] = ["vx", "vy", "vz"];
+const W: [&str; 3] = ["wx", "wy", "wz"];
+const ANGLES: [&str; 3] = ["roll", "pitch", "yaw"];
+const V_DOT: [&str; 3] = ["vx_dot", "vy_dot", "vz_dot"];
+const W_DOT: [&str; 3] = ["wx_dot", "wy_dot", "wz_dot"];
+
+fn triple(sheet: &Sheet, names: [&str; 3], row: usize) -> [f64; 3] {
+    names.map(|name| sheet.get(name)[row])
+}
+
+fn add(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {
+    std::array::from_fn(|axis| a[axis] + factor * b[axis])
+}
+
+fn to_inertial(sheet: &Sheet, row: usize, v: [f64; 3]) -> [f64; 3] {
+    let [roll, pitch, yaw] = triple(sheet, ANGLES, row);
+    rotate(&rotation_body_to_inertial(roll, pitch, yaw), v)
+}
+
+/// ω × v.
+fn transport(sheet: &Sheet, row: usize) -> [f64; 3] {
+    cross(triple(sheet, W, row), triple(sheet, V, row))
+}
+
+#[test]
+fn a_canonical_log_is_taken_bit_by_bit() -> Outcome {
+    let sheet = Sheet::canonical(200).with("rotor_rpm", vec![1800.0; 200]);
+    let data = read_one(&sheet.csv(), "")?;
+    let flight = only(&data);
+    assert_same(flight, &sheet, Tolerance::Exact.relative_f64());
+    assert_eq!((flight.name.as_str(), flight.manoeuvre.as_str(), flight.targets), ("a", "hover", Targets::Recorded));
+    assert_eq!((flight.step_s.to_bits(), flight.absent.len()), (STEP_S.to_bits(), 0));
+    assert_eq!(flight.named("rotor_rpm"), Some(sheet.get("rotor_rpm")));
+    assert_eq!(data.notes, Vec::<String>::new());
+    Ok(())
+}
+
+#[test]
+fn bad_logs_are_refused_with_file_line_column_found_and_expected() {
+    let good = Sheet::canonical(60);
+    let text = |from: &str, to: &str| good.csv().replacen(from, to, 1);
+    let cases: Vec<(String, &[&str])> = vec![
+        (
+            good.clone().cell("vy", 7, f64::NAN).csv(),
+            &["a.csv, line 9, column `vy`: found NaN or an empty cell, expected a finite"],
+        ),
+        (good.clone().cell("u3", 0, f64::INFINITY).csv(), &["line 2, column `u3`: found inf"]),
+        (good.clone().without("wz").csv(), &["line 1, column `wz`: found no such column in the header"]),
+        (good.clone().without("vx").rename("vy", "vyy").csv(), &["`vx`", "also missing: `vy`"]),
+        (good.clone().rename("roll", "rol").csv(), &["column `roll`", "did you mean `rol`?", "q1 q2 q3 q4"]),
+        (good.clone().without("vz_dot").csv(), &["`vz_dot`", "all three accelerations of a kind or none"]),
+        (good.clone().without_all(&W_DOT).csv(), &["`wx_dot`", "all six accelerations, or none"]),
+        (good.clone().without("z").csv(), &["column `z`", "`missing` of dataset.toml"]),
+        (good.clone().rename("x", "y").csv(), &["line 1, column `y`: found the same name twice in the header"]),
+        (text("0.02,", "soon,"), &["column `t`: found `soon`, expected a number"]),
+        (good.clone().cell("t", 9, 0.05).csv(), &["line 11, column `t`: found time that steps back: 0.05 s after 0.08 s"]),
+        (good.clone().cell("t", 9, 0.08).csv(), &["line 11, column `t`: found time that repeats"]),
+        (
+            good.clone().keep_rows(|row| !(20..45).contains(&row)).csv(),
+            &["line 22, column `t`: found a jump of 0.26", "after 0.19 s", "--split-at-gaps"],
+        ),
+        (
+            good.clone().map("pitch", |pitch| pitch * 180.0 / PI).csv(),
+            &["column `pitch`", "looks like degrees", "angles = \"deg\""],
+        ),
+        (String::new(), &["an empty file"]),
+        (good.clone().keep_rows(|_| false).csv(), &["a header and no rows"]),
+        (good.clone().keep_rows(|row| row == 0).csv(), &["a single row"]),
+        ("PAR1 and so on".into(), &["binary content in a file named .csv"]),
+    ];
+    for (csv, parts) in cases {
+        assert_says(&refusal(read_one(&csv, "")), parts);
+    }
+}
+
+#[test]
+fn degrees_in_a_gentle_flight_are_found_by_how_fast_they_change() {
+    // Within ±1.2: too small to be found by size.
+    let gentle =
+        Sheet::canonical(300).map("roll", |roll| roll * 0.04).map("wx", |w| w * 0.04).map("pitch", |_| 0.0).map("wy", |_| 0.0);
+    let degrees = gentle.clone().map("roll", |roll| roll * 180.0 / PI);
+    assert_eq!(refusal(read_one(&gentle.csv(), "")), "accepted");
+    assert_says(&refusal(read_one(&degrees.csv(), "")), &["column `roll`", "times as fast as wx says", "looks like degrees"]);
+}
+
+#[test]
+fn a_flight_shorter_than_the_history_is_refused() {
+    let options = ReadOptions { minimum_rows: 100, ..ReadOptions::default() };
+    let message = refusal(read_with(&Sheet::canonical(60).csv(), "", &options));
+    assert_says(&message, &["a.csv: found 60 samples, expected at least 100, the length of the history"]);
+}
+
+#[test]
+fn gaps_split_on_request_and_short_pieces_are_left_out_aloud() -> Outcome {
+    let sheet = Sheet::canonical(300).keep_rows(|row| !(100..120).contains(&row) && !(130..150).contains(&row));
+    let options = ReadOptions { split_at_gaps: true, minimum_rows: 50, ..ReadOptions::default() };
+    let data = read_with(&sheet.csv(), "", &options)?;
+    let lengths: Vec<(&str, usize)> = data.flights.iter().map(|flight| (flight.name.as_str(), flight.len())).collect();
+    assert_eq!(lengths, [("a[1]", 100), ("a[2]", 150)]);
+    assert_eq!(data.flights[1].start_s.to_bits(), sheet.get("t")[110].to_bits());
+    let notes = data.notes.join("\n");
+    assert_says(
+        &notes,
+        &["cut at a jump of 0.210 s before t = 1.200 s", "the piece of 0.10 s (10 samples) from t = 1.20 s on is left out"],
+    );
+    Ok(())
+}
+
+#[test]
+fn accelerations_are_derived_when_all_six_are_absent_and_this_is_said() -> Outcome {
+    let sheet = Sheet::canonical(400);
+    let data = read_one(&sheet.clone().without_all(&V_DOT).without_all(&W_DOT).csv(), "")?;
+    let flight = only(&data);
+    assert_eq!(flight.targets, Targets::Derived);
+    assert_says(&data.notes.join("\n"), &["linear accelerations are derived from v", "-3 dB at 10 Hz", "angular accelerations"]);
+    for column in Column::TARGETS {
+        // The waves lie below 0.5 Hz: inside, the differentiator's error is its next order, some 1e-5 of the signal.
+        let inside = 30..370;
+        let error = difference(&flight.column(column)[inside.clone()], &sheet.get(column.name())[inside]);
+        assert!(error < 1e-4, "{} by {error:e}", column.name());
+    }
+    let slow = read_one(&sheet.without_all(&V_DOT).without_all(&W_DOT).csv(), "cutoff_hz = 4")?;
+    assert_says(&slow.notes.join("\n"), &["-3 dB at 4 Hz"]);
+    Ok(())
+}
+
+#[test]
+fn a_quaternion_may_stand_in_place_of_the_angles() -> Outcome {
+    let sheet = Sheet::canonical(120);
+    let parts: Vec<[f64; 4]> =
+        (0..120).map(|row| triple(&sheet, ANGLES, row)).map(|[r, p, y]| euler_to_quaternion(r, p, y)).collect();
+    let mut other = sheet.clone().without_all(&ANGLES);
+    for (axis, name) in ["q1", "q2", "q3", "q4"].iter().enumerate() {
+        other = other.with(name, parts.iter().map(|part| part[axis]).collect());
+    }
+    assert_same(only(&read_one(&other.csv(), "")?), &sheet, CLOSE);
+    assert_says(
+        &refusal(read_one(&other.clone().cell("q4", 5, 0.5).csv(), "")),
+        &["line 7", "a quaternion of norm", "unit quaternion"],
+    );
+    assert_says(&refusal(read_one(&other.without("q3").csv(), "")), &["column `q3`", "scalar last"]);
+    Ok(())
+}
+
+#[test]
+fn other_axes_and_frames_come_to_the_same_flight() -> Outcome {
+    let sheet = Sheet::canonical(150);
+    for (name, axes) in Axes::NAMES {
+        for frame in ["body", "inertial"] {
+            // Each change of axes is its own inverse, and so is that of the angles.
+            let inertial = frame == "inertial";
+            let other = sheet
+                .clone()
+                .map_triple(
+                    V,
+                    |row, v| if inertial { axes.inertial_to_ned(to_inertial(&sheet, row, v)) } else { axes.body_to_frd(v) },
+                )
+                .map_triple(["x", "y", "z"], |_, p| axes.inertial_to_ned(p))
+                .map_triple(ANGLES, |_, [roll, pitch, yaw]| match axes {
+                    Axes::NedFrd => [roll, pitch, yaw],
+                    Axes::EnuFlu => [roll, -pitch, FRAC_PI_2 - yaw],
+                    Axes::NwuFlu => [roll, -pitch, -yaw],
+                })
+                .map_triple(W, |_, w| axes.body_to_frd(w))
+                .map_triple(V_DOT, |_, a| axes.body_to_frd(a))
+                .map_triple(W_DOT, |_, a| axes.body_to_frd(a));
+            let data = read_one(&other.csv(), &format!("axes = \"{name}\"\nvelocity = \"{frame}\""))?;
+            assert_same(only(&data), &sheet, CLOSE);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn other_accelerations_come_to_the_derivative_of_the_body_components() -> Outcome {
+    let sheet = Sheet::canonical(150);
+    let body = |row: usize, v_dot: [f64; 3]| add(v_dot, transport(&sheet, row), 1.0);
+    let force =
+        |row: usize, v_dot: [f64; 3]| add(body(row, v_dot), gravity_body(sheet.get("roll")[row], sheet.get("pitch")[row]), -1.0);
+    let inertial = |row: usize, _: [f64; 3]| inertial_acceleration(sheet.get("t")[row]);
+    for (kind, other) in [
+        ("specific_force", sheet.clone().map_triple(V_DOT, force)),
+        ("body_acceleration", sheet.clone().map_triple(V_DOT, body)),
+        ("inertial", sheet.clone().map_triple(V_DOT, inertial)),
+    ] {
+        let data = read_one(&other.csv(), &format!("targets = \"{kind}\""))?;
+        // The sheet's own second derivatives are differences of differences.
+        assert_same(only(&data), &sheet, Tolerance::Approximate.relative_f64());
+    }
+    Ok(())
+}
+
+#[test]
+fn units_are_converted() -> Outcome {
+    let sheet = Sheet::canonical(100);
+    let degrees = |angle: f64| angle * 180.0 / PI;
+    let mut other = sheet.clone().map("t", |t| t * 1e3).map("z", |z| z / 0.3048).map("vz_dot", |a| a / 9.80665);
+    for name in ANGLES.into_iter().chain(W).chain(W_DOT) {
+        other = other.map(name, degrees);
+    }
+    let description = r#"
+        [units]
+        time = "ms"
+        z = "ft"
+        angles = "deg"
+        rates = "deg/s"
+        angular_acceleration = "deg/s^2"
+        vz_dot = "g"
+    "#;
+    let data = read_one(&other.csv(), description)?;
+    assert_same(only(&data), &sheet, CLOSE);
+    assert!((only(&data).step_s - STEP_S).abs() <= CLOSE);
+    Ok(())
+}
+
+#[test]
+fn columns_by_another_name_a_formula_or_the_first_that_is_there() -> Outcome {
+    let sheet = Sheet::canonical(80);
+    let other = sheet
+        .clone()
+        .rename("vx", "v nose")
+        .without("u4")
+        .with("m1", sheet.get("u4").iter().map(|u| (u * 0.5e10).sqrt()).collect())
+        .with("m2", sheet.get("u4").iter().map(|u| (u * 0.5e10).sqrt()).collect());
+    let description = r#"
+        [columns]
+        vx = ["v_nose", "v nose"]
+        u4 = "1e-10 * (m1^2 + m2^2)"
+    "#;
+    let data = read_one(&other.csv(), description)?;
+    assert_same(only(&data), &sheet, CLOSE);
+    assert_eq!(only(&data).extra.keys().collect::<Vec<_>>(), ["m1", "m2"]);
+
+    let unknown = read_one(&other.csv(), &description.replace("m2^2", "m3^2"));
+    assert_says(&refusal(unknown), &["column `u4`", "unknown name `m3`"]);
+    let slip = read_one(&other.csv(), "[columns]\nvx = \"v noze\"\nu4 = \"m1\"");
+    assert_says(&refusal(slip), &["line 1, column `vx`", "no column `v noze`", "did you mean `v nose`?"]);
+    Ok(())
+}
+
+#[test]
+fn a_row_filter_keeps_pieces_and_says_what_it_kept() -> Outcome {
+    let sheet = Sheet::canonical(700);
+    // Height is 10 + 2 sin(0.9 t): above 11 twice in 7 s, the second time only shortly.
+    let data = read_one(&sheet.csv(), "use = [\"height > 11\", \"airspeed > 0\"]\nminimum_length_s = 0.1")?;
+    let flight = only(&data);
+    assert_eq!(flight.name, "a");
+    assert!(flight.column(Column::Z).iter().all(|&z| z < -11.0));
+    assert_says(&data.notes.join("\n"), &["`a`: `use` keeps", "of 700 samples"]);
+
+    let two = read_one(&sheet.csv(), "use = \"abs(height - 10) > 1\"\nminimum_length_s = 0.5")?;
+    assert_eq!(two.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["a[1]", "a[2]"]);
+    let whole = two.flights.iter().map(phyture::flight::Flight::len).sum::<usize>();
+    assert_eq!(whole, sheet.get("z").iter().filter(|z| (-**z - 10.0).abs() > 1.0).count());
+
+    assert_says(&refusal(read_one(&sheet.csv(), "use = \"heigth > 11\"")), &["unknown name `heigth`", "did you mean `height`?"]);
+    assert_says(&refusal(read_one(&sheet.csv(), "use = \"height > 99\"")), &["no piece is left", "keeps 0 of 700"]);
+    Ok(())
+}
+
+#[test]
+fn cells_are_repaired_only_by_a_stated_rule_and_counted() -> Outcome {
+    let bad = Sheet::canonical(100).with("m1", (0..100).map(f64::from).collect()).cell("m1", 10, f64::NAN).cell("m1", 11, 1e6);
+    assert_says(&refusal(read_one(&bad.csv(), "")), &["line 12, column `m1`", "[[repair]]"]);
+    let rule = "[[repair]]\ncolumns = [\"m1\"]\nvalid = \"value < 1000\"\nmax_gap_s = ";
+    let data = read_one(&bad.csv(), &format!("{rule}0.05"))?;
+    assert_eq!(only(&data).named("m1").map(|values| values[9..13].to_vec()), Some(vec![9.0, 10.0, 11.0, 12.0]));
+    assert_says(&data.notes.join("\n"), &["`a`: bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`"]);
+    // A run that is too long stays bad: refused where it is in use, harmless where the filter leaves it out.
+    assert_says(&refusal(read_one(&bad.csv(), &format!("{rule}0.01"))), &["line 12, column `m1`", "`use` keeps"]);
+    let cut = read_one(&bad.csv(), &format!("use = \"m1 >= 20\"\n{rule}0.01"))?;
+    assert_eq!(only(&cut).len(), 80);
+    Ok(())
+}
+
+#[test]
+fn position_and_heading_may_be_missing_if_the_description_says_so() -> Outcome {
+    let sheet = Sheet::canonical(300);
+    let other = sheet.clone().without_all(&["x", "y", "z", "yaw"]);
+    let data = read_one(&other.csv(), "missing = [\"x\", \"y\", \"z\", \"yaw\"]")?;
+    let flight = only(&data);
+    assert_eq!(flight.absent, [Column::X, Column::Y, Column::Z, Column::Yaw]);
+    assert_says(&data.notes.join("\n"), &["`z` is not in the logs and is zero", "the integral of the Euler yaw rate from zero"]);
+    let from_zero: Vec<f64> = sheet.get("yaw").iter().map(|yaw| yaw - sheet.get("yaw")[0]).collect();
+    // Trapezoids of 0.01 s on waves of about 1 rad/s: h²/12 times their second derivative.
+    assert!(difference(flight.column(Column::Yaw), &from_zero) < 1e-4);
+    let inertial = read_one(&other.csv(), "missing = [\"x\", \"y\", \"z\", \"yaw\"]\nvelocity = \"inertial\"");
+    assert_says(&refusal(inertial), &["velocity", "a heading"]);
+    Ok(())
+}
+
+#[test]
+fn another_rate_and_jittering_stamps_are_resampled() -> Outcome {
+    let sheet = Sheet::canonical(400);
+    let stamps: Vec<f64> = (0..400).map(|row| STEP_S * f64::from(row) * 1.25 + 0.002 * f64::from(row).sin()).collect();
+    // Samples of the same waves on the slower, jittering clock: stretch time instead of the waves.
+    let stretched = sheet.clone().with("t", stamps.clone());
+    assert_says(&refusal(read_one(&stretched.csv(), "")), &["column `t`", "one constant step within 1 %"]);
+    let data = read_one(&stretched.csv(), "resample_hz = 100")?;
+    let flight = only(&data);
+    assert_eq!((flight.step_s.to_bits(), flight.len()), (0.01_f64.to_bits(), (stamps[399] / 0.01) as usize + 1));
+    assert_says(&data.notes.join("\n"), &["resampled from 80.00 Hz to 100 Hz"]);
+    for sample in 0..flight.len() {
+        // The value recorded next to this time, corrected to first order.
+        let at = stamps.partition_point(|&stamp| stamp <= flight.time_s(sample)).clamp(1, 399);
+        let part = (flight.time_s(sample) - stamps[at - 1]) / (stamps[at] - stamps[at - 1]);
+        for name in ["vx", "roll", "yaw"] {
+            let (before, after) = (sheet.get(name)[at - 1], sheet.get(name)[at]);
+            let found = flight.named(name).map(|values| values[sample]);
+            // Linear interpolation itself is within h²/8 times the second derivative, some 1e-3 here.
+            assert!(found.is_some_and(|value| (value - before - part * (after - before)).abs() < 2e-3), "{name} at {sample}");
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn the_folder_gives_names_and_classes() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let (csv, root) = (Sheet::canonical(50).csv(), folder.path());
+    let names = |path: &std::path::Path, options: &ReadOptions| -> phyture::Result<Vec<String>> {
+        Ok(data_set(path, options)?.flights.iter().map(|flight| format!("{}/{}", flight.manoeuvre, flight.name)).collect())
+    };
+    put(root, "turn/b.csv", &csv)?;
+    put(root, "hover/a10.csv", &csv)?;
+    put(root, "hover/a9.csv", &csv)?;
+    put(root, "hover/notes.txt", "windy")?;
+    let plain = ReadOptions::default();
+    assert_eq!(names(root, &plain)?, ["hover/a9", "hover/a10", "turn/b"]);
+    assert_eq!(names(&root.join("hover"), &plain)?, ["hover/a9", "hover/a10"]);
+    assert_eq!(names(&root.join("turn/b.csv"), &plain)?, ["turn/b"]);
+
+    put(root, "turn/a9.csv", &csv)?;
+    assert_says(&refusal(data_set(root, &plain)), &["two flights named `a9`", "hover", "turn", "rename one"]);
+    put(root, "dataset.toml", "exclude = [\"turn\"]\nmanoeuvre = { separator = \"9\", part = 1 }")?;
+    let data = data_set(root, &plain)?;
+    assert_eq!(data.flights.iter().map(|flight| flight.manoeuvre.as_str()).collect::<Vec<_>>(), ["a", "a10"]);
+    assert_says(&data.notes.join("\n"), &["left out, as dataset.toml says: `turn`"]);
+
+    // A description elsewhere is taken instead, and its faults name it.
+    put(root, "other.toml", "exclud = \"turn\"")?;
+    let options = ReadOptions { dataset: Some(root.join("other.toml")), ..ReadOptions::default() };
+    assert_says(&refusal(data_set(root, &options)), &["other.toml", "`exclud` is an unknown key", "did you mean `exclude`?"]);
+
+    put(root, "loose.csv", &csv)?;
+    assert_says(&refusal(data_set(root, &plain)), &["logs beside folders of logs: loose.csv"]);
+    assert_says(&refusal(data_set(&root.join("hover/notes.txt"), &plain)), &["a file of the kind `.txt`", ".csv or .parquet"]);
+    assert_says(&refusal(data_set(&root.join("nowhere"), &plain)), &["nowhere"]);
+    std::fs::create_dir(root.join("empty"))?;
+    assert_says(&refusal(data_set(&root.join("empty"), &plain)), &["no logs", "DATA/<manoeuvre>/<flight>.csv"]);
+    Ok(())
+}
