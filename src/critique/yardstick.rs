@@ -130,7 +130,9 @@ mod tests {
     fn windows_without_a_full_history_are_refused_with_the_reason() {
         let flights = [Flight::new("a", "a", 0.0, 0.01, still(3000), Targets::Recorded).unwrap()];
         let config = LinearConfig::default();
-        let refused = |training: &[Window]| ridge(&flights, training, &[], &config).map_err(|error| error.to_string()).err().unwrap_or_default();
+        let refused = |training: &[Window]| {
+            ridge(&flights, training, &[], &config).map_err(|error| error.to_string()).err().unwrap_or_default()
+        };
         assert!(refused(&windows(0, 9..3000)).contains("history of 11 rows that ends at row 9"));
         assert!(refused(&windows(1, 10..20)).contains("flight 1 among 1"));
         assert!(finite_difference(&flights, &windows(0, 0..1)).is_err());

@@ -50,7 +50,12 @@ impl LinearConfig {
             (_, 0) => ("linear.inputs", "none"),
             _ => return Ok(()),
         };
-        Err(Error::Config { place: "linear history".into(), field: field.into(), found: found.into(), expected: "at least 1".into() })
+        Err(Error::Config {
+            place: "linear history".into(),
+            field: field.into(),
+            found: found.into(),
+            expected: "at least 1".into(),
+        })
     }
 }
 
@@ -185,9 +190,16 @@ impl Linear {
     /// A text for a person.
     pub fn check(&self) -> Result<(), String> {
         let inputs = self.config.inputs.len();
-        let sizes = [(self.mean.len(), inputs), (self.inverse_deviation.len(), inputs), (self.weights.len(), 6 * (inputs * self.config.lags + 1))];
+        let sizes = [
+            (self.mean.len(), inputs),
+            (self.inverse_deviation.len(), inputs),
+            (self.weights.len(), 6 * (inputs * self.config.lags + 1)),
+        ];
         let numbers = self.mean.iter().chain(&self.inverse_deviation).chain(&self.weights);
-        if self.config.check().is_err() || sizes.iter().any(|(found, expected)| found != expected) || !numbers.clone().all(|number| number.is_finite()) {
+        if self.config.check().is_err()
+            || sizes.iter().any(|(found, expected)| found != expected)
+            || !numbers.clone().all(|number| number.is_finite())
+        {
             return Err("the linear history's numbers do not fit its inputs and lags".into());
         }
         Ok(())
@@ -218,7 +230,11 @@ fn moments(signals: &[Signals], windows: &[Window], inputs: usize) -> (Vec<f64>,
     }
     let mut variance = vec![0.0; inputs];
     for window in windows {
-        variance.iter_mut().zip(row(window)).zip(&mean).for_each(|((variance, value), mean)| *variance += (value - mean).powi(2) / count);
+        variance
+            .iter_mut()
+            .zip(row(window))
+            .zip(&mean)
+            .for_each(|((variance, value), mean)| *variance += (value - mean).powi(2) / count);
     }
     // Below the rounding of the mean a deviation is no movement.
     let inverse = |(variance, mean): (f64, &f64)| {

@@ -12,8 +12,9 @@ use linear::Linear;
 pub use scaling::{Scale, Scaling};
 pub use stream::StreamingHybrid;
 
+use crate::blocks::Blocks;
 use crate::error::{Error, Result};
-use crate::flight::{Flight, Window};
+use crate::flight::{Column, Flight, Window};
 use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::nn::{Network, OutputScale, PhyTureConfig};
 use crate::physics::Model;
@@ -43,6 +44,8 @@ pub struct Description {
     pub linear: Option<Linear>,
     /// Fixed scales from the training part.
     pub scaling: Scaling,
+    /// Factor on what the network says, one a channel: 1 is the network as trained.
+    pub gate: [f64; 6],
     /// Sampling step of the training data, s.
     pub step_s: f64,
 }
@@ -94,6 +97,33 @@ impl Hybrid {
             return Err(Error::Shape { operation: "hybrid", message });
         }
         Ok(Self { description, network, parameters })
+    }
+
+    /// Sets the gate from windows that the network was not trained on, and gives it back: the factor that fits the network's
+    /// residual to the measured one by least squares, cut to [0, 1], and 0 where the gain is not one standard error above
+    /// nothing (block means of 10 s). So a channel in which the network learned nothing that carries over is left to the
+    /// physics. A network that predicts the acceleration itself has no gate.
+    ///
+    /// # Errors
+    /// As [`Hybrid::predict`].
+    pub fn fit_gate(&mut self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<[f64; 6]> {
+        self.description.gate = [1.0; 6];
+        if !self.description.config.variant.predicts_residual() || windows.is_empty() {
+            return Ok(self.description.gate);
+        }
+        let sequences = sequence::sequences(flights, &self.description)?;
+        let predicted = self.predict(flights, windows, threads)?;
+        let blocks = Blocks::new(flights, windows).of_window;
+        let gate = std::array::from_fn(|channel| {
+            let pairs = windows.iter().zip(&predicted).map(|(window, predicted)| {
+                let baseline = sequences[window.flight].baseline(window.last)[channel];
+                let measured = flights[window.flight].column(Column::TARGETS[channel])[window.last];
+                (measured - baseline, predicted[channel] - baseline)
+            });
+            gate(&pairs.collect::<Vec<_>>(), &blocks)
+        });
+        self.description.gate = gate;
+        Ok(gate)
     }
 
     /// What it is, but for its weights.
@@ -194,7 +224,7 @@ impl Hybrid {
         let residual = self.description.config.variant.predicts_residual();
         let last = &output[output.len().saturating_sub(6)..];
         std::array::from_fn(|channel| {
-            let learned = last.get(channel).copied().map_or(f64::NAN, f64::from);
+            let learned = last.get(channel).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel];
             if residual { baseline[channel] + learned } else { learned }
         })
     }
@@ -205,5 +235,51 @@ impl Hybrid {
     /// As [`Model::stream`].
     pub fn stream(&self) -> Result<StreamingHybrid<'_>> {
         StreamingHybrid::new(self)
+    }
+}
+
+/// The factor γ of [`Hybrid::fit_gate`] for pairs (left over by the baseline, said by the network) and the block of each.
+fn gate(pairs: &[(f64, f64)], blocks: &[usize]) -> f64 {
+    let (cross, square) =
+        pairs.iter().fold((0.0, 0.0), |(cross, square), (left, said)| (cross + left * said, square + said * said));
+    if cross <= 0.0 || square <= 0.0 {
+        return 0.0;
+    }
+    let factor = (cross / square).min(1.0);
+    // Fall of the squared error, block by block.
+    let mut gains = vec![0.0; blocks.iter().max().map_or(0, |last| last + 1)];
+    for ((left, said), block) in pairs.iter().zip(blocks) {
+        gains[*block] += left * left - (left - factor * said).powi(2);
+    }
+    let count = gains.len() as f64;
+    let total: f64 = gains.iter().sum();
+    let variance = gains.iter().map(|gain| (gain - total / count).powi(2)).sum::<f64>() * count / (count - 1.0).max(1.0);
+    if total > variance.sqrt() { factor } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pairs(said: impl Fn(usize) -> f64) -> (Vec<(f64, f64)>, Vec<usize>) {
+        let left = |index: usize| (index as f64 * 0.7).sin();
+        ((0..400).map(|index| (left(index), said(index))).collect(), (0..400).map(|index| index / 20).collect())
+    }
+
+    #[test]
+    fn the_gate_keeps_what_carries_over_shrinks_what_is_too_large_and_shuts_out_noise() {
+        let close = |found: f64, expected: f64| (found - expected).abs() < phyture_kernels::Tolerance::Close.relative_f64();
+        let (exact, blocks) = pairs(|index| (index as f64 * 0.7).sin());
+        assert!(close(gate(&exact, &blocks), 1.0));
+        let (large, blocks) = pairs(|index| 2.0 * (index as f64 * 0.7).sin());
+        assert!(close(gate(&large, &blocks), 0.5));
+        let (small, blocks) = pairs(|index| 0.5 * (index as f64 * 0.7).sin());
+        assert!(close(gate(&small, &blocks), 1.0));
+        let (opposite, blocks) = pairs(|index| -(index as f64 * 0.7).sin());
+        assert!(close(gate(&opposite, &blocks), 0.0));
+        // Uncorrelated but for chance: the gain is within its standard error.
+        let (noise, blocks) = pairs(|index| (index as f64 * 12.9898 + 1.0).sin() * (index as f64 * 78.233).cos());
+        assert!(close(gate(&noise, &blocks), 0.0));
+        assert!(close(gate(&[], &[]), 0.0));
     }
 }

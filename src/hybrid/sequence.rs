@@ -122,7 +122,14 @@ pub fn sequences(flights: &[Flight], description: &Description) -> Result<Vec<Se
 ///
 /// # Errors
 /// As [`sequences`].
-pub fn scaling(flights: &[Flight], spans: &[Span], model: &Model, inputs: &[String], linear: Option<&Linear>, config: &PhyTureConfig) -> Result<Scaling> {
+pub fn scaling(
+    flights: &[Flight],
+    spans: &[Span],
+    model: &Model,
+    inputs: &[String],
+    linear: Option<&Linear>,
+    config: &PhyTureConfig,
+) -> Result<Scaling> {
     let formulas = parse_inputs(inputs)?;
     let residual = config.variant.predicts_residual();
     let raw: Vec<Raw> = flights.iter().map(|flight| Raw::new(flight, model, &formulas, linear, residual)).collect::<Result<_>>()?;

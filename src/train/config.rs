@@ -31,6 +31,9 @@ pub struct TrainConfig {
     pub stride: usize,
     /// Weight of each channel's squared error in the loss is 1/σ² of the residual instead of 1. Default off (paper eq. 13).
     pub standardise_loss: bool,
+    /// Every so many-th 10-s block of the training part is kept from the network to fit its gate on, one factor a channel
+    /// between 0 and 1; 0 keeps none and sets no gate, as in the paper. Default 0.
+    pub gate_every: usize,
     /// Seed of initial weights, order and dropout. Default 0.
     pub seed: u64,
     /// Seconds between checkpoints. Default 30.
@@ -49,6 +52,7 @@ impl Default for TrainConfig {
             warmup_epochs: WARMUP_EPOCHS,
             stride: TRAINING_STRIDE,
             standardise_loss: false,
+            gate_every: 0,
             seed: 0,
             checkpoint_s: 30.0,
         }
@@ -89,6 +93,9 @@ impl TrainConfig {
                 self.network.state_channels,
                 &format!("the number of inputs, {}", self.inputs.len()),
             ));
+        }
+        if self.gate_every == 1 {
+            return Err(fault("gate_every", 1, "0 (no gate), or 2 and more: 1 would leave nothing to train on"));
         }
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
         self.network.check()

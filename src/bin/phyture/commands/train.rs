@@ -3,9 +3,10 @@
 use super::{Context, data_sha256, interruption};
 use crate::arguments::{Data, Division};
 use crate::output::Progress;
+use phyture::blocks::Blocks;
 use phyture::flight::split::Split;
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, Window};
+use phyture::flight::{Column, DataSet, Window};
 use phyture::hybrid::{Description, Hybrid, sequence};
 use phyture::physics::Model;
 use phyture::train::{Outcome, RunFolder, TrainConfig, Trainer};
@@ -104,7 +105,13 @@ fn fit(
         );
         return Err(Error::Interrupted { saved });
     }
-    let hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
+    let mut hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
+    if config.gate_every > 0 {
+        let gate = hybrid.fit_gate(&set.flights, &job.gate_windows, context.threads())?;
+        let shown: Vec<String> =
+            Column::TARGETS.iter().zip(gate).map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
+        context.say(format!("gate, from {} windows kept from training: {}", job.gate_windows.len(), shown.join("  ")));
+    }
     hybrid.write(&folder.network())?;
     let last_epoch_loss = sum / f64::from(count.max(1));
     context.say(format!(
@@ -127,6 +134,8 @@ struct Job {
     description: Description,
     sequences: Vec<sequence::Sequence>,
     windows: Vec<Window>,
+    /// Windows kept from training, for the gate.
+    gate_windows: Vec<Window>,
 }
 
 impl Job {
@@ -140,10 +149,16 @@ impl Job {
             inputs: config.inputs.clone(),
             scaling: sequence::scaling(flights, spans, model, &config.inputs, linear.as_ref(), &config.network)?,
             linear,
+            gate: [1.0; 6],
             step_s: flights.first().map_or(0.01, |flight| flight.step_s),
         };
         let sequences = sequence::sequences(flights, &description)?;
-        Ok(Self { description, sequences, windows: windows(&split.training, config.network.history, config.stride) })
+        let all = windows(spans, config.network.history, config.stride);
+        let blocks = Blocks::new(flights, &all).of_window;
+        let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
+        let choose =
+            |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
+        Ok(Self { description, sequences, windows: choose(false).collect(), gate_windows: choose(true).collect() })
     }
 }
 
