@@ -103,11 +103,9 @@ mod tests {
             for t in 1..=10 {
                 let gradient = numbers::<T>(seed + t, len);
                 step(level, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
-                for i in start..len {
-                    let g = gradient[i].f64() * scale;
-                    let moments = (expected.1[i], expected.2[i]);
-                    (expected.0[i], expected.1[i], expected.2[i]) =
-                        reference::adam(&adam, t, expected.0[i], g, moments.0, moments.1);
+                let moments = expected.1.iter_mut().zip(&mut expected.2);
+                for ((theta, (m, v)), g) in expected.0.iter_mut().zip(moments).zip(&gradient).skip(start) {
+                    (*theta, *m, *v) = reference::adam(&adam, t, *theta, g.f64() * scale, *m, *v);
                 }
             }
             let narrow = |x: &[f64]| x.iter().map(|x| T::of(*x)).collect::<Vec<T>>();
