@@ -1,6 +1,8 @@
 //! One step of Adam (Kingma & Ba 2015) in PyTorch's form, over flat slices.
 //!
-//!   m ← β₁m + (1 − β₁)g,   v ← β₂v + (1 − β₂)g²,   θ ← θ − lr/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε)
+//! ```text
+//! m ← β₁m + (1 − β₁)g,   v ← β₂v + (1 − β₂)g²,   θ ← θ − lr/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε)
+//! ```
 
 use crate::Real;
 use crate::level::{Isa, Kernel, Level};
