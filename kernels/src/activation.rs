@@ -103,7 +103,7 @@ fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
     }
 }
 
-/// y = f(x), both [n, C].
+/// y = f(x), both `[n, C]`.
 pub fn forward<T: Real>(level: Level, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
     level.run(Forward { kind, x, y });
@@ -127,7 +127,7 @@ impl<T: Real> Kernel for Forward<'_, T> {
     }
 }
 
-/// dx {=, +=} dy∘f′, all [n, C]; `saved` is x or y as [`Activation::saves`] says.
+/// dx {=, +=} dy∘f′, all `[n, C]`; `saved` is x or y as [`Activation::saves`] says.
 pub fn backward<T: Real>(level: Level, kind: Activation, saved: Rows<'_, T>, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
     same_shape(&saved, &dy);
     same_shape(&dy, &dx.view());

@@ -1,6 +1,8 @@
 //! One step of Adam (Kingma & Ba 2015) in PyTorch's form, over flat slices.
 //!
-//!   m ← β₁m + (1 − β₁)g,   v ← β₂v + (1 − β₂)g²,   θ ← θ − lr/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε)
+//! ```text
+//! m ← β₁m + (1 − β₁)g,   v ← β₂v + (1 − β₂)g²,   θ ← θ − lr/(1 − β₁ᵗ) · m / (√v/√(1 − β₂ᵗ) + ε)
+//! ```
 
 use crate::Real;
 use crate::level::{Isa, Kernel, Level};
@@ -103,11 +105,9 @@ mod tests {
             for t in 1..=10 {
                 let gradient = numbers::<T>(seed + t, len);
                 step(level, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
-                for i in start..len {
-                    let g = gradient[i].f64() * scale;
-                    let moments = (expected.1[i], expected.2[i]);
-                    (expected.0[i], expected.1[i], expected.2[i]) =
-                        reference::adam(&adam, t, expected.0[i], g, moments.0, moments.1);
+                let moments = expected.1.iter_mut().zip(&mut expected.2);
+                for ((theta, (m, v)), g) in expected.0.iter_mut().zip(moments).zip(&gradient).skip(start) {
+                    (*theta, *m, *v) = reference::adam(&adam, t, *theta, g.f64() * scale, *m, *v);
                 }
             }
             let narrow = |x: &[f64]| x.iter().map(|x| T::of(*x)).collect::<Vec<T>>();

@@ -1,13 +1,17 @@
 //! Multi-head attention that never stores a score map (paper eqs. 21–23 without the projections).
 //!
-//!   s = q·kᵀ/√d_k,  p = softmax(s) a row,  o = (m∘p/(1 − rate))·v       for each head
+//! ```text
+//! s = q·kᵀ/√d_k,  p = softmax(s) a row,  o = (m∘p/(1 − rate))·v       for each head
+//! ```
 //!
-//! q, o [queries, heads·d_k]; k, v [keys, heads·d_k]; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of
+//! q, o `[queries, heads·d_k]`; k, v `[keys, heads·d_k]`; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of
 //! keys with an online softmax and keeps only ℓ = log Σ eˢ, `[heads, queries]`. The backward pass makes p = e^(s − ℓ) and the
 //! dropout mask m again, block by block (Dao 2023, FlashAttention-2):
 //!
-//!   D = rowsum(do∘o),  dp = m∘(do·vᵀ)/(1 − rate),  ds = p∘(dp − D)
-//!   dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do
+//! ```text
+//! D = rowsum(do∘o),  dp = m∘(do·vᵀ)/(1 − rate),  ds = p∘(dp − D)
+//! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do
+//! ```
 //!
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
@@ -110,14 +114,14 @@ fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>,
     tile::rows::<T, I, _, _, MR, NR>(&rows, n, panels, &mut Store { c, bias: None, write });
 }
 
-/// c += sᵀ·b, s [keys, lanes], b [keys, width].
+/// c += sᵀ·b, s `[keys, lanes]`, b `[keys, width]`.
 #[inline(always)]
 fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(s: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>) {
     let mut sink = Store { c, bias: None, write: Write::Add };
     tile::columns::<T, I, _, MR, NR>((s.rows(), s.cols(), b.cols()), |p| s.row(p), |p| b.row(p), &mut sink);
 }
 
-/// o and `log_sum_exp` [heads, queries] from q, k, v.
+/// o and `log_sum_exp` `[heads, queries]` from q, k, v.
 ///
 /// # Panics
 /// If shapes disagree, `heads` does not divide the width, or there is no key.
@@ -209,7 +213,7 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     }
 }
 
-/// One step of the online softmax over a block of scores [keys, lanes]: scores become e^(s − m) with the new largest score m of
+/// One step of the online softmax over a block of scores `[keys, lanes]`: scores become e^(s − m) with the new largest score m of
 /// each lane; `total` and what else was summed so far is to be multiplied with `factor` = e^(m_old − m).
 #[inline(always)]
 fn softmax_block<T: Real, I: Isa, const NR: usize>(
@@ -249,11 +253,11 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
 /// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
 #[derive(Debug)]
 pub struct Gradients<'a, T> {
-    /// Gradient of q, [queries, heads·d_k].
+    /// Gradient of q, `[queries, heads·d_k]`.
     pub dq: RowsMut<'a, T>,
-    /// Gradient of k, [keys, heads·d_k].
+    /// Gradient of k, `[keys, heads·d_k]`.
     pub dk: RowsMut<'a, T>,
-    /// Gradient of v, [keys, heads·d_k].
+    /// Gradient of v, `[keys, heads·d_k]`.
     pub dv: RowsMut<'a, T>,
     /// Set or add for dq.
     pub write_q: Write,
@@ -384,7 +388,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
     }
 }
 
-/// Packs a block of rows [≤ block, size] as a right operand of depth `block`, times `factor`; missing rows are zero.
+/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block`, times `factor`; missing rows are zero.
 #[inline(always)]
 fn panels<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, block: usize, panels: &mut [T]) {
     for (panel, c) in panels.chunks_exact_mut(block * NR).zip((0..).step_by(NR)) {

@@ -1,15 +1,19 @@
 //! One-dimensional convolution of a channels-last sequence, stride 1, ends padded by repeating the first and the last row.
 //!
-//!   z[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[clamp(t + j − left, 0, n − 1), c],   t = 0 … n + left + right − taps
-//!   y = dropout(f(z))
+//! ```text
+//! z[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[clamp(t + j − left, 0, n − 1), c],   t = 0 … n + left + right − taps
+//! y = dropout(f(z))
+//! ```
 //!
-//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x [n, in], y [n′, out]. The padded sequence is never made:
+//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x `[n, in]`, y `[n′, out]`. The padded sequence is never made:
 //! the product reads shifted rows of x where they lie. Only y is kept: for the leaky relu its sign tells the branch, and a
 //! dropped element is told from a kept zero by the zero's sign (dropped +0, kept −0), so the backward pass of the epilogue
 //! needs neither z nor a mask.
 //!
-//!   dx̃[s, c] = Σ_{o,j} dz[s − j, o]·W[o, c, j] on the padded rows s, of which the ends fold into dx[0] and dx[n − 1]
-//!   dW[o, c, j] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
+//! ```text
+//! dx̃[s, c] = Σ_{o,j} dz[s − j, o]·W[o, c, j] on the padded rows s, of which the ends fold into dx[0] and dx[n − 1]
+//! dW[o, c, j] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
+//! ```
 
 use crate::activation::{self, Activation};
 use crate::dropout::Mask;
@@ -20,9 +24,9 @@ use crate::{Real, Rows, RowsMut, Write, linear, rows};
 /// How the weight lies in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WeightLayout {
-    /// [out, in, taps], as PyTorch stores it.
+    /// `[out, in, taps]`, as PyTorch stores it.
     OutInTap,
-    /// [taps, in, out]: the matrix [taps·in, out] of the product; no transposition on the way in or out.
+    /// `[taps, in, out]`: the matrix `[taps·in, out]` of the product; no transposition on the way in or out.
     TapInOut,
 }
 
@@ -45,7 +49,7 @@ impl Geometry {
         if rows == 0 { 0 } else { (rows + self.left + self.right + 1).saturating_sub(self.taps) }
     }
 
-    /// Place of W[o, c, j] in the weight slice.
+    /// Place of `W[o, c, j]` in the weight slice.
     #[inline(always)]
     pub const fn index(self, inputs: usize, outputs: usize, o: usize, c: usize, j: usize) -> usize {
         match self.layout {
@@ -211,7 +215,7 @@ impl<T: Real> Sink<T> for Finish<'_, T> {
     }
 }
 
-/// dz = dy∘f′(z)∘mask/(1 − p) [n′, out], from the y that [`forward`] gave.
+/// dz = dy∘f′(z)∘mask/(1 − p) `[n′, out]`, from the y that [`forward`] gave.
 ///
 /// # Panics
 /// If shapes disagree or the activation is gelu, whose derivative y does not tell.
@@ -376,7 +380,7 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
     }
 }
 
-/// dW {=, +=} Σ_t dz[t, o]·x[clamp(t + j − left), c], in the layout of the geometry.
+/// dW {=, +=} `Σ_t dz[t, o]·x[clamp(t + j − left), c]`, in the layout of the geometry.
 ///
 /// # Panics
 /// If shapes disagree.

@@ -1,9 +1,11 @@
 //! Inverted dropout whose mask is made again where it is needed, never stored.
 //!
-//!   y = m∘x / (1 − p),  m_ij = 0 with probability p;   dx = m∘dy / (1 − p)
+//! ```text
+//! y = m∘x / (1 − p),  m_ij = 0 with probability p;   dx = m∘dy / (1 − p)
+//! ```
 //!
 //! Element (i, j) is dropped when word j of the mask's sub-stream i lies below ⌊p·2³²⌉. The scale is the reciprocal of the keep
-//! probability that this threshold realises, so that E[y] = x holds exactly.
+//! probability that this threshold realises, so that the mean of y over masks is exactly x.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::random::{Stream, word};
@@ -105,13 +107,13 @@ impl<T: Real> Kernel for Apply<'_, T> {
     }
 }
 
-/// y = m∘x / (1 − p), both [n, C].
+/// y = m∘x / (1 − p), both `[n, C]`.
 pub fn forward<T: Real>(level: Level, mask: Mask, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
     level.run(Apply { mask, x, y, write: Write::Set });
 }
 
-/// dx {=, +=} m∘dy / (1 − p), both [n, C], with the mask of the forward pass.
+/// dx {=, +=} m∘dy / (1 − p), both `[n, C]`, with the mask of the forward pass.
 pub fn backward<T: Real>(level: Level, mask: Mask, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
     same_shape(&dy, &dx.view());
     level.run(Apply { mask, x: dy, y: dx, write });

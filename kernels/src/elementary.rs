@@ -233,7 +233,7 @@ mod tests {
         if size_of::<T>() == 4 { T::of(f64::from((x.f64() as f32).next_up())) } else { T::of(x.f64().next_up()) }
     }
 
-    /// Largest distance from `exact` over `count` + 1 points of [low, high], in units in the last place, and where.
+    /// Largest distance from `exact` over `count` + 1 points of `[low, high]`, in units in the last place, and where.
     fn worst<T: Real>(level: Level, function: Function, exact: impl Fn(f64) -> f64, low: f64, high: f64) -> (f64, f64) {
         let count = 400_000;
         let points: Vec<T> = (0..=count).map(|i| T::of(low + (high - low) * f64::from(i) / f64::from(count))).collect();

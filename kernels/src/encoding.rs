@@ -1,8 +1,10 @@
 //! Sinusoidal position encoding (paper eqs. 19–20).
 //!
-//!   PE(p, 2i) = sin(p·10000^(−2i/d)),  PE(p, 2i+1) = cos(p·10000^(−2i/d)),   p = 0 … H − 1
+//! ```text
+//! PE(p, 2i) = sin(p·10000^(−2i/d)),  PE(p, 2i+1) = cos(p·10000^(−2i/d)),   p = 0 … H − 1
+//! ```
 //!
-//! A table [H, d], made once; computed in f64 and rounded.
+//! A table `[H, d]`, made once; computed in f64 and rounded.
 
 use crate::{Real, RowsMut};
 

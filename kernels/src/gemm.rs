@@ -2,11 +2,11 @@
 //!
 //! | function | c | a | b |
 //! | --- | --- | --- | --- |
-//! | [`ab`] | a·b | [m, k] | [k, n] |
-//! | [`atb`] | aᵀ·b | [k, m] | [k, n] |
-//! | [`abt`] | a·bᵀ | [m, k] | [n, k] |
+//! | [`ab`] | a·b | `[m, k]` | `[k, n]` |
+//! | [`atb`] | aᵀ·b | `[k, m]` | `[k, n]` |
+//! | [`abt`] | a·bᵀ | `[m, k]` | `[n, k]` |
 //!
-//! c is [m, n] and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
+//! c is `[m, n]` and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
 //! stays in the first-level cache; a is read where it lies (tile.rs). Written for the sizes of this project: n from 6 to a few
 //! hundred, k up to a few thousand, any m.
 
@@ -30,18 +30,18 @@ pub fn scratch_len(m: usize, k: usize, n: usize) -> usize {
     tile::panels_len(k.min(LONGEST_BLOCK), n)
 }
 
-/// c {=, +=} a·b; a [m, k], b [k, n], c [m, n].
+/// c {=, +=} a·b; a `[m, k]`, b `[k, n]`, c `[m, n]`.
 pub fn ab<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.rows() == c.rows() && a.cols() == b.rows() && b.cols() == c.cols(), "a·b: shapes do not chain");
     level.run(Product { a, b: Right::Plain(b), bias: None, c, write, scratch });
 }
 
-/// c {=, +=} a·bᵀ; a [m, k], b [n, k], c [m, n].
+/// c {=, +=} a·bᵀ; a `[m, k]`, b `[n, k]`, c `[m, n]`.
 pub fn abt<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     abt_bias(level, a, b, None, c, write, scratch);
 }
 
-/// c {=, +=} a·bᵀ + bias, bias [n] on every row.
+/// c {=, +=} a·bᵀ + bias, bias `[n]` on every row.
 pub(crate) fn abt_bias<T: Real>(
     level: Level,
     a: Rows<'_, T>,
@@ -56,7 +56,7 @@ pub(crate) fn abt_bias<T: Real>(
     level.run(Product { a, b: Right::Transposed(b), bias, c, write, scratch });
 }
 
-/// c {=, +=} aᵀ·b; a [k, m], b [k, n], c [m, n].
+/// c {=, +=} aᵀ·b; a `[k, m]`, b `[k, n]`, c `[m, n]`.
 pub fn atb<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.cols() == c.rows() && a.rows() == b.rows() && b.cols() == c.cols(), "aᵀ·b: shapes do not chain");
     let _ = scratch;
@@ -176,9 +176,16 @@ mod tests {
 
     #[test]
     fn sizes_of_the_networks_and_around_the_blocks() {
-        for (m, k, n) in
-            [(500, 64, 64), (251, 320, 64), (64, 1000, 64), (1, 1000, 64), (1000, 1, 64), (64, 513, 16), (241, 256, 257)]
-        {
+        for (m, k, n) in [
+            (500, 64, 64),
+            (251, 320, 64),
+            (64, 1000, 64),
+            (1, 1000, 64),
+            (1000, 1, 64),
+            (64, 513, 16),
+            (241, 256, 257),
+            (3, 9, 35),
+        ] {
             check::<f32>(m, k, n, 3);
             check::<f64>(m, k, n, 3);
         }

@@ -1,15 +1,17 @@
 //! Layer normalisation over the last axis.
 //!
-//!   y = γ·x̂ + β,  x̂ = (x − μ)·r,  r = (σ² + ε)^−½            (μ, σ² of each row; σ² with divisor C)
-//!   dx = r·(g − mean(g) − x̂·mean(g·x̂)),  g = γ·dy;   dγ = Σ dy·x̂;   dβ = Σ dy
+//! ```text
+//! y = γ·x̂ + β,  x̂ = (x − μ)·r,  r = (σ² + ε)^−½            (μ, σ² of each row; σ² with divisor C)
+//! dx = r·(g − mean(g) − x̂·mean(g·x̂)),  g = γ·dy;   dγ = Σ dy·x̂;   dβ = Σ dy
+//! ```
 //!
-//! x, y [n, C]; γ, β [C]; kept for the backward pass: μ, r [n].
+//! x, y `[n, C]`; γ, β `[C]`; kept for the backward pass: μ, r `[n]`.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::rows::same_shape;
 use crate::{Real, Rows, RowsMut, Write, sums};
 
-/// y, and `mean` and `rstd` [n] for the backward pass.
+/// y, and `mean` and `rstd` `[n]` for the backward pass.
 ///
 /// # Panics
 /// If shapes disagree.

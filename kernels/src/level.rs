@@ -1,6 +1,6 @@
 //! The instruction-set level a kernel runs at, chosen at run time.
 //!
-//! A kernel is one generic body in plain Rust ([`Kernel::run`]); it is compiled once a level, each time inside a function that
+//! A kernel is one generic body in plain Rust (`Kernel::run`); it is compiled once a level, each time inside a function that
 //! has that level's instructions enabled, so that the compiler turns the same loops into wider registers. This file is the only
 //! place that calls such a function, and so the only place where the choice has to be argued to be safe.
 //!

@@ -1,8 +1,10 @@
-//! Linear map of every row: y = x·Wᵀ + b, with W [out, in] as PyTorch keeps it.
+//! Linear map of every row: y = x·Wᵀ + b, with W `[out, in]` as PyTorch keeps it.
 //!
-//!   dx = dy·W,  dW = dyᵀ·x,  db = Σ_rows dy
+//! ```text
+//! dx = dy·W,  dW = dyᵀ·x,  db = Σ_rows dy
+//! ```
 //!
-//! x [n, in], y [n, out]. The backward pass reads x and W.
+//! x `[n, in]`, y `[n, out]`. The backward pass reads x and W.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::{Real, Rows, RowsMut, Write, gemm};
@@ -25,12 +27,12 @@ pub fn backward_input<T: Real>(level: Level, dy: Rows<'_, T>, weight: &[T], dx: 
     gemm::ab(level, dy, Rows::packed(weight, dy.cols(), dx.cols()), dx, write, scratch);
 }
 
-/// dW {=, +=} dyᵀ·x, [out, in].
+/// dW {=, +=} dyᵀ·x, `[out, in]`.
 pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, dweight: &mut [T], write: Write, scratch: &mut [T]) {
     gemm::atb(level, dy, x, RowsMut::packed(dweight, dy.cols(), x.cols()), write, scratch);
 }
 
-/// db {=, +=} Σ_rows dy, [out].
+/// db {=, +=} Σ_rows dy, `[out]`.
 pub fn backward_bias<T: Real>(level: Level, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     assert_eq!(dy.cols(), dbias.len(), "bias gradient");
     level.run(SumRows { x: dy, total: dbias, write });

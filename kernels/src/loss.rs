@@ -1,7 +1,7 @@
 //! Squared error: L = weight·Σ (y − target)², dL/dy = 2·weight·(y − target).
 //!
 //! With weight = 1/B it is the mean over samples of the squared norm over channels (paper eq. 13); with one over the number of
-//! elements, PyTorch's mean squared error. y, target [n, C].
+//! elements, PyTorch's mean squared error. y, target `[n, C]`.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::rows::same_shape;

@@ -1,9 +1,11 @@
 //! Centred moving average over time, ends padded by repeating the first and the last row (paper eq. 29).
 //!
-//!   y[t] = 1/w · Σ_{|j| ≤ (w−1)/2} x[clamp(t + j, 0, n − 1)],   w odd
+//! ```text
+//! y[t] = 1/w · Σ_{|j| ≤ (w−1)/2} x[clamp(t + j, 0, n − 1)],   w odd
+//! ```
 //!
-//! x, y [n, C]. The backward pass is the exact adjoint, the padding's share folded into the two end rows.
-//! A running sum over time, every channel a lane; it starts afresh every [`RESTART`] rows, so that rounding does not build up.
+//! x, y `[n, C]`. The backward pass is the exact adjoint, the padding's share folded into the two end rows.
+//! A running sum over time, every channel a lane; it starts afresh every `RESTART` rows, so that rounding does not build up.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::rows::same_shape;

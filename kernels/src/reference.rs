@@ -12,7 +12,7 @@ fn sum<T: Real>(terms: impl Iterator<Item = f64>) -> T {
     T::of(terms.sum())
 }
 
-/// c = a·b; a [m, k], b [k, n].
+/// c = a·b; a `[m, k]`, b `[k, n]`.
 pub fn gemm_ab<T: Real>(a: Rows<'_, T>, b: Rows<'_, T>, mut c: RowsMut<'_, T>) {
     for i in 0..c.rows() {
         for j in 0..c.cols() {
@@ -21,7 +21,7 @@ pub fn gemm_ab<T: Real>(a: Rows<'_, T>, b: Rows<'_, T>, mut c: RowsMut<'_, T>) {
     }
 }
 
-/// c = aᵀ·b; a [k, m], b [k, n].
+/// c = aᵀ·b; a `[k, m]`, b `[k, n]`.
 pub fn gemm_atb<T: Real>(a: Rows<'_, T>, b: Rows<'_, T>, mut c: RowsMut<'_, T>) {
     for i in 0..c.rows() {
         for j in 0..c.cols() {
@@ -30,7 +30,7 @@ pub fn gemm_atb<T: Real>(a: Rows<'_, T>, b: Rows<'_, T>, mut c: RowsMut<'_, T>) 
     }
 }
 
-/// c = a·bᵀ; a [m, k], b [n, k].
+/// c = a·bᵀ; a `[m, k]`, b `[n, k]`.
 pub fn gemm_abt<T: Real>(a: Rows<'_, T>, b: Rows<'_, T>, mut c: RowsMut<'_, T>) {
     for i in 0..c.rows() {
         for j in 0..c.cols() {
@@ -96,7 +96,7 @@ pub fn erf(x: f64) -> f64 {
     total * (-x * x).exp() * std::f64::consts::FRAC_2_SQRT_PI
 }
 
-/// o = dropout(softmax(q·kᵀ/√d_k))·v a head, every map stored; also the row log-sum-exp [heads, queries].
+/// o = dropout(softmax(q·kᵀ/√d_k))·v a head, every map stored; also the row log-sum-exp `[heads, queries]`.
 pub fn attention<T: Real>(
     heads: usize,
     q: Rows<'_, T>,
@@ -188,7 +188,7 @@ fn tap_row(geometry: Geometry, rows: usize, t: usize, j: usize) -> usize {
     (t + j).saturating_sub(geometry.left).min(rows - 1)
 }
 
-/// y[t, o] = b[o] + Σ_{c,j} W[o,c,j]·x[clamp(t + j − left), c]; no activation, no dropout.
+/// `y[t, o] = b[o] + Σ_{c,j} W[o,c,j]·x[clamp(t + j − left), c]`; no activation, no dropout.
 pub fn conv1d<T: Real>(geometry: Geometry, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, mut y: RowsMut<'_, T>) {
     let (inputs, outputs) = (x.cols(), y.cols());
     for t in 0..y.rows() {
@@ -285,7 +285,7 @@ pub fn layer_norm_backward<T: Real>(
     }
 }
 
-/// y[t] = mean of x[clamp(t − (w−1)/2 … t + (w−1)/2)].
+/// `y[t]` = mean of `x[clamp(t − (w−1)/2 … t + (w−1)/2)]`.
 pub fn moving_average<T: Real>(width: usize, x: Rows<'_, T>, mut y: RowsMut<'_, T>) {
     let half = width / 2;
     for t in 0..x.rows() {

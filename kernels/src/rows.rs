@@ -213,12 +213,12 @@ impl<T: Real> Kernel for Scale<'_, T> {
     }
 }
 
-/// y {=, +=} x, both [n, C].
+/// y {=, +=} x, both `[n, C]`.
 pub fn copy<T: Real>(level: Level, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
     scale(level, T::ONE, x, y, write);
 }
 
-/// y {=, +=} factor·x, both [n, C].
+/// y {=, +=} factor·x, both `[n, C]`.
 pub fn scale<T: Real>(level: Level, factor: T, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
     same_shape(&x, &y.view());
     level.run(Scale { factor, x, y, write });
@@ -244,27 +244,27 @@ impl<T: Real> Kernel for Combine<'_, T> {
     }
 }
 
-/// y = a + b, all [n, C].
+/// y = a + b, all `[n, C]`.
 pub fn add<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
     level.run(Combine { a, b, sign: T::ONE, y });
 }
 
-/// y = a − b, all [n, C].
+/// y = a − b, all `[n, C]`.
 pub fn subtract<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
     level.run(Combine { a, b, sign: -T::ONE, y });
 }
 
-/// Splits a sequence x [n, C] into its even rows [⌈n/2⌉, C] and odd rows [⌊n/2⌋, C]. Exact.
+/// Splits a sequence x `[n, C]` into its even rows `[⌈n/2⌉, C]` and odd rows `[⌊n/2⌋, C]`. Exact.
 pub fn split<T: Real>(level: Level, x: Rows<'_, T>, even: RowsMut<'_, T>, odd: RowsMut<'_, T>) {
     copy(level, x.even(), even, Write::Set);
     copy(level, x.odd(), odd, Write::Set);
 }
 
-/// The inverse of [`split`], and with `Write::Add` its adjoint's accumulating form: y[2i] {=, +=} even[i], y[2i+1] {=, +=} odd[i].
+/// The inverse of [`split`], and with `Write::Add` its adjoint's accumulating form: `y[2i] {=, +=} even[i]`, `y[2i+1] {=, +=} odd[i]`.
 pub fn interleave<T: Real>(level: Level, even: Rows<'_, T>, odd: Rows<'_, T>, mut y: RowsMut<'_, T>, write: Write) {
     copy(level, even, y.reborrow().even(), write);
     copy(level, odd, y.odd(), write);

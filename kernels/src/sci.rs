@@ -1,9 +1,11 @@
 //! The exchange of an SCI block (paper eqs. 25–28): scale by an exponential, then add or subtract.
 //!
-//!   scaling:  y = x∘eˢ;     dx = dy∘eˢ,  ds = dy∘x∘eˢ
-//!   update:   y = a ± b;    da = dy,  db = ±dy
+//! ```text
+//! scaling:  y = x∘eˢ;     dx = dy∘eˢ,  ds = dy∘x∘eˢ
+//! update:   y = a ± b;    da = dy,  db = ±dy
+//! ```
 //!
-//! All [n, C], any strides. The update is [`crate::rows::add`] and [`crate::rows::subtract`]; its gradients are copies.
+//! All `[n, C]`, any strides. The update is [`crate::rows::add`] and [`crate::rows::subtract`]; its gradients are copies.
 
 use crate::elementary::exp;
 use crate::level::{Isa, Kernel, Level};

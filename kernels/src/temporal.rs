@@ -1,8 +1,10 @@
 //! Linear map over time, shared by all channels (paper eqs. 31–32): y = W·x + b.
 //!
-//!   y[p, c] = b[p] + Σ_t W[p, t]·x[t, c];    dx = Wᵀ·dy,  dW = dy·xᵀ,  db[p] = Σ_c dy[p, c]
+//! ```text
+//! y[p, c] = b[p] + Σ_t W[p, t]·x[t, c];    dx = Wᵀ·dy,  dW = dy·xᵀ,  db[p] = Σ_c dy[p, c]
+//! ```
 //!
-//! x [H, C], W [P, H], b [P], y [P, C]. The backward pass reads x and W.
+//! x `[H, C]`, W `[P, H]`, b `[P]`, y `[P, C]`. The backward pass reads x and W.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::{Real, Rows, RowsMut, Write, gemm, sums};
@@ -64,7 +66,7 @@ pub fn backward_input<T: Real>(level: Level, dy: Rows<'_, T>, weight: &[T], dx: 
     gemm::atb(level, Rows::packed(weight, dy.rows(), dx.rows()), dy, dx, write, scratch);
 }
 
-/// dW {=, +=} dy·xᵀ, [P, H].
+/// dW {=, +=} dy·xᵀ, `[P, H]`.
 ///
 /// # Panics
 /// If shapes disagree.
@@ -78,7 +80,7 @@ pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, d
     }
 }
 
-/// dW[p, t] {=, +=} <dy[p], x[t]>.
+/// `dW[p, t] {=, +=} <dy[p], x[t]>`.
 struct RowDots<'a, T> {
     x: Rows<'a, T>,
     dy: Rows<'a, T>,
@@ -99,7 +101,7 @@ impl<T: Real> Kernel for RowDots<'_, T> {
     }
 }
 
-/// db {=, +=} Σ_c dy[p, c], [P].
+/// db {=, +=} `Σ_c dy[p, c]`, `[P]`.
 ///
 /// # Panics
 /// If lengths disagree.

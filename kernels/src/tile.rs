@@ -1,6 +1,8 @@
 //! The inner loops of every matrix product and convolution: a tile of accumulators that stays in registers.
 //!
-//!   acc[i][j] = Σ_p left(i, p)·right(p, j),   i < MR, j < NR
+//! ```text
+//! acc[i][j] = Σ_p left(i, p)·right(p, j),   i < MR, j < NR
+//! ```
 //!
 //! The left operand is never copied. It comes as rows ([`LeftRows`]: row i of tap τ is a slice along p, which covers a matrix,
 //! a shifted sequence with replicated ends, and a sequence with zeros outside) or as columns ([`columns`]: row p is a slice
@@ -17,7 +19,7 @@ const WIDEST: usize = 32;
 /// Rows of the left operand that pass over one panel before the next panel is taken: they stay in the second-level cache.
 const ROW_BLOCK: usize = 240;
 
-/// Numbers that the panels of a right operand [depth, n] take at any level.
+/// Numbers that the panels of a right operand `[depth, n]` take at any level.
 pub(crate) const fn panels_len(depth: usize, n: usize) -> usize {
     depth * n.next_multiple_of(WIDEST)
 }
@@ -79,7 +81,7 @@ impl<T: Real> Sink<T> for Store<'_, T> {
     }
 }
 
-/// Packs b [depth, n] into panels, the last one filled up with zeros.
+/// Packs b `[depth, n]` into panels, the last one filled up with zeros.
 #[inline(always)]
 pub(crate) fn pack<T: Real, const NR: usize>(b: Rows<'_, T>, panels: &mut [T]) {
     let (depth, n) = (b.rows(), b.cols());
@@ -97,7 +99,7 @@ pub(crate) fn pack<T: Real, const NR: usize>(b: Rows<'_, T>, panels: &mut [T]) {
     }
 }
 
-/// Packs bᵀ for b [n, depth]: element (p, j) of the panels is b[j·, p], where row j of b is `row(j)`, elements `step` apart.
+/// Packs bᵀ for b `[n, depth]`: element (p, j) of the panels is `b[j][p]`, where row j of b is `row(j)`, elements `step` apart.
 #[inline(always)]
 pub(crate) fn pack_transposed<'b, T: Real, const NR: usize>(
     depth: usize,
@@ -191,7 +193,7 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     }
 }
 
-/// One tile of the column form: acc[i][j] = Σ_p left(p)[i]·right(p)[j].
+/// One tile of the column form: `acc[i][j] = Σ_p left(p)[i]·right(p)[j]`.
 #[inline(always)]
 fn column_tile<'a, T: Real, I: Isa, const MR: usize, const NR: usize>(
     depth: usize,
@@ -210,7 +212,7 @@ fn column_tile<'a, T: Real, I: Isa, const MR: usize, const NR: usize>(
     spill(&acc)
 }
 
-/// sink ← leftᵀ·right: row p of the left operand is `left(p)` [m], of the right one `right(p)` [n]; p < depth.
+/// sink ← leftᵀ·right: row p of the left operand is `left(p)` `[m]`, of the right one `right(p)` `[n]`; p < depth.
 #[inline(always)]
 pub(crate) fn columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
     (depth, m, n): (usize, usize, usize),
