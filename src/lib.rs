@@ -9,6 +9,7 @@
 //! angles; quaternions scalar last; velocity is the inertial velocity written in body axes; matrices are row-major.
 #![forbid(unsafe_code)]
 
+pub mod blocks;
 pub mod critique;
 pub mod error;
 pub mod flight;

@@ -78,14 +78,11 @@ fn what_was_derived_or_absent_stays_so_through_files() -> Outcome {
     Ok(())
 }
 
+/// Changes velocity, ω, v', ω', Euler angles and the quaternion of a row.
+type Bend<'a> = dyn Fn(usize, &mut [[f64; 3]; 5], &mut [f64; 4]) + 'a;
+
 /// A flight in the Stanford layout under one of the hypotheses, with so many seconds of standing at its start.
-fn stanford(
-    folder: &Path,
-    name: &str,
-    sheet: &Sheet,
-    idle_s: f64,
-    bend: &dyn Fn(usize, &mut [[f64; 3]; 5], &mut [f64; 4]),
-) -> Outcome {
+fn stanford(folder: &Path, name: &str, sheet: &Sheet, idle_s: f64, bend: &Bend) -> Outcome {
     let (mut smoother, mut controls) = (String::new(), String::new());
     let idle = (idle_s / STEP_S).round() as usize;
     let samples = sheet.get("t").len();
@@ -133,8 +130,7 @@ const KINEMATIC: [Column; 18] = {
 fn the_stanford_layout_is_read_under_each_hypothesis() -> Outcome {
     let sheet = Sheet::canonical(600);
     let turn = |row: usize| rotation_body_to_inertial(sheet.get("roll")[row], sheet.get("pitch")[row], sheet.get("yaw")[row]);
-    type Bend<'a> = Box<dyn Fn(usize, &mut [[f64; 3]; 5], &mut [f64; 4]) + 'a>;
-    let cases: [(&str, Bend); 5] = [
+    let cases: [(&str, Box<Bend>); 5] = [
         ("the quaternion turns body to NED, w in body axes", Box::new(|_, _, _| {})),
         (
             "the quaternion turns body to NED, w in NED",

@@ -101,6 +101,8 @@ fn a_flight_shorter_than_the_history_is_refused() {
     let options = ReadOptions { minimum_rows: 100, ..ReadOptions::default() };
     let message = refusal(read_with(&Sheet::canonical(60).csv(), "", &options));
     assert_says(&message, &["a.csv: found 60 samples, expected at least 100, the length of the history"]);
+    let message = refusal(read_with(&Sheet::canonical(60).csv(), "use = \"height > 0\"", &options));
+    assert_says(&message, &["found 60 samples, expected at least 100"]);
 }
 
 #[test]

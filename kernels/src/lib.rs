@@ -1,10 +1,11 @@
 //! Kernels of phyture: numbers in, numbers out.
 //!
-//! Slices with shapes and row strides; no tape, no model, no input or output, no dependency but `matrixmultiply` (oracle,
-//! f64 and cold path). All `unsafe` and all SIMD of the project live in this crate.
+//! Slices with shapes and row strides; no tape, no model, no input or output, no dependency (`matrixmultiply` is an oracle of
+//! tests and benches). All `unsafe` of the project lives in this crate, and all of it in one place: the call of a kernel
+//! compiled for an instruction-set level ([`level`]). There are no intrinsics: a kernel is plain Rust, compiled once a level.
 //!
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
-//! of a sequence are views; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
+//! of a sequence are views; the [`Level`] is the first argument, chosen once; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
 
 #![expect(clippy::too_many_arguments, reason = "a kernel takes its sizes and buffers one by one, as BLAS does")]
 

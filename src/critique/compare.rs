@@ -3,7 +3,7 @@
 //! Takes predictions as numbers, whoever made them; which windows and which channels are worth judging is the caller's
 //! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
 
-use super::blocks::{BlockMean, BlockSum, Blocks};
+use crate::blocks::{BlockMean, BlockSum, Blocks};
 use super::regime::Regime;
 use crate::error::{Error, Result};
 use crate::flight::split::Part;

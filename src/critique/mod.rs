@@ -1,6 +1,5 @@
 //! The critique: where a model fails against the measurements, and by how much.
 
-pub mod blocks;
 pub mod check;
 pub mod compare;
 pub mod locate;
@@ -10,4 +9,4 @@ pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
 pub use regime::Regime;
-pub use yardstick::{Ridge, RidgeInput, RidgeOptions, centred_difference, finite_difference};
+pub use yardstick::{centred_difference, finite_difference, ridge};

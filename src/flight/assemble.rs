@@ -45,34 +45,35 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     };
     let parts = parts(&table, &time_name, &time_s, schema.resample_hz.is_some(), cuts.split_at_gaps)?;
     let mut done = Assembled::default();
-    let mut pieces = Vec::new();
-    for part in &parts {
-        if part.gap_before_s > 0.0 {
-            let gap = format!("`{name}`: cut at a jump of {:.3} s before t = {:.3} s", part.gap_before_s, part.start_s);
-            done.own_notes.push(gap);
+    if let [whole] = parts.as_slice() {
+        of_part(table, &time_s, whole, Identity { name, manoeuvre, alone: true }, schema, cuts, &mut done)?;
+    } else {
+        for part in &parts {
+            if part.gap_before_s > 0.0 {
+                let gap = format!("`{name}`: cut at a jump of {:.3} s before t = {:.3} s", part.gap_before_s, part.start_s);
+                done.own_notes.push(gap);
+            }
+            if too_short(part.rows.len(), part.step_s, schema, cuts) {
+                done.own_notes.push(left_out(name, part.rows.len(), part.start_s, part.step_s));
+                continue;
+            }
+            let times = time_s.get(part.rows.clone()).unwrap_or_default();
+            let rows = table.slice(part.rows.clone());
+            of_part(rows, times, part, Identity { name, manoeuvre, alone: false }, schema, cuts, &mut done)?;
         }
-        if parts.len() > 1 && too_short(part.rows.len(), part.step_s, schema, cuts) {
-            done.own_notes.push(left_out(name, part.rows.len(), part.start_s, part.step_s));
-            continue;
-        }
-        let rows = if parts.len() == 1 { table.clone() } else { table.slice(part.rows.clone()) };
-        let times = time_s.get(part.rows.clone()).unwrap_or_default();
-        let made = of_part(rows, times, part, (name, manoeuvre, pieces.len()), schema, cuts, &mut done)?;
-        pieces.extend(made);
     }
-    let uncut = parts.len() == 1 && schema.rows.is_empty();
-    if let [only] = pieces.as_slice()
-        && uncut
-        && only.len() < cuts.minimum_rows
-    {
-        let expected = format!("at least {}, the length of the history", cuts.minimum_rows);
-        return Err(table.fault(format!("{} samples", only.len()), expected));
-    }
-    if let [only] = pieces.as_mut_slice() {
+    if let [only] = done.flights.as_mut_slice() {
         only.name = name.to_owned();
     }
-    done.flights = pieces;
     Ok(done)
+}
+
+/// What a part's flights are called, and whether the part is the whole log.
+#[derive(Clone, Copy)]
+struct Identity<'a> {
+    name: &'a str,
+    manoeuvre: &'a str,
+    alone: bool,
 }
 
 fn too_short(rows: usize, step_s: f64, schema: &Schema, cuts: Cuts) -> bool {
@@ -87,16 +88,16 @@ fn left_out(name: &str, rows: usize, start_s: f64, step_s: f64) -> String {
     )
 }
 
-/// The flights of a part without jumps, numbered on from those made before.
+/// Adds the flights of a part without jumps, numbered on from those made before.
 fn of_part(
     mut table: RawTable,
     time_s: &[f64],
     part: &Part,
-    (name, manoeuvre, made_before): (&str, &str, usize),
+    Identity { name, manoeuvre, alone }: Identity,
     schema: &Schema,
     cuts: Cuts,
     done: &mut Assembled,
-) -> Result<Vec<Flight>> {
+) -> Result<()> {
     if let Some(note) = repair::repair(&mut table, &schema.repairs, part.step_s)? {
         done.own_notes.push(format!("`{name}`: {note}"));
     }
@@ -129,24 +130,27 @@ fn of_part(
             if runs.len() == 1 { "" } else { "s" }
         ));
     }
-    let mut flights = Vec::new();
-    let whole = runs.len() == 1 && runs[0].len() == samples;
     for run in runs {
         let run_start_s = start_s + step_s * run.start as f64;
-        if !whole && too_short(run.len(), step_s, schema, cuts) {
+        if too_short(run.len(), step_s, schema, cuts) {
+            if alone && run.len() == samples {
+                let least = cuts.minimum_rows.max((schema.minimum_length_s / step_s).ceil() as usize);
+                let expected = format!("at least {least}, the length of the history (or `minimum_length_s` in dataset.toml)");
+                return Err(table.fault(format!("{samples} samples"), expected));
+            }
             done.own_notes.push(left_out(name, run.len(), run_start_s, step_s));
             continue;
         }
         check_used(&table, &columns, &run, &row_of)?;
         let cut = |values: &[f64]| values.get(run.clone()).unwrap_or_default().to_vec();
         let canonical = std::array::from_fn(|column| columns.canonical[column].as_deref().map(cut).unwrap_or_default());
-        let number = made_before + flights.len() + 1;
+        let number = done.flights.len() + 1;
         let mut flight = Flight::new(format!("{name}[{number}]"), manoeuvre, run_start_s, step_s, canonical, targets)?;
         flight.absent = absent.clone();
         flight.extra = columns.extra.iter().map(|(name, values)| (name.clone(), cut(values))).collect();
-        flights.push(flight);
+        done.flights.push(flight);
     }
-    Ok(flights)
+    Ok(())
 }
 
 /// Every column to the new times; attitude as a quaternion, so that wrapped angles and loops cost nothing.
@@ -168,8 +172,9 @@ fn resample(columns: &mut Columns, resampler: &Resampler) {
     }
     let parts = parts.map(|values| resampler.apply(&values));
     let mut euler: [Vec<f64>; 3] = Default::default();
-    for sample in 0..parts[0].len() {
-        let angles = attitude::quaternion_to_euler([parts[0][sample], parts[1][sample], parts[2][sample], parts[3][sample]]);
+    let [a, b, c, d] = &parts;
+    for (((&a, &b), &c), &d) in a.iter().zip(b).zip(c).zip(d) {
+        let angles = attitude::quaternion_to_euler([a, b, c, d]);
         euler.iter_mut().zip(angles).for_each(|(values, angle)| values.push(angle));
     }
     for column in Column::ALL.into_iter().filter(|column| !angles.contains(column)) {

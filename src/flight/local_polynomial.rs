@@ -12,6 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
     /// Its value at the point.
+    #[cfg_attr(not(feature = "files"), allow(dead_code, reason = "only logs are resampled"))]
     Value,
     /// Its derivative at the point, by the unit of the offsets.
     Slope,

@@ -27,7 +27,7 @@ pub(super) struct Part {
 /// [`Error::Cell`](crate::Error::Cell) where time steps back, repeats, or is shorter than the step; where it jumps unless `split`.
 pub(super) fn parts(table: &RawTable, column: &str, time_s: &[f64], resampled: bool, split: bool) -> Result<Vec<Part>> {
     let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if let Some(at) = steps.iter().position(|&step| !(step > 0.0)) {
+    if let Some(at) = steps.iter().position(|&step| step.is_nan() || step <= 0.0) {
         let (before, after) = (time_s[at], time_s[at + 1]);
         let what = if after == before { "repeats" } else { "steps back" };
         let found = format!("time that {what}: {after} s after {before} s");

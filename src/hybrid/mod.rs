@@ -3,10 +3,12 @@
 //! A [`Hybrid`] holds everything a prediction needs (calibrated model, inputs, scales, weights) and is one file. How it was
 //! trained is in `train`.
 
+pub mod linear;
 pub mod scaling;
 pub mod sequence;
 mod stream;
 
+use linear::Linear;
 pub use scaling::{Scale, Scaling};
 pub use stream::StreamingHybrid;
 
@@ -37,6 +39,8 @@ pub struct Description {
     pub config: PhyTureConfig,
     /// State-control inputs, as formulas of the log's columns.
     pub inputs: Vec<String>,
+    /// Linear history between physics and network, if there is one.
+    pub linear: Option<Linear>,
     /// Fixed scales from the training part.
     pub scaling: Scaling,
     /// Sampling step of the training data, s.
@@ -122,6 +126,9 @@ impl Hybrid {
         let text = file.metadata.get(METADATA).ok_or_else(|| fault("holds no hybrid of phyture (no such metadata)".into()))?;
         let description: Description =
             serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;
+        if let Some(linear) = &description.linear {
+            linear.check().map_err(fault)?;
+        }
         let network = description.network(false)?;
         let mut parameters = vec![0.0; network.graph().parameter_count()];
         for parameter in network.parameters() {
@@ -152,7 +159,7 @@ impl Hybrid {
     /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; what evaluating the
     /// model gives.
     pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
-        let Description { model, config, inputs, scaling, .. } = &self.description;
+        let config = &self.description.config;
         flights.iter().try_for_each(|flight| self.description.check_step(flight))?;
         let whole = |window: &Window| {
             window.last + 1 >= config.history && flights.get(window.flight).is_some_and(|flight| window.last < flight.len())
@@ -165,7 +172,7 @@ impl Hybrid {
                 expected: format!("a row with a full history of {} samples", config.history),
             });
         }
-        let sequences = sequence::sequences(flights, model, inputs, scaling, config)?;
+        let sequences = sequence::sequences(flights, &self.description)?;
         let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
         let mut predicted = Vec::with_capacity(windows.len());
         for chunk in windows.chunks(CHUNK) {

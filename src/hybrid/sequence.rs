@@ -1,8 +1,10 @@
 //! Flights as the network sees them: scaled state and physics rows, ready to be cut into histories.
 
+use super::Description;
+use super::linear::{Linear, LinearConfig, Signals};
 use super::scaling::{Scale, Scaling};
 use crate::error::{Error, Result};
-use crate::flight::{Accelerations, Column, Flight, Span};
+use crate::flight::{Accelerations, Column, Flight, Span, Window};
 use crate::formula::Formula;
 use crate::nn::PhyTureConfig;
 use crate::physics::Model;
@@ -24,9 +26,16 @@ struct Raw {
 }
 
 impl Raw {
-    fn new(flight: &Flight, model: &Model, inputs: &[Formula], residual: bool) -> Result<Self> {
+    fn new(flight: &Flight, model: &Model, inputs: &[Formula], linear: Option<&Linear>, residual: bool) -> Result<Self> {
         let state = inputs.iter().map(|formula| crate::physics::evaluate(formula, flight)).collect::<Result<_>>()?;
-        let baseline = model.predict(flight)?;
+        let mut baseline = model.predict(flight)?;
+        if let Some(linear) = linear {
+            let signals = Signals::new(flight, linear.config())?;
+            for sample in 0..flight.len() {
+                let filtered = linear.at(&signals, sample);
+                baseline.iter_mut().zip(filtered).for_each(|(column, value)| column[sample] += value);
+            }
+        }
         let learned = learned(flight, &baseline, residual);
         Ok(Self { state, baseline, learned })
     }
@@ -37,7 +46,7 @@ impl Raw {
 pub struct Sequence {
     /// Scaled state-control rows, `[samples, D_S]`.
     state: Vec<f32>,
-    /// Scaled baseline rows, `[samples, 6]`.
+    /// Scaled rows of the baseline (physics, and linear history where there is one), `[samples, 6]`.
     physics: Vec<f32>,
     /// What the network is to predict, `[samples, 6]`, physical units.
     learned: Vec<f32>,
@@ -92,21 +101,17 @@ pub fn parse_inputs(inputs: &[String]) -> Result<Vec<Formula>> {
     inputs.iter().map(|text| Formula::parse(text)).collect()
 }
 
-/// The flights of a data set as sequences under `scaling`.
+/// The flights of a data set as sequences, as the description says.
 ///
 /// # Errors
 /// [`Error::Formula`] if an input or an effect names a column that a flight lacks; [`Error::Undetermined`] if a value is not
 /// finite: a NaN never reaches the network.
-pub fn sequences(
-    flights: &[Flight],
-    model: &Model,
-    inputs: &[String],
-    scaling: &Scaling,
-    config: &PhyTureConfig,
-) -> Result<Vec<Sequence>> {
+pub fn sequences(flights: &[Flight], description: &Description) -> Result<Vec<Sequence>> {
+    let Description { model, config, inputs, linear, scaling, .. } = description;
     let formulas = parse_inputs(inputs)?;
     let one = |flight: &Flight| {
-        let sequence = Sequence::new(Raw::new(flight, model, &formulas, config.variant.predicts_residual())?, scaling);
+        let raw = Raw::new(flight, model, &formulas, linear.as_ref(), config.variant.predicts_residual())?;
+        let sequence = Sequence::new(raw, scaling);
         check_finite(flight, inputs, &sequence)?;
         Ok(sequence)
     };
@@ -117,21 +122,32 @@ pub fn sequences(
 ///
 /// # Errors
 /// As [`sequences`].
-pub fn scaling(flights: &[Flight], spans: &[Span], model: &Model, inputs: &[String], config: &PhyTureConfig) -> Result<Scaling> {
+pub fn scaling(flights: &[Flight], spans: &[Span], model: &Model, inputs: &[String], linear: Option<&Linear>, config: &PhyTureConfig) -> Result<Scaling> {
     let formulas = parse_inputs(inputs)?;
-    let raw: Vec<Raw> = flights
-        .iter()
-        .map(|flight| Raw::new(flight, model, &formulas, config.variant.predicts_residual()))
-        .collect::<Result<_>>()?;
-    let of = |column: &dyn Fn(&Raw) -> Vec<f64>| {
-        let columns: Vec<Vec<f64>> = raw.iter().map(column).collect();
-        Scale::of(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>(), spans)
+    let residual = config.variant.predicts_residual();
+    let raw: Vec<Raw> = flights.iter().map(|flight| Raw::new(flight, model, &formulas, linear, residual)).collect::<Result<_>>()?;
+    let of = |column: &dyn Fn(&Raw) -> &Vec<f64>| {
+        let columns: Vec<&[f64]> = raw.iter().map(|raw| column(raw).as_slice()).collect();
+        Scale::of(&columns, spans)
     };
     Ok(Scaling {
-        state: (0..inputs.len()).map(|input| of(&|raw| raw.state[input].clone())).collect(),
-        physics: std::array::from_fn(|channel| of(&|raw| raw.baseline[channel].clone())),
-        output: std::array::from_fn(|channel| of(&|raw| raw.learned[channel].clone())),
+        state: (0..inputs.len()).map(|input| of(&|raw| &raw.state[input])).collect(),
+        physics: std::array::from_fn(|channel| of(&|raw| &raw.baseline[channel])),
+        output: std::array::from_fn(|channel| of(&|raw| &raw.learned[channel])),
     })
+}
+
+/// The linear history of what the model leaves over on the training spans.
+///
+/// # Errors
+/// As [`Linear::fit`] and [`Model::predict`].
+pub fn linear(flights: &[Flight], spans: &[Span], model: &Model, config: &LinearConfig) -> Result<Linear> {
+    let windows = crate::flight::windows::windows(spans, config.lags, 1);
+    let baselines: Vec<Accelerations> = flights.iter().map(|flight| model.predict(flight)).collect::<Result<_>>()?;
+    let left_over: Vec<Accelerations> =
+        flights.iter().zip(&baselines).map(|(flight, baseline)| learned(flight, baseline, true)).collect();
+    let target = |window: &Window| std::array::from_fn(|channel| left_over[window.flight][channel][window.last]);
+    Linear::fit(flights, &windows, &windows.iter().map(target).collect::<Vec<_>>(), config)
 }
 
 fn check_finite(flight: &Flight, inputs: &[String], sequence: &Sequence) -> Result<()> {

@@ -1,6 +1,7 @@
 //! The hybrid in real time: one sample in, one prediction out, on the calling thread.
 
 use super::Hybrid;
+use super::linear::Linear;
 use super::sequence::parse_inputs;
 use crate::error::{Error, Result};
 use crate::formula::StreamingFormula;
@@ -11,6 +12,7 @@ use crate::tape::{Session, Threads};
 pub struct StreamingHybrid<'a> {
     hybrid: &'a Hybrid,
     model: StreamingModel,
+    linear: Option<StreamingLinear>,
     inputs: Vec<StreamingFormula>,
     session: Session<f32>,
     /// The last H rows, scaled, oldest first.
@@ -20,18 +22,23 @@ pub struct StreamingHybrid<'a> {
     values: Vec<f64>,
 }
 
+/// Whether a stream has this quantity.
+fn known(name: &str) -> bool {
+    quantity_at(&[0.0; 16], 0.0, name).is_some()
+}
+
 impl<'a> StreamingHybrid<'a> {
     pub(super) fn new(hybrid: &'a Hybrid) -> Result<Self> {
         let description = hybrid.description();
         let formulas = parse_inputs(&description.inputs)?;
-        let probe = |name: &str| quantity_at(&[0.0; 16], 0.0, name).is_some();
-        if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&probe)) {
+        if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&known)) {
             return Err(error);
         }
         let history = description.config.history;
         Ok(Self {
             hybrid,
             model: description.model.stream(description.step_s)?,
+            linear: description.linear.as_ref().map(|linear| StreamingLinear::new(linear, description.step_s)).transpose()?,
             inputs: formulas.iter().map(|formula| formula.stream(description.step_s)).collect::<Result<_>>()?,
             session: Session::infer(hybrid.network.graph(), &[hybrid.network.output()], Threads(1))?,
             state: vec![0.0; history * description.inputs.len()],
@@ -51,8 +58,12 @@ impl<'a> StreamingHybrid<'a> {
             return Err(Error::Undetermined(format!("sample {}: `{name}` is {}, not a finite number", self.samples, state[index])));
         }
         let description = self.hybrid.description();
-        let baseline = self.model.push(state)?;
+        let mut baseline = self.model.push(state)?;
         let time_s = description.step_s * self.samples as f64;
+        if let (Some(stream), Some(linear)) = (&mut self.linear, &description.linear) {
+            let filtered = stream.push(linear, state, time_s)?;
+            baseline.iter_mut().zip(filtered).for_each(|(sum, value)| *sum += value);
+        }
         let channels = self.inputs.len();
         self.state.copy_within(channels.., 0);
         self.physics.copy_within(6.., 0);
@@ -83,5 +94,37 @@ impl<'a> StreamingHybrid<'a> {
             return Err(Error::Undetermined(format!("sample {}: the prediction is not finite", self.samples - 1)));
         }
         Ok(Some(predicted))
+    }
+}
+
+/// The linear history's inputs and its last rows, newest first.
+struct StreamingLinear {
+    inputs: Vec<StreamingFormula>,
+    rows: std::collections::VecDeque<Vec<f64>>,
+    lags: usize,
+    values: Vec<f64>,
+}
+
+impl StreamingLinear {
+    fn new(linear: &Linear, step_s: f64) -> Result<Self> {
+        let formulas = parse_inputs(&linear.config().inputs)?;
+        if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&known)) {
+            return Err(error);
+        }
+        let inputs = formulas.iter().map(|formula| formula.stream(step_s)).collect::<Result<_>>()?;
+        Ok(Self { inputs, rows: std::collections::VecDeque::new(), lags: linear.config().lags, values: Vec::new() })
+    }
+
+    fn push(&mut self, linear: &Linear, state: &[f64; 16], time_s: f64) -> Result<[f64; 6]> {
+        let mut row = if self.rows.len() == self.lags { self.rows.pop_back().unwrap_or_default() } else { Vec::new() };
+        row.clear();
+        for formula in &mut self.inputs {
+            self.values.clear();
+            self.values.extend(formula.inputs().iter().map(|name| quantity_at(state, time_s, name).unwrap_or(f64::NAN)));
+            row.push(formula.push(&self.values)?);
+        }
+        self.rows.push_front(row);
+        let last = self.rows.len() - 1;
+        Ok(linear.predict(|lag| &self.rows[lag.min(last)]))
     }
 }

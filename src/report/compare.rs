@@ -97,9 +97,11 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
         let wins: Vec<&str> =
             (0..6).filter(|c| other.rmse.channels()[*c] > channels[*c] && channels[*c].is_some()).map(name).collect();
         out.push(match wins.len() {
-            0 => format!("It beats the yardstick “{}” in no channel.", other.name),
-            6 => format!("It beats the yardstick “{}” in all six channels.", other.name),
-            _ => format!("It beats the yardstick “{}” in {} of 6 channels: {}.", other.name, wins.len(), wins.join(", ")),
+            0 => format!("{} beats the yardstick “{}” in no channel.", model.name, other.name),
+            6 => format!("{} beats the yardstick “{}” in all six channels.", model.name, other.name),
+            _ => {
+                format!("{} beats the yardstick “{}” in {} of 6 channels: {}.", model.name, other.name, wins.len(), wins.join(", "))
+            }
         });
     }
     let worst_part = |parts: &std::collections::BTreeMap<String, PartError>| {
@@ -180,16 +182,21 @@ fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
             rows,
         })
     };
-    let flown: Vec<(&Regime, &PartError)> = Regime::ALL
+    // The worst part first.
+    let score = |part: &PartError| normalised(part, deviation).into_iter().flatten().fold(0.0, f64::max);
+    let mut manoeuvres: Vec<(&String, &PartError)> = model.by_manoeuvre.iter().collect();
+    manoeuvres.sort_by(|a, b| score(b.1).total_cmp(&score(a.1)));
+    let mut flown: Vec<(&Regime, &PartError)> = Regime::ALL
         .iter()
         .filter_map(|regime| Some((regime, model.by_regime.get(regime.name())?)))
         .filter(|(_, part)| part.n > 0)
         .collect();
+    flown.sort_by(|a, b| score(b.1).total_cmp(&score(a.1)));
     let missing: Vec<&str> =
         Regime::ALL.iter().filter(|regime| flown.iter().all(|(other, _)| other != regime)).map(|regime| regime.name()).collect();
     let rules: Vec<String> = Regime::ALL.iter().map(|regime| format!("{}: {}", regime.name(), regime.rule())).collect();
     let mut parts = vec![
-        map("manoeuvre", model.by_manoeuvre.iter().map(|(name, part)| row(name, part)).collect()),
+        map("manoeuvre", manoeuvres.iter().map(|(name, part)| row(name, part)).collect()),
         map("regime", flown.iter().map(|(regime, part)| row(regime.name(), part)).collect()),
         Part::Text(format!("A sample has the first regime whose rule holds. {}.", rules.join("; "))),
     ];
@@ -197,7 +204,7 @@ fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
         parts.push(Part::Text(format!("Not in these windows: {}.", missing.join(", "))));
     }
     parts.push(Part::Text(
-        "n counts windows. Intervals rest on blocks of ten seconds, as neighbouring samples are not independent; without one there is a single block.".into(),
+        "Worst part first, by its worst channel. n counts windows. Intervals rest on blocks of ten seconds, as neighbouring samples are not independent; without one there is a single block.".into(),
     ));
     Section { title: "Where the error lies".into(), parts }
 }

@@ -24,7 +24,7 @@ pub const PANELS: usize = 6;
 const FAINT: &str = "#b5cfe0";
 
 /// An interactive figure, ready for a page.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct Figure {
     /// Title.
     pub title: String,
@@ -32,20 +32,13 @@ pub struct Figure {
     pub caption: String,
     /// Height on the page, pixels.
     pub height_px: usize,
-    traces: Traces,
-    layout: Layout,
-}
-
-impl std::fmt::Debug for Figure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Figure").field("title", &self.title).field("traces", &self.traces.len()).finish_non_exhaustive()
-    }
+    json: String,
 }
 
 impl Figure {
     /// `{"data": …, "layout": …}` as the figure library takes it.
-    pub fn json(&self) -> String {
-        format!("{{\"data\":{},\"layout\":{}}}", self.traces.to_json(), self.layout.to_json())
+    pub fn json(&self) -> &str {
+        &self.json
     }
 }
 
@@ -277,7 +270,8 @@ fn rounded(values: &[f64]) -> Vec<f64> {
 }
 
 fn figure(title: &str, caption: &str, traces: Traces, layout: Layout, height_px: usize) -> Figure {
-    Figure { title: title.to_owned(), caption: caption.to_owned(), height_px, traces, layout: layout.height(height_px) }
+    let json = format!("{{\"data\":{},\"layout\":{}}}", traces.to_json(), layout.height(height_px).to_json());
+    Figure { title: title.to_owned(), caption: caption.to_owned(), height_px, json }
 }
 
 /// Where the panels of a figure stand, in pixels and as shares of the plotting area.
@@ -419,7 +413,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn json(figure: &Figure) -> serde_json::Value {
-        serde_json::from_str(&figure.json()).unwrap_or_default()
+        serde_json::from_str(figure.json()).unwrap_or_default()
     }
 
     fn panels(count: usize) -> Vec<(String, String)> {

@@ -268,7 +268,7 @@ figcaption { max-width: 46rem; }
   body { padding: 0; max-width: none; }
   p, figcaption { max-width: none; }
   .wide { overflow: visible; break-inside: avoid; }
-  h2, caption, figcaption { break-after: avoid; } tr, figure { break-inside: avoid; }
+  h2, h2 + p, caption, figcaption { break-after: avoid; } tr, figure { break-inside: avoid; }
   * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   nav, .modebar { display: none !important; }
 }

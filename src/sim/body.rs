@@ -58,12 +58,6 @@ impl State {
         [x, y, z, a, b, c, d, u, v, w, p, q, r, b1, a1, tail, collective, self.induced, self.rotor_speed]
     }
 
-    /// What an accelerometer along the mast shows, up, m/s², when the velocity down changes at this rate.
-    pub(super) fn felt(&self, down_rate: f64) -> f64 {
-        let gravity = to_body(&rotation(self.attitude), [0.0, 0.0, GRAVITY_M_S2]);
-        gravity[2] - cross(self.rate, self.velocity)[2] - down_rate
-    }
-
     pub(super) fn from_flat(flat: &Flat) -> Self {
         let [x, y, z, a, b, c, d, u, v, w, p, q, r, b1, a1, tail, collective, induced, rotor_speed] = *flat;
         Self {
@@ -347,4 +341,80 @@ impl Body {
 struct Air {
     v: [f64; 3],
     speed: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    fn unit(q: [f64; 4]) -> Option<[f64; 4]> {
+        let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (length > 0.1).then(|| q.map(|x| x / length))
+    }
+
+    fn close(a: [f64; 3], b: [f64; 3], size: f64) -> bool {
+        a.iter().zip(b).all(|(a, b)| (a - b).abs() < Tolerance::Close.relative_f64() * size)
+    }
+
+    proptest! {
+        #[test]
+        fn a_product_rotates_right_first(
+            left in prop::array::uniform4(-1.0..1.0_f64),
+            right in prop::array::uniform4(-1.0..1.0_f64),
+            v in prop::array::uniform3(-10.0..10.0_f64),
+        ) {
+            let (Some(left), Some(right)) = (unit(left), unit(right)) else { return Ok(()) };
+            let both = to_local(&rotation(product(left, right)), v);
+            let one_by_one = to_local(&rotation(left), to_local(&rotation(right), v));
+            prop_assert!(close(both, one_by_one, 20.0));
+            prop_assert!(close(to_body(&rotation(left), to_local(&rotation(left), v)), v, 20.0));
+        }
+
+        #[test]
+        fn the_full_tensor_satisfies_euler_s_equation(
+            rate in prop::array::uniform3(-5.0..5.0_f64),
+            direct in prop::array::uniform3(-50.0..50.0_f64),
+        ) {
+            let body = Body::new(&Mechanisms::none().with(Mechanism::InertiaCross, 1.0));
+            let ([ix, iy, iz], xz) = (INERTIA_KG_M2, INERTIA_XZ_KG_M2);
+            let tensor = |[x, y, z]: [f64; 3]| [ix * x - xz * z, iy * y, iz * z - xz * x];
+            let inertial = tensor(body.angular_acceleration(rate, direct));
+            let turning = cross(rate, tensor(rate));
+            let sum = std::array::from_fn(|axis| inertial[axis] + turning[axis]);
+            prop_assert!(close(sum, [ix * direct[0], iy * direct[1], iz * direct[2]], 20.0));
+        }
+    }
+
+    #[test]
+    fn the_baseline_hovers_at_its_trim() {
+        let body = Body::new(&Mechanisms::none());
+        let state = body.hover(10.0, 0.7);
+        let trim: [f64; 3] = std::array::from_fn(|axis| -COEFFICIENTS.d2[axis] / COEFFICIENTS.c2[axis]);
+        let controls = [trim[0], trim[1], trim[2], state.servo[1]];
+        let rates = body.derivative(&state.flat(), controls, &Disturbance::default(), 0.0);
+        assert!(rates.iter().all(|rate| rate.abs() < Tolerance::Close.relative_f64() * GRAVITY_M_S2), "{rates:?}");
+    }
+
+    #[test]
+    fn lags_change_the_way_there_and_not_the_steady_response() {
+        let on = [Mechanism::CyclicLag, Mechanism::TailLag, Mechanism::CollectiveLag]
+            .into_iter()
+            .fold(Mechanisms::none(), |mechanisms, mechanism| mechanisms.with(mechanism, 1.0));
+        let (quick, slow) = (Body::new(&Mechanisms::none()), Body::new(&on));
+        let fly = |body: &Body, steps: usize| {
+            let mut flat = body.hover(10.0, 0.0).flat();
+            let controls = [0.02, -0.01, 0.03, 0.465];
+            (0..steps).for_each(|_| body.step(&mut flat, [controls; 3], &Disturbance::default(), 0.0, 0.002));
+            State::from_flat(&flat).rate
+        };
+        let (early, late) = ((fly(&quick, 20), fly(&slow, 20)), (fly(&quick, 2000), fly(&slow, 2000)));
+        for axis in 0..3 {
+            let left = |early: [f64; 3], late: [f64; 3]| (early[axis] - late[axis]).abs();
+            assert!(left(early.1, late.1) > 1.1 * left(early.0, late.0), "axis {axis}: {early:?}");
+            // After 4 s only the gyroscopic terms tell the histories apart.
+            assert!((late.1[axis] - late.0[axis]).abs() < 0.02 * late.0[axis].abs(), "axis {axis}: {late:?}");
+        }
+    }
 }

@@ -77,8 +77,9 @@ fn rates(rates: [f64; 3], constant: f64, upright: f64) -> Goal {
 /// Height at which a class starts, m.
 pub(super) fn start_height(class: &str) -> f64 {
     match class {
-        "hover_low" => 1.5,
-        "hover" | "control_steps" => 8.0,
+        "hover_low" => 1.3,
+        "control_steps" => 6.0,
+        "hover" => 4.0,
         "pirouettes" => 12.0,
         "descents" => 40.0,
         "vertical_sweeps" | "orientation_sweeps" | "turn_demos1" | "dodging_demos" | "stop_and_go" => 20.0,
@@ -105,15 +106,15 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
     let spread = |random: &mut Random, value: f64| value * random.between(0.75, 1.25);
     match class {
         // Heights evenly spread in their logarithm, so that the ground is felt in half of them.
-        "hover" => fly(random.between(3.0, 6.0), 0.8 * random.between(0.0, 10.0_f64.ln()).exp(), path(0.0, 0.0, 0.0)),
+        "hover" => fly(random.between(3.0, 6.0), 0.8 * random.between(0.0, 8.0_f64.ln()).exp(), path(0.0, 0.0, 0.0)),
         "hover_low" => {
             let (ahead, right) = (random.between(-1.0, 1.0), random.between(-1.0, 1.0));
-            fly(random.between(2.5, 5.0), random.between(0.8, 3.0), path(ahead, right, random.between(-0.4, 0.4)));
+            fly(random.between(2.5, 5.0), random.between(0.7, 1.8), path(ahead, right, random.between(-0.4, 0.4)));
         }
         "vertical_sweeps" => {
             let periods = [random.between(5.0, 7.0), random.between(2.0, 3.5)];
             let (height, climb) =
-                if random.uniform() < 0.5 { (2.6, random.between(0.5, 1.0)) } else { (home, random.between(2.0, 5.0)) };
+                if random.uniform() < 0.6 { (1.9, random.between(0.4, 0.8)) } else { (home, random.between(2.0, 5.0)) };
             fly(3.0, height, path(0.0, 0.0, 0.0));
             fly(14.0, height, Goal::Sweep { ahead: 0.0, right: 0.0, climb, turn: 0.0, periods, inverted: false });
         }
@@ -157,9 +158,11 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             let pattern = [MULTISTEP, DOUBLET, STEP][random.below(3)];
             let unit_s = random.between(0.15, 0.3);
             let ahead = [0.0, 0.0, 6.0, 10.0][random.below(4)];
+            // Low over the ground only at rest and without collective inputs.
+            let height = if ahead == 0.0 && channel != 3 { 2.3 } else { home };
             let seconds = unit_s * pattern.len() as f64;
-            fly(seconds, home, Goal::Stick { channel, amplitude, unit_s, pattern, ahead });
-            fly(random.between(1.8, 2.6), home, path(ahead, 0.0, 0.0));
+            fly(seconds, height, Goal::Stick { channel, amplitude, unit_s, pattern, ahead });
+            fly(random.between(1.8, 2.6), height, path(ahead, 0.0, 0.0));
         }
         "descents" => {
             // Down, round out, hover low, and back up.
@@ -173,8 +176,8 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
                 inverted: false,
             };
             fly(34.0 / sink, home, climb(-sink, ahead));
-            fly(4.0, 6.0, path(0.0, 0.0, 0.0));
-            fly(random.between(3.5, 5.5), random.between(1.2, 3.0), path(0.0, 0.0, 0.0));
+            fly(5.0, 6.0, path(0.0, 0.0, 0.0));
+            fly(random.between(5.0, 8.0), random.between(1.0, 2.2), path(0.0, 0.0, 0.0));
             fly(6.5, home, climb(random.between(4.0, 5.5), ahead));
         }
         "loops" => {
@@ -239,7 +242,7 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             one(kinds[random.below(kinds.len())], random, segments);
         }
         // Tumbling about all axes with the collective following the tilt, and a catch after each.
-        _ if class == "chaos" => {
+        "chaos" => {
             for _ in 0..1 + random.below(3) {
                 let spin = [random.between(-4.5, 4.5), random.between(-4.5, 4.5), random.between(-3.0, 3.0)];
                 fly(random.between(0.5, 1.2), home, rates(spin, 0.0, 1.7));

@@ -1,6 +1,5 @@
 //! The switches of the truth helicopter: which mechanisms it has beyond the paper's baseline, and how strong. No physics here.
 
-use super::vehicle;
 use crate::error::{Error, Result};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -71,9 +70,8 @@ impl Mechanism {
     /// Largest scale: beyond it the pilot is not shown to keep the aircraft in the air, in any of the classes.
     pub const fn largest_scale(self) -> f64 {
         match self {
-            Self::TranslLift => 1.25,
-            Self::VortexRing => 1.5,
-            _ => 2.0,
+            Self::VortexRing | Self::Turbulence => 1.5,
+            _ => 3.0,
         }
     }
 
@@ -155,29 +153,6 @@ impl Serialize for Mechanisms {
         }
         map.end()
     }
-}
-
-/// What a simulation hides in its logs: everything somebody needs to judge a calibration or a diagnosis against.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Truth {
-    /// Seed of the session.
-    pub seed: u64,
-    /// Version of this crate.
-    pub version: &'static str,
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Diagonal of the inertia tensor, kg m².
-    pub inertia: [f64; 3],
-    /// Rotor radius, m.
-    pub rotor_radius_m: f64,
-    /// Delay between a logged control and the acceleration logged beside it, s, that a model of these logs should state.
-    pub control_delay_s: f64,
-    /// Disturbances, noise and smoothing.
-    pub level: super::Level,
-    /// Coefficients of eqs. 14-15.
-    pub coefficients: vehicle::Coefficients,
-    /// Mechanisms beyond the baseline that are on, and their scales.
-    pub mechanisms: Mechanisms,
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ mod vehicle;
 mod wind;
 
 pub use manoeuvres::CLASSES;
-pub use mechanisms::{Mechanism, Mechanisms, Truth};
+pub use mechanisms::{Mechanism, Mechanisms};
 pub use vehicle::{COEFFICIENTS, Coefficients, INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M};
 
 use crate::error::{Error, Result};
@@ -184,6 +184,29 @@ impl Simulation {
     }
 }
 
+/// What a simulation hides in its logs: everything somebody needs to judge a calibration or a diagnosis against.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Truth {
+    /// Seed of the session.
+    pub seed: u64,
+    /// Version of this crate.
+    pub version: &'static str,
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Diagonal of the inertia tensor, kg m².
+    pub inertia: [f64; 3],
+    /// Rotor radius, m.
+    pub rotor_radius_m: f64,
+    /// Delay between a logged control and the acceleration logged beside it, s, that a model of these logs should state.
+    pub control_delay_s: f64,
+    /// Disturbances, noise and smoothing.
+    pub level: Level,
+    /// Coefficients of eqs. 14-15.
+    pub coefficients: Coefficients,
+    /// Mechanisms beyond the baseline that are on, and their scales.
+    pub mechanisms: Mechanisms,
+}
+
 /// Flies and records a session. Flights are sorted by class and name.
 ///
 /// # Errors
@@ -227,7 +250,7 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
         let state = State::from_flat(&flat);
         let mut controls = actuators.output();
         let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, &disturbance, burnt);
-        actuators.push(pilot.fly(&state, state.felt(az), sample >= settling));
+        actuators.push(pilot.fly(&state, sample >= settling));
         if sample >= settling {
             motion.push(Instant {
                 position: state.position,

@@ -20,12 +20,10 @@ const DITHER_TIME_S: f64 = 0.12;
 const VELOCITY_GAIN: [f64; 2] = [1.3, 0.3];
 /// The same for the vertical, where the stick acts on the acceleration itself.
 const CLIMB_GAIN: [f64; 2] = [2.2, 0.9];
-/// Time in which the hand gets used to a thrust that is not what it expects, s.
-const FEEL_TIME_S: f64 = 0.3;
-/// Ratio of felt to expected thrust up to which the hand lets the path's own feedback do the work.
-const FEEL_FREE: f64 = 1.6;
+/// Largest heave damping the hand allows for, m/s². Beyond, it would chase a fall with less and less collective.
+const FELT_DAMPING_M_S2: f64 = 6.0;
 /// Height error to climb, 1/s.
-const HEIGHT_GAIN: f64 = 1.0;
+const HEIGHT_GAIN: f64 = 1.3;
 /// Attitude error to rate, 1/s.
 const ATTITUDE_GAIN: f64 = 3.5;
 /// Rate error to angular acceleration, 1/s, and its integral, 1/s².
@@ -58,7 +56,6 @@ pub(super) struct Pilot {
     velocity_sum: [f64; 3],
     rate_sum: [f64; 3],
     sticks: [f64; 4],
-    feel: f64,
     dither: [GaussMarkov; 4],
     random: Random,
     step_s: f64,
@@ -86,7 +83,6 @@ impl Pilot {
             velocity_sum: [0.0; 3],
             rate_sum: [0.0; 3],
             sticks,
-            feel: 1.0,
             dither,
             random,
             step_s,
@@ -94,13 +90,8 @@ impl Pilot {
     }
 
     /// Stick positions one step ahead, each in [-1, 1], from the state now. Until the script starts, the pilot hovers.
-    /// `felt` is the specific force along the mast, up, m/s².
-    pub(super) fn fly(&mut self, state: &State, felt: f64, started: bool) -> [f64; 4] {
+    pub(super) fn fly(&mut self, state: &State, started: bool) -> [f64; 4] {
         let rotation = rotation(state.attitude);
-        // Collective feel: the ratio of what is felt to what this stick position gives on the nominal machine.
-        let expected = -Self::thrust_line(state, self.sticks[3]);
-        let surprise = (felt - self.feel * expected) * expected / (GRAVITY_M_S2 * GRAVITY_M_S2 + expected * expected);
-        self.feel = (self.feel + self.step_s / FEEL_TIME_S * surprise).clamp(0.6, 4.0);
         let hover = Goal::Path { ahead: 0.0, right: 0.0, climb: None, nose_turn: 0.0, path_turn: 0.0, inverted: false };
         let segment = if started { self.segments.get(self.current).copied() } else { None };
         let Segment { seconds, height, mut goal } =
@@ -179,7 +170,8 @@ impl Pilot {
         let climb = match climb {
             // A commanded descent fades out well above the ground.
             Some(climb) => climb.max(HEIGHT_GAIN * (DESCENT_END_M + state.position[2])),
-            None => (HEIGHT_GAIN * (height + state.position[2])).clamp(-3.5, 4.5),
+            // Towards the ground ever more slowly.
+            None => (HEIGHT_GAIN * (height + state.position[2])).clamp((0.6 * state.position[2]).clamp(-3.5, 0.0), 4.5),
         };
         goal[2] = -climb;
         let achieved = to_local(rotation, state.velocity);
@@ -240,11 +232,6 @@ impl Pilot {
         Wanted { rates, thrust }
     }
 
-    /// Force along body down on the nominal machine, m/s².
-    fn thrust_line(state: &State, collective: f64) -> f64 {
-        COEFFICIENTS.c1_z * collective + COEFFICIENTS.d1_z + COEFFICIENTS.a[2] * state.velocity[2]
-    }
-
     /// Inner loop: sticks that give these rates and this thrust on the nominal machine.
     fn sticks_for(&mut self, state: &State, wanted: &Wanted) -> [f64; 4] {
         let mut sticks = [0.0; 4];
@@ -254,8 +241,9 @@ impl Pilot {
             let moment = RATE_GAIN[0] * error + RATE_GAIN[1] * self.rate_sum[axis] - COEFFICIENTS.b[axis] * wanted.rates[axis];
             *stick = ((moment - COEFFICIENTS.d2[axis]) / COEFFICIENTS.c2[axis]).clamp(-0.9, 0.9);
         }
-        let thrust = wanted.thrust.clamp(-1.6 * GRAVITY_M_S2, 2.0 * GRAVITY_M_S2) / (self.feel / FEEL_FREE).max(1.0);
-        let down = -thrust - COEFFICIENTS.d1_z - COEFFICIENTS.a[2] * state.velocity[2];
+        let thrust = wanted.thrust.clamp(-1.6 * GRAVITY_M_S2, 2.0 * GRAVITY_M_S2);
+        let damping = (COEFFICIENTS.a[2] * state.velocity[2]).clamp(-FELT_DAMPING_M_S2, FELT_DAMPING_M_S2);
+        let down = -thrust - COEFFICIENTS.d1_z - damping;
         sticks[3] = (down / COEFFICIENTS.c1_z).clamp(-0.95, 0.95);
         sticks
     }

@@ -3,6 +3,7 @@
 use super::schedule::WARMUP_EPOCHS;
 use crate::error::{Error, Result};
 use crate::flight::windows::TRAINING_STRIDE;
+use crate::hybrid::linear::LinearConfig;
 use crate::nn::PhyTureConfig;
 use serde::{Deserialize, Serialize};
 
@@ -15,6 +16,9 @@ pub struct TrainConfig {
     /// State-control inputs, as formulas of the log's columns. Default: the 16 of paper eq. 10 (position, Euler angles,
     /// velocity, rates, controls).
     pub inputs: Vec<String>,
+    /// A linear history between physics and network: ridge regression of what physics leaves over, fitted in closed form before
+    /// the network. Default none, as in the paper.
+    pub linear: Option<LinearConfig>,
     /// Passes over the training windows. Default 100; the paper does not state its number.
     pub epochs: usize,
     /// Windows a step. Default 32.
@@ -38,6 +42,7 @@ impl Default for TrainConfig {
         Self {
             network: PhyTureConfig::default(),
             inputs: crate::flight::Column::STATE.iter().map(|column| column.name().to_owned()).collect(),
+            linear: None,
             epochs: 100,
             batch: 32,
             peak_rate: 1e-3,
@@ -85,6 +90,7 @@ impl TrainConfig {
                 &format!("the number of inputs, {}", self.inputs.len()),
             ));
         }
+        self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
         self.network.check()
     }
 }

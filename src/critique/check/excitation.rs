@@ -2,7 +2,7 @@
 //! told apart. A coefficient can be no better than this.
 
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::BLOCK_S;
+use crate::blocks::BLOCK_S;
 use crate::flight::{Column, Flight};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,7 @@
 use super::increments::{Instant, Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::attitude::{cross, gravity_body, rotate_back};
 
 /// A coefficient of which 95 % certainly lies nearer to another convention's value (0, 2, −1) than to 1.

@@ -4,7 +4,7 @@
 use super::increments::Motion;
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::FEW_BLOCKS;
+use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
 
 /// Certainly nearer to another convention than to 1.

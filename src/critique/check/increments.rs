@@ -3,7 +3,7 @@
 //! Every relation ṡ = f is checked in its integral form, s(t₁) − s(t₀) = ∫ f dt over a piece (trapezoidal rule). That needs no
 //! differentiator, and noise enters at the two ends only. No verdicts here.
 
-use crate::critique::blocks::BLOCK_S;
+use crate::blocks::BLOCK_S;
 use crate::flight::attitude::{Matrix3, gravity_body, rotation_body_to_inertial};
 use crate::flight::{Column, Flight, Targets};
 use std::ops::Range;

@@ -6,7 +6,7 @@
 
 use super::increments::{Instant, Motion, Vector};
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};
 use std::ops::Range;
@@ -124,6 +124,9 @@ impl Relation {
                 read("", "", DOWN, |i| stack(cross(i.rotation[2], i.rates))),
                 read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [-1.0; 3])))),
                 read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, FLIP)))),
+                read("the roll rate has the other sign", "[columns] wx = \"-wx\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [-1.0, 1.0, 1.0])))),
+                read("the pitch rate has the other sign", "[columns] wy = \"-wy\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [1.0, -1.0, 1.0])))),
+                read("the yaw rate has the other sign", "[columns] wz = \"-wz\", with the file's name", DOWN, |i| stack(cross(i.rotation[2], scaled(i.rates, [1.0, 1.0, -1.0])))),
                 read("roll has the other sign", ROLL_SIGN, |i| stack(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2], i.rates))),
                 read("pitch has the other sign", PITCH_SIGN, |i| stack(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2], i.rates))),
                 read("the rates are in degrees a second", "[units] rates = \"deg/s\"", DOWN, |i| stack(cross(i.rotation[2], i.rates.map(|rate| rate * DEGREE)))),
@@ -136,6 +139,9 @@ impl Relation {
             read("the rates are written in inertial axes", "[columns] wx, wy, wz as body rates: the log has inertial ones", |i| axes(&i.rotation), |i| turning(&i.rotation, rotate_back(&i.rotation, i.rates))),
             read("the rates have the other sign", "[columns] wx = \"-wx\", wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [-1.0; 3]))),
             read("the rates are nose-port-up while the attitude is not", "[columns] wy = \"-wy\", wz = \"-wz\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, FLIP))),
+            read("the roll rate has the other sign", "[columns] wx = \"-wx\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [-1.0, 1.0, 1.0]))),
+            read("the pitch rate has the other sign", "[columns] wy = \"-wy\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [1.0, -1.0, 1.0]))),
+            read("the yaw rate has the other sign", "[columns] wz = \"-wz\", with the file's name", |i| axes(&i.rotation), |i| turning(&i.rotation, scaled(i.rates, [1.0, 1.0, -1.0]))),
             read("roll has the other sign", ROLL_SIGN, |i| axes(&turned(scaled(i.angles, [-1.0, 1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [-1.0, 1.0, 1.0])), i.rates)),
             read("pitch has the other sign", PITCH_SIGN, |i| axes(&turned(scaled(i.angles, [1.0, -1.0, 1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.rates)),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),

@@ -6,7 +6,7 @@
 use super::increments::Motion;
 use super::regression::BlockRegression;
 use super::report::{Finding, Subject, Verdict};
-use crate::critique::blocks::{FEW_BLOCKS, student_975};
+use crate::blocks::{FEW_BLOCKS, student_975};
 use crate::flight::attitude::{cross, rotate};
 use serde::{Deserialize, Serialize};
 

@@ -3,12 +3,12 @@
 use super::predict::read_network;
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
-use phyture::critique::yardstick::{Ridge, RidgeOptions, finite_difference};
-use phyture::critique::{Comparison, Row, compare};
+use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::{TEST_STRIDE, windows};
 use phyture::flight::{DataSet, Span, Window};
 use phyture::hybrid::Hybrid;
+use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
 use phyture::report::{CompareReport, compare_page, page};
 use phyture::{Error, Result};
@@ -68,7 +68,6 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
             ("data".to_owned(), data.data.display().to_string()),
             ("SHA-256 of the data".to_owned(), data_sha256(data)?),
             ("seed".to_owned(), context.seed().to_string()),
-            ("phyture".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ];
         let path = result.write_page(&set, folder, &provenance)?;
         context.say(format!("report: {}", path.display()));
@@ -117,8 +116,7 @@ impl Contest<'_> {
         let mut rows = vec![finite_difference(&set.flights, &windows)?];
         if let Some(lags) = self.ridge {
             let training = phyture::flight::windows::windows(&split.training, lags, 1);
-            let ridge = Ridge::fit(&set.flights, &training, &RidgeOptions { lags, ..RidgeOptions::default() })?;
-            rows.push(ridge.predict(&set.flights, &windows)?);
+            rows.push(ridge(&set.flights, &training, &windows, &LinearConfig { lags, ..LinearConfig::default() })?);
         }
         for (name, model) in self.models {
             let columns = set.flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;

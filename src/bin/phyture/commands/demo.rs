@@ -93,7 +93,6 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let provenance = [
         ("data".to_owned(), format!("built-in truth helicopter, seed {}, {minutes} min", context.seed())),
         ("locked".to_owned(), LOCKED.join(", ")),
-        ("phyture".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
     ];
     let page = judged.write_page(&set, out, &provenance)?;
     let seconds = begun.elapsed().as_secs_f64();

@@ -132,15 +132,17 @@ struct Job {
 impl Job {
     fn new(set: &DataSet, split: &Split, model: &Model, config: &TrainConfig) -> Result<Self> {
         config.check()?;
-        let scaling = sequence::scaling(&set.flights, &split.training, model, &config.inputs, &config.network)?;
-        let sequences = sequence::sequences(&set.flights, model, &config.inputs, &scaling, &config.network)?;
+        let (flights, spans) = (&set.flights, &split.training);
+        let linear = config.linear.as_ref().map(|linear| sequence::linear(flights, spans, model, linear)).transpose()?;
         let description = Description {
             model: model.clone(),
             config: config.network.clone(),
             inputs: config.inputs.clone(),
-            scaling,
-            step_s: set.flights.first().map_or(0.01, |flight| flight.step_s),
+            scaling: sequence::scaling(flights, spans, model, &config.inputs, linear.as_ref(), &config.network)?,
+            linear,
+            step_s: flights.first().map_or(0.01, |flight| flight.step_s),
         };
+        let sequences = sequence::sequences(flights, &description)?;
         Ok(Self { description, sequences, windows: windows(&split.training, config.network.history, config.stride) })
     }
 }

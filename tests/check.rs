@@ -1,0 +1,322 @@
+//! The check of conventions and timing: flights with one thing wrong each are named, clean ones pass.
+
+use phyture::critique::check::{CheckReport, Finding, Verdict, check};
+use phyture::flight::attitude::{cross, euler_rates, gravity_body, rotate, rotation_body_to_inertial};
+use phyture::flight::{Column, DataSet, Flight, GRAVITY_M_S2, Targets};
+use proptest::prelude::*;
+
+const STEP_S: f64 = 0.01;
+/// Integration steps a sample.
+const SUBSTEPS: usize = 5;
+
+/// SplitMix64 (Steele, Lea & Flood 2014), as numbers of mean 0 and variance 1.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut bits = self.0;
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((bits ^ (bits >> 31)) as f64 / u64::MAX as f64 - 0.5) * 12_f64.sqrt()
+    }
+
+    /// One step of a process with this correlation time and rms 1.
+    fn coloured(&mut self, state: f64, step_s: f64, time_s: f64) -> f64 {
+        let keep = (-step_s / time_s).exp();
+        keep * state + (1.0 - keep * keep).sqrt() * self.next()
+    }
+}
+
+/// Columns of one flight: a rigid body with a thrust along z, drag, rate damping, gusts, and a pilot who holds changing attitudes,
+/// heading and climb; sensors with noise. `delay` samples pass before a control acts.
+fn columns(seconds: usize, seed: u64, delay: usize) -> [Vec<f64>; Column::COUNT] {
+    let mut noise = Noise(seed);
+    let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| Vec::new());
+    let (mut position, mut velocity, mut rates, mut angles) = ([0.0, 0.0, -20.0], [0.0; 3], [0.0; 3], [0.0; 3]);
+    let (mut wanted, mut gust, mut twist, mut dither) = ([0.0; 4], [0.0; 3], [0.0; 3], [0.0; 4]);
+    let mut past = vec![[0.0; 4]; delay + 1];
+    for _ in 0..(seconds as f64 / STEP_S) as usize {
+        wanted = wanted.map(|value| noise.coloured(value, STEP_S, 1.5));
+        dither = dither.map(|value| noise.coloured(value, STEP_S, 0.15));
+        gust = gust.map(|value| noise.coloured(value, STEP_S, 0.5));
+        twist = twist.map(|value| noise.coloured(value, STEP_S, 0.2));
+        let climb = rotate(&rotation_body_to_inertial(angles[0], angles[1], angles[2]), velocity)[2];
+        let pilot = [
+            0.15 * (0.25 * wanted[0] - 0.02 * velocity[1] - angles[0]) * 4.0 - 0.05 * rates[0] + 0.05 * dither[0],
+            0.15 * (0.25 * wanted[1] + 0.02 * velocity[0] - angles[1]) * 4.0 - 0.05 * rates[1] + 0.05 * dither[1],
+            0.3 * (0.6 * wanted[2] - rates[2]) + 0.05 * dither[2],
+            0.1 * (climb - 1.5 * wanted[3]) + 0.05 * dither[3],
+        ];
+        past.rotate_right(1);
+        past[0] = pilot;
+        let u = past[delay];
+        let derivatives = |velocity: [f64; 3], rates: [f64; 3], angles: [f64; 3]| {
+            let (gravity, turning) = (gravity_body(angles[0], angles[1]), cross(velocity, rates));
+            let thrust = [0.0, 0.0, -GRAVITY_M_S2 - 20.0 * u[3]];
+            let drag = [-0.05, -0.08, -0.8];
+            let linear: [f64; 3] = std::array::from_fn(|axis| {
+                turning[axis] + gravity[axis] + thrust[axis] + drag[axis] * velocity[axis] + 0.3 * gust[axis]
+            });
+            let power = [40.0, 30.0, 25.0];
+            let angular: [f64; 3] = std::array::from_fn(|axis| -5.0 * rates[axis] + power[axis] * u[axis] + 0.3 * twist[axis]);
+            (linear, angular)
+        };
+        let (linear, angular) = derivatives(velocity, rates, angles);
+        let measured = [position, angles, velocity, rates, [u[0], u[1], u[2]], linear, angular].concat();
+        let sigma = [0.01, 0.003, 0.02, 0.01, 0.0, 0.05, 0.1];
+        let mut values: Vec<f64> =
+            measured.iter().enumerate().map(|(index, value)| value + sigma[index / 3] * noise.next()).collect();
+        // The log holds the stick, not what has reached the rotor.
+        values.splice(12..15, pilot);
+        columns.iter_mut().zip(&values).for_each(|(column, value)| column.push(*value));
+        let step_s = STEP_S / SUBSTEPS as f64;
+        for _ in 0..SUBSTEPS {
+            let (linear, angular) = derivatives(velocity, rates, angles);
+            let travel = rotate(&rotation_body_to_inertial(angles[0], angles[1], angles[2]), velocity);
+            let turning = euler_rates(angles[0], angles[1], rates);
+            for axis in 0..3 {
+                position[axis] += step_s * travel[axis];
+                angles[axis] += step_s * turning[axis];
+                velocity[axis] += step_s * linear[axis];
+                rates[axis] += step_s * angular[axis];
+            }
+        }
+    }
+    columns
+}
+
+/// Four flights of 50 s, each column set changed by `plant`.
+fn data(seed: u64, delay: usize, targets: Targets, plant: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> DataSet {
+    let flights = (0..4).map(|index| {
+        let mut columns = columns(50, seed ^ (index << 32), delay);
+        if targets == Targets::Derived {
+            // Central differences of what the log holds.
+            for (channel, target) in Column::TARGETS.into_iter().enumerate() {
+                let state = columns[6 + channel].clone();
+                let last = state.len() - 1;
+                let slope = |k: usize| (state[(k + 1).min(last)] - state[k.saturating_sub(1)]) / (2.0 * STEP_S);
+                columns[target as usize] = (0..=last).map(slope).collect();
+            }
+        }
+        plant(&mut columns);
+        Flight::new(format!("{index}"), "test", 0.0, STEP_S, columns, targets).unwrap()
+    });
+    DataSet { flights: flights.collect(), notes: Vec::new() }
+}
+
+fn finding<'a>(report: &'a CheckReport, name: &str) -> &'a Finding {
+    report.findings.iter().find(|finding| finding.name == name).unwrap_or_else(|| panic!("no finding `{name}` in\n{report}"))
+}
+
+/// Applies `f` to three columns at once, sample by sample.
+fn each(columns: &mut [Vec<f64>; Column::COUNT], of: [Column; 3], mut f: impl FnMut(usize, [f64; 3]) -> [f64; 3]) {
+    for sample in 0..columns[0].len() {
+        let values = f(sample, of.map(|column| columns[column as usize][sample]));
+        of.into_iter().zip(values).for_each(|(column, value)| columns[column as usize][sample] = value);
+    }
+}
+
+const ANGLES: [Column; 3] = [Column::Roll, Column::Pitch, Column::Yaw];
+const V: [Column; 3] = [Column::Vx, Column::Vy, Column::Vz];
+const W: [Column; 3] = [Column::Wx, Column::Wy, Column::Wz];
+const V_DOT: [Column; 3] = [Column::VxDot, Column::VyDot, Column::VzDot];
+
+fn triple(columns: &[Vec<f64>; Column::COUNT], of: [Column; 3], sample: usize) -> [f64; 3] {
+    of.map(|column| columns[column as usize][sample])
+}
+
+fn plus(a: [f64; 3], b: [f64; 3], factor: f64) -> [f64; 3] {
+    std::array::from_fn(|axis| a[axis] + factor * b[axis])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn no_fault_is_found_where_there_is_none(seed in any::<u64>(), delay in 0..5_usize, derived in any::<bool>()) {
+        let report = check(&data(seed, delay, if derived { Targets::Derived } else { Targets::Recorded }, |_| ()), None);
+        prop_assert!(!report.fault, "{report}");
+    }
+}
+
+#[test]
+fn a_clean_log_passes_and_its_terms_are_found() {
+    let report = check(&data(1, 0, Targets::Recorded, |_| ()), None);
+    println!("{report}");
+    assert!(!report.fault);
+    for name in
+        ["position_rate", "attitude_rate", "velocity_targets", "rate_targets", "lateral_force", "rates_offset", "targets_offset"]
+    {
+        assert_eq!(finding(&report, name).verdict, Verdict::Ok, "{report}");
+    }
+    for name in ["gravity_x", "gravity_y", "attitude_rate_x", "velocity_targets_y"] {
+        let finding = finding(&report, name);
+        assert_eq!(finding.verdict, Verdict::Ok, "{report}");
+    }
+}
+
+/// Plants one fault and gives what the check makes of it.
+fn planted(targets: Targets, plant: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> CheckReport {
+    let report = check(&data(2, 0, targets, plant), None);
+    println!("{report}");
+    report
+}
+
+fn assert_fault(report: &CheckReport, name: &str, says: &str) {
+    let finding = finding(report, name);
+    assert!(report.fault && finding.verdict == Verdict::Fault && finding.message.contains(says), "{name}: {says}\n{report}");
+    assert!(finding.set.is_some());
+}
+
+#[test]
+fn a_transposed_attitude_is_named() {
+    let report = planted(Targets::Recorded, |columns| {
+        each(columns, ANGLES, |_, [roll, pitch, yaw]| {
+            let rows = rotation_body_to_inertial(roll, pitch, yaw);
+            // Angles of the transposed matrix.
+            [rows[1][2].atan2(rows[2][2]), -rows[0][2].asin(), rows[0][1].atan2(rows[0][0])]
+        });
+    });
+    assert_fault(&report, "position_rate", "transposed");
+    assert_fault(&report, "attitude_rate", "transposed");
+}
+
+#[test]
+fn targets_that_are_not_the_derivative_of_body_velocity_are_named() {
+    let specific_force = planted(Targets::Recorded, |columns| {
+        let copy = columns.clone();
+        each(columns, V_DOT, |k, target| {
+            let inertial = plus(target, cross(triple(&copy, W, k), triple(&copy, V, k)), 1.0);
+            plus(inertial, gravity_body(copy[Column::Roll as usize][k], copy[Column::Pitch as usize][k]), -1.0)
+        });
+    });
+    assert_fault(&specific_force, "velocity_targets", "specific force");
+    assert_fault(&specific_force, "gravity_x", "specific force");
+    let without_gravity = planted(Targets::Recorded, |columns| {
+        let copy = columns.clone();
+        each(columns, V_DOT, |k, target| {
+            plus(target, gravity_body(copy[Column::Roll as usize][k], copy[Column::Pitch as usize][k]), -1.0)
+        });
+    });
+    assert_fault(&without_gravity, "velocity_targets", "gravity has been taken out");
+    let body_acceleration = planted(Targets::Recorded, |columns| {
+        let copy = columns.clone();
+        each(columns, V_DOT, |k, target| plus(target, cross(triple(&copy, W, k), triple(&copy, V, k)), 1.0));
+    });
+    assert_fault(&body_acceleration, "velocity_targets", "inertial acceleration in body axes");
+    let inertial = planted(Targets::Recorded, |columns| {
+        let copy = columns.clone();
+        each(columns, V_DOT, |k, target| {
+            let [roll, pitch, yaw] = triple(&copy, ANGLES, k);
+            let acceleration = plus(target, cross(triple(&copy, W, k), triple(&copy, V, k)), 1.0);
+            rotate(&rotation_body_to_inertial(roll, pitch, yaw), acceleration)
+        });
+    });
+    assert_fault(&inertial, "velocity_targets", "inertial axes");
+    let in_g = planted(Targets::Recorded, |columns| each(columns, V_DOT, |_, target| target.map(|value| value / GRAVITY_M_S2)));
+    assert_fault(&in_g, "velocity_targets", "units of g");
+}
+
+#[test]
+fn an_inertial_velocity_is_named_with_and_without_position() {
+    let plant = |columns: &mut [Vec<f64>; Column::COUNT]| {
+        let copy = columns.clone();
+        each(columns, V, |k, velocity| {
+            let [roll, pitch, yaw] = triple(&copy, ANGLES, k);
+            rotate(&rotation_body_to_inertial(roll, pitch, yaw), velocity)
+        });
+    };
+    assert_fault(&planted(Targets::Recorded, plant), "position_rate", "inertial axes");
+    let mut data = data(2, 0, Targets::Derived, plant);
+    for flight in &mut data.flights {
+        flight.absent = vec![Column::X, Column::Y, Column::Z];
+    }
+    let report = check(&data, None);
+    println!("{report}");
+    assert_fault(&report, "lateral_force", "inertial axes");
+}
+
+#[test]
+fn signs_and_units_are_named() {
+    let flip = |column: Column| {
+        move |columns: &mut [Vec<f64>; Column::COUNT]| columns[column as usize].iter_mut().for_each(|value| *value = -*value)
+    };
+    assert_fault(&planted(Targets::Derived, flip(Column::Roll)), "attitude_rate", "roll has the other sign");
+    assert_fault(&planted(Targets::Derived, flip(Column::Pitch)), "lateral_force", "pitch has the other sign");
+    assert_fault(&planted(Targets::Derived, flip(Column::Wz)), "attitude_rate", "yaw rate has the other sign");
+    assert_fault(&planted(Targets::Derived, flip(Column::Z)), "position_rate", "z is height");
+    let degrees =
+        |of: [Column; 3]| move |columns: &mut [Vec<f64>; Column::COUNT]| each(columns, of, |_, values| values.map(f64::to_degrees));
+    assert_fault(&planted(Targets::Derived, degrees(W)), "attitude_rate", "degrees a second");
+    assert_fault(&planted(Targets::Derived, degrees(ANGLES)), "attitude_rate", "angles are in degrees");
+    let up = planted(Targets::Derived, |columns| {
+        for column in [
+            Column::Y,
+            Column::Z,
+            Column::Pitch,
+            Column::Yaw,
+            Column::Vy,
+            Column::Vz,
+            Column::Wy,
+            Column::Wz,
+            Column::VyDot,
+            Column::VzDot,
+        ] {
+            columns[column as usize].iter_mut().for_each(|value| *value = -*value);
+        }
+    });
+    assert_fault(&up, "lateral_force", "z points up");
+}
+
+#[test]
+fn shifted_streams_are_measured() {
+    // The rates come 20 ms late.
+    let report = planted(Targets::Recorded, |columns| {
+        for column in W {
+            let values = &mut columns[column as usize];
+            values.rotate_right(2);
+            values[..2].fill(0.0);
+        }
+    });
+    let rates = finding(&report, "rates_offset");
+    assert!(rates.verdict == Verdict::Warning && rates.message.contains("later than the attitude by 20 ms"), "{report}");
+    assert!(!report.fault, "{report}");
+}
+
+#[test]
+fn the_delay_of_the_controls_is_measured() {
+    for delay in [0, 2, 4] {
+        let report = check(&data(3, delay, Targets::Recorded, |_| ()), None);
+        let finding = finding(&report, "control_delay");
+        // A control held over a sample acts half a sample late on average; the interval has to reach to within one sample.
+        let [low, high] = finding.interval.unwrap();
+        let truth_s = delay as f64 * STEP_S;
+        assert!(low - STEP_S <= truth_s && truth_s <= high + STEP_S && high - low < 0.02, "{delay}: {report}");
+        assert!(report.control_delay.is_some_and(|profile| profile.delay_s.len() == profile.relative_error.len()));
+    }
+}
+
+#[test]
+fn still_controls_are_said_and_little_data_gives_no_verdict() {
+    let still = planted(Targets::Recorded, |columns| columns[Column::U3 as usize].fill(0.1));
+    assert_eq!(finding(&still, "excitation_u3").verdict, Verdict::Warning);
+    let mut short =
+        data(1, 0, Targets::Recorded, |columns| columns[Column::Roll as usize].iter_mut().for_each(|value| *value = -*value));
+    short.flights.truncate(1);
+    short.flights = short.flights.iter().filter_map(|flight| flight.slice(0..2000, "short")).collect();
+    let report = check(&short, None);
+    assert!(!report.fault, "{report}");
+    assert_eq!(finding(&report, "attitude_rate").verdict, Verdict::Undetermined);
+    let empty = check(&DataSet::default(), None);
+    assert!(!empty.fault && !empty.to_string().is_empty());
+}
+
+#[test]
+fn the_report_is_json_and_comes_back() {
+    let report = check(&data(1, 0, Targets::Recorded, |_| ()), None);
+    let text = serde_json::to_string(&report).unwrap();
+    let back: CheckReport = serde_json::from_str(&text).unwrap();
+    assert_eq!(back.findings.len(), report.findings.len());
+    assert!(text.contains("\"fault\":false"));
+}
