@@ -32,7 +32,7 @@ static ALLOCATOR: Counting = Counting;
 #[test]
 fn the_steady_state_allocates_nothing() -> Result<()> {
     let config = PhyTureConfig { history: 32, d_model: 16, moving_average: 5, ..PhyTureConfig::default() };
-    let network = Network::<f32>::new(&config, &OutputScale::unit(6))?;
+    let network = Network::<f32>::new(&config, &OutputScale::unit(6), false)?;
     let parameters = network.initial(1);
     let fill = |sample: usize, inputs: &mut [&mut [f32]]| inputs.iter_mut().for_each(|input| input.fill(0.1 * sample as f32));
     for threads in [1, 2] {

@@ -37,7 +37,7 @@ fn fill<T: Real>(sample: usize, inputs: &mut [&mut [T]]) {
 }
 
 fn check(config: &PhyTureConfig, samples: usize, dropout: Option<DropoutKey>) -> Result<()> {
-    let network = Network::<f64>::new(config, &scale())?;
+    let network = Network::<f64>::new(config, &scale(), false)?;
     let parameters = network.initial(1);
     let last = format!("mstfe.{}.", config.stacks - 1);
     let zero = |name: &str| {
@@ -81,7 +81,7 @@ fn gradients<T: Real>(
     threads: usize,
     dropout: Option<DropoutKey>,
 ) -> Result<(f64, Vec<T>)> {
-    let network = Network::<T>::new(config, &scale())?;
+    let network = Network::<T>::new(config, &scale(), false)?;
     let mut session = Session::train(network.graph(), network.loss(), &[], Threads(threads))?;
     let loss = session.step(parameters, 9, dropout, &fill)?;
     Ok((loss, session.gradients().to_vec()))
@@ -90,7 +90,7 @@ fn gradients<T: Real>(
 #[test]
 fn one_thread_and_many_give_the_same_bits() -> Result<()> {
     let config = small(Variant::PhyTure);
-    let parameters = Network::<f32>::new(&config, &scale())?.initial(2);
+    let parameters = Network::<f32>::new(&config, &scale(), false)?.initial(2);
     let (loss, one) = gradients(&config, &parameters, 1, Some(KEY))?;
     for threads in [2, 16] {
         let (other, many) = gradients(&config, &parameters, threads, Some(KEY))?;
@@ -103,7 +103,7 @@ fn one_thread_and_many_give_the_same_bits() -> Result<()> {
 #[test]
 fn f32_follows_f64() -> Result<()> {
     let config = small(Variant::PhyTure);
-    let network = Network::<f32>::new(&config, &scale())?;
+    let network = Network::<f32>::new(&config, &scale(), false)?;
     let single = network.initial(3);
     let double: Vec<f64> = single.iter().map(|&value| f64::from(value)).collect();
     // The same masks: a stream is a function of its key, not of the precision.
