@@ -141,6 +141,25 @@ proptest! {
 }
 
 #[test]
+fn missing_physics_is_no_convention_fault() -> phyture::Result<()> {
+    use phyture::sim::{Mechanism, Simulation, simulate};
+    let bare = || Simulation { minutes: 5.0, ..Simulation::baseline() };
+    let everything = Simulation { minutes: 5.0, ..Simulation::default() };
+    let stalled = bare().hide("stall_saturation", Mechanism::from_id("stall_saturation")?.largest_scale())?;
+    for simulation in [everything, stalled, bare()] {
+        let report = check(&simulate(&simulation)?, None);
+        assert!(!report.fault, "{report}");
+    }
+    // What the simulator does to the clocks is measured.
+    let late = bare().hide("ctrl_delay", 1.0)?;
+    let report = check(&simulate(&late)?, None);
+    assert!(finding(&report, "control_delay").measured.is_some_and(|delay_s| delay_s > STEP_S), "{report}");
+    let shifted = check(&simulate(&bare().hide("sync", 1.0)?)?, None);
+    assert_eq!(finding(&shifted, "rates_offset").verdict, Verdict::Warning, "{shifted}");
+    Ok(())
+}
+
+#[test]
 fn a_clean_log_passes_and_its_terms_are_found() {
     let report = check(&data(1, 0, Targets::Recorded, |_| ()), None);
     println!("{report}");

@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// Folds of the cross-validation over blocks.
 const FOLDS: usize = 5;
 
-/// Penalties tried, λ a window in units of the standardised inputs: 10^(−8), 10^(−7.5) … 10^2.
-const PENALTY_EXPONENTS: std::ops::RangeInclusive<i32> = -16..=4;
+/// Decades of the penalties tried, λ a window in units of the standardised inputs: 10⁻⁸ … 10².
+const PENALTY_EXPONENTS: std::ops::RangeInclusive<i32> = -8..=2;
 
 /// Rows gathered before one matrix product adds them to the normal matrix.
 const BATCH: usize = 512;
@@ -312,7 +312,7 @@ fn solve(folds: &[Normal]) -> Result<(Array2<f64>, [f64; 6])> {
         })
         .collect();
     for exponent in PENALTY_EXPONENTS {
-        let penalty = 10_f64.powf(f64::from(exponent) / 2.0);
+        let penalty = 10_f64.powi(exponent);
         let mut error = Some(Array1::<f64>::zeros(6));
         for (left_out, training) in folds.iter().zip(&training) {
             error = error.zip(training.weights(penalty)).map(|(sum, weights)| sum + left_out.squared_error(&weights));

@@ -12,6 +12,8 @@ use crate::flight::attitude::{cross, gravity_body, rotate_back};
 
 /// A coefficient of which 95 % certainly lies nearer to another convention's value (0, 2, −1) than to 1.
 const FAULT_MARGIN: f64 = 0.5;
+/// The same along z, where thrust acts: its own errors (stall, droop, inflow) take half of a coefficient away.
+const FAULT_MARGIN_THRUST: f64 = 0.8;
 /// Beyond what unmodelled forces usually do to it.
 const WARNING_MARGIN: f64 = 0.2;
 /// A reading has to leave at most this share of the lateral force of the nominal one.
@@ -174,7 +176,7 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let what = if term == "gravity" { "gravity in body axes" } else { "the Coriolis term -w x v" };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;
-    if beyond(FAULT_MARGIN) {
+    if beyond(if axis == "z" { FAULT_MARGIN_THRUST } else { FAULT_MARGIN }) {
         finding.verdict = Verdict::Fault;
         let contains = |number: f64| (value - number).abs() < FAULT_MARGIN;
         let (message, set) = match (term, contains(0.0), contains(-1.0)) {

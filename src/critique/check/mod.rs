@@ -22,6 +22,8 @@ use crate::physics::Model;
 
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
+/// Share of the samples that may exceed it: glitches and full deflections are no other scale.
+const RARE_SHARE: f64 = 0.01;
 
 /// Checks conventions, timing and excitation of a data set. Of `model`, if there is one, only the control delay is used.
 ///
@@ -124,16 +126,18 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
             format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
         findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
     }
-    let control = largest(&[Column::U1, Column::U2, Column::U3, Column::U4]);
-    if control > LARGEST_CONTROL {
-        let message =
-            format!("controls reach {control:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]");
-        findings.push(finding(
-            "control_range",
-            Verdict::Warning,
-            message,
-            Some("[columns] u1 = \"u1 / 1000\" or the like, with the file's names"),
-        ));
+    let controls = [Column::U1, Column::U2, Column::U3, Column::U4];
+    let beyond = |column: Column| {
+        let values = || flights.iter().flat_map(move |flight| flight.column(column));
+        values().filter(|value| value.abs() > LARGEST_CONTROL).count() as f64 > RARE_SHARE * values().count() as f64
+    };
+    if controls.into_iter().any(beyond) {
+        let message = format!(
+            "controls reach {:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]",
+            largest(&controls)
+        );
+        let set = "[columns] u1 = \"u1 / 1000\" or the like, with the file's names";
+        findings.push(finding("control_range", Verdict::Warning, message, Some(set)));
     }
     let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {

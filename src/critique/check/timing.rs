@@ -85,7 +85,8 @@ struct Pair {
     name: &'static str,
     late: &'static str,
     early: &'static str,
-    columns: &'static str,
+    /// Columns of the state, and of its rate.
+    columns: [&'static str; 2],
     applies: fn(&Motion) -> bool,
     /// Change of the state less its predicted change, given the piece and the shift of the other stream.
     error: fn(&Motion, &std::ops::Range<usize>, isize) -> f64,
@@ -104,7 +105,7 @@ const PAIRS: [Pair; 3] = [
         name: "velocity_offset",
         late: "velocity and attitude come later than position",
         early: "velocity and attitude come earlier than position",
-        columns: "x, y and z",
+        columns: ["x, y and z", "roll, pitch, yaw, vx, vy and vz"],
         applies: |motion| motion.position && motion.heading,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -116,7 +117,7 @@ const PAIRS: [Pair; 3] = [
         name: "rates_offset",
         late: "the rates come later than the attitude",
         early: "the rates come earlier than the attitude",
-        columns: "roll, pitch and yaw (or q1 to q4)",
+        columns: ["roll, pitch and yaw (or q1 to q4)", "wx, wy and wz"],
         applies: |_| true,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -132,7 +133,7 @@ const PAIRS: [Pair; 3] = [
         name: "targets_offset",
         late: "the targets come later than the velocity",
         early: "the targets come earlier than the velocity",
-        columns: "vx, vy and vz",
+        columns: ["vx, vy and vz", "vx_dot, vy_dot and vz_dot"],
         applies: |motion| motion.recorded,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -301,15 +302,8 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
         finding.verdict = Verdict::Warning;
         let late = minimum.at > 0.0;
         finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());
-        finding.set = Some(if late {
-            format!("[columns] {} as `delay(NAME, {:.3})`, with the file's names", pair.columns, minimum.at * step_s)
-        } else {
-            format!(
-                "[columns] the other stream than {} as `delay(NAME, {:.3})`, with the file's names",
-                pair.columns,
-                -minimum.at * step_s
-            )
-        });
+        let (columns, delay_s) = (pair.columns[usize::from(!late)], (minimum.at * step_s).abs());
+        finding.set = Some(format!("[columns] {columns} as `delay(NAME, {delay_s:.3})`, with the file's names"));
     } else {
         finding.verdict = Verdict::Ok;
         finding.message = "in step".into();
