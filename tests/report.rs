@@ -3,7 +3,8 @@
 //! The page is left in `target/tmp/compare.html`, to be looked at.
 #![cfg(feature = "report")]
 
-use phyture::critique::{Comparison, Row, Split, compare};
+use phyture::critique::{Comparison, Row, compare};
+use phyture::flight::split;
 use phyture::flight::{Column, Flight, Targets, Window};
 use phyture::report::{CompareReport, Page, Part, Section, compare_page, page};
 use phyture::{Error, Result};
@@ -91,7 +92,7 @@ fn case(awkward_name: &str) -> Result<Case> {
         Row { name: "paper + ground effect".into(), predicted: predict(0.3, 0.3) },
         Row { name: "finite difference".into(), predicted: predict(0.0, 0.9) },
     ];
-    let comparison = compare(&flights, &windows, &rows, Split::Locked)?;
+    let comparison = compare(&flights, &windows, &rows, split::Part::Locked)?;
     Ok(Case { flights, windows, rows, comparison })
 }
 

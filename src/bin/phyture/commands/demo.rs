@@ -4,7 +4,7 @@
 //! on the rest; the residual network trained on the rest; both judged on the locked flights.
 
 use super::compare::Contest;
-use super::train::train_in;
+use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
 use phyture::critique::Comparison;
 use phyture::critique::check::check;
@@ -79,10 +79,12 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let mut model = starting_model();
     model.data.locked = locked;
     let (model, _, _) = calibrate::fit(context, &set, &model, &split)?;
-    model.write(&out.join("model.toml"))?;
+    model.write(out.join("model.toml"))?;
 
     context.say("\n4. The residual network, trained on the same flights");
-    let hybrid = train_in(context, &set, &split, &model, &config, &out.join("run"), &interrupted)?;
+    let run = out.join("run");
+    let task = Task { set: &set, split: &split, model: &model, config: &config, identity: "demo", folder: &run };
+    let hybrid = task.hybrid(context, &interrupted)?;
 
     context.say("\n5. Measured against predicted on the locked flights, which neither saw");
     let history = config.network.history;

@@ -94,12 +94,7 @@ impl Context<'_> {
 
     /// Reads the flights, and says what the reader has to say.
     pub fn flights(&self, data: &Data, history: usize) -> Result<DataSet> {
-        let options = ReadOptions {
-            minimum_rows: history,
-            split_at_gaps: data.split_at_gaps,
-            dataset: data.dataset.clone(),
-            ..ReadOptions::default()
-        };
+        let options = ReadOptions { minimum_rows: history, split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone() };
         let set = data_set(&data.data, &options)?;
         self.say(format!(
             "{}: {} flights, {} manoeuvre classes, {:.0} s at {:.0} Hz",

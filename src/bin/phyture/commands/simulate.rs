@@ -62,7 +62,7 @@ pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode
         "stanford" => write::stanford(folder, &set.flights)?,
         _ => write::data_set_csv(folder, &set.flights)?,
     }
-    starting_model().write(&folder.join("model.toml"))?;
+    starting_model().write(folder.join("model.toml"))?;
     let truth = simulation.truth();
     let text = serde_json::to_string_pretty(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
     write_atomically(folder.join("truth.json"), |file| writeln!(file, "{text}"))?;

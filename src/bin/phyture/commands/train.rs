@@ -51,82 +51,97 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let split = context.split(&set.flights, &model, division)?;
     let identity = format!("{}\n{}\n{split:?}", data_sha256(data)?, model.to_toml()?);
     let interrupted = interruption()?;
-    let output = fit(context, &set, &split, &model, &config, &identity, wanted, &interrupted)?;
+    let task = Task { set: &set, split: &split, model: &model, config: &config, identity: &identity, folder: wanted.output };
+    let output = task.run(context, wanted.resume, &interrupted)?;
     context.json(&output)?;
     Ok(ExitCode::SUCCESS)
 }
 
-/// The run itself; `identity` tells one set of training data from another when a run is resumed.
-fn fit(
-    context: &Context,
-    set: &DataSet,
-    split: &Split,
-    model: &Model,
-    config: &TrainConfig,
-    identity: &str,
-    wanted: &Wanted,
-    interrupted: &AtomicBool,
-) -> Result<Output> {
-    let begun = Instant::now();
-    let job = Job::new(set, split, model, config)?;
-    let folder = RunFolder::create(wanted.output)?;
-    let digest = Sha256::digest(identity.as_bytes());
-    let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-    let state = wanted.resume.then(|| folder.resume(config, digest)).transpose()?;
-    let network = job.description.network(config.standardise_loss)?;
-    let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
-    context.say(format!(
-        "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs",
-        network.graph().parameter_count(),
-        job.windows.len(),
-        config.network.history,
-        trainer.steps(),
-        config.batch,
-        config.epochs
-    ));
-    let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
-    let (mut sum, mut count, mut epoch) = (0.0, 0_u32, 0);
-    let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
-        if report.step.epoch != epoch {
-            (sum, count, epoch) = (0.0, 0, report.step.epoch);
-        }
-        sum += report.step.loss;
-        count += 1;
-        progress.at(report.step.step, || format!("loss {:.4}  rate {:.2e}", sum / f64::from(count), report.step.rate));
-        !interrupted.load(Ordering::Relaxed)
-    })?;
-    drop(progress);
-    if outcome == Outcome::Stopped {
-        let saved = format!(
-            "saved after step {} of {} in {}; go on with --resume",
-            trainer.state().step,
+/// A training run, whoever asked for it.
+pub struct Task<'a> {
+    /// Flights.
+    pub set: &'a DataSet,
+    /// What trains.
+    pub split: &'a Split,
+    /// The calibrated model.
+    pub model: &'a Model,
+    /// Settings.
+    pub config: &'a TrainConfig,
+    /// Tells one set of training data from another when a run is resumed.
+    pub identity: &'a str,
+    /// Run folder.
+    pub folder: &'a Path,
+}
+
+impl Task<'_> {
+    /// Trains to the end and reads back the hybrid.
+    pub fn hybrid(&self, context: &Context, interrupted: &AtomicBool) -> Result<Hybrid> {
+        Hybrid::read(&self.run(context, false, interrupted)?.network)
+    }
+
+    fn run(&self, context: &Context, resume: bool, interrupted: &AtomicBool) -> Result<Output> {
+        let Task { set, split, model, config, identity, folder } = *self;
+        let begun = Instant::now();
+        let job = Job::new(set, split, model, config)?;
+        let folder = RunFolder::create(folder)?;
+        let digest = Sha256::digest(identity.as_bytes());
+        let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
+        let state = resume.then(|| folder.resume(config, digest)).transpose()?;
+        let network = job.description.network(config.standardise_loss)?;
+        let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
+        context.say(format!(
+            "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs",
+            network.graph().parameter_count(),
+            job.windows.len(),
+            config.network.history,
             trainer.steps(),
-            folder.checkpoint().display()
-        );
-        return Err(Error::Interrupted { saved });
+            config.batch,
+            config.epochs
+        ));
+        let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
+        let (mut sum, mut count, mut epoch) = (0.0, 0_u32, 0);
+        let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
+            if report.step.epoch != epoch {
+                (sum, count, epoch) = (0.0, 0, report.step.epoch);
+            }
+            sum += report.step.loss;
+            count += 1;
+            progress.at(report.step.step, || format!("loss {:.4}  rate {:.2e}", sum / f64::from(count), report.step.rate));
+            !interrupted.load(Ordering::Relaxed)
+        })?;
+        drop(progress);
+        if outcome == Outcome::Stopped {
+            let saved = format!(
+                "saved after step {} of {} in {}; go on with --resume",
+                trainer.state().step,
+                trainer.steps(),
+                folder.checkpoint().display()
+            );
+            return Err(Error::Interrupted { saved });
+        }
+        let mut hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
+        if config.gate_every > 0 {
+            let gate = hybrid.fit_gate(&set.flights, &job.gate_windows, context.threads())?;
+            let shown: Vec<String> =
+                Column::TARGETS.iter().zip(gate).map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
+            context.say(format!("gate, from {} windows kept from training: {}", job.gate_windows.len(), shown.join("  ")));
+        }
+        hybrid.write(&folder.network())?;
+        let last_epoch_loss = sum / f64::from(count.max(1));
+        context.say(format!(
+            "trained in {:.0} s, mean loss of the last epoch {last_epoch_loss:.4}; written to {}",
+            begun.elapsed().as_secs_f64(),
+            folder.network().display()
+        ));
+        Ok(Output {
+            network: folder.network(),
+            parameters: network.graph().parameter_count(),
+            windows: job.windows.len(),
+            steps: trainer.steps(),
+            last_epoch_loss,
+            seconds: begun.elapsed().as_secs_f64(),
+        })
     }
-    let mut hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
-    if config.gate_every > 0 {
-        let gate = hybrid.fit_gate(&set.flights, &job.gate_windows, context.threads())?;
-        let shown: Vec<String> =
-            Column::TARGETS.iter().zip(gate).map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
-        context.say(format!("gate, from {} windows kept from training: {}", job.gate_windows.len(), shown.join("  ")));
-    }
-    hybrid.write(&folder.network())?;
-    let last_epoch_loss = sum / f64::from(count.max(1));
-    context.say(format!(
-        "trained in {:.0} s, mean loss of the last epoch {last_epoch_loss:.4}; written to {}",
-        begun.elapsed().as_secs_f64(),
-        folder.network().display()
-    ));
-    Ok(Output {
-        network: folder.network(),
-        parameters: network.graph().parameter_count(),
-        windows: job.windows.len(),
-        steps: trainer.steps(),
-        last_epoch_loss,
-        seconds: begun.elapsed().as_secs_f64(),
-    })
 }
 
 /// Training data and what the hybrid will be, but for its weights.
@@ -160,19 +175,4 @@ impl Job {
             |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
         Ok(Self { description, sequences, windows: choose(false).collect(), gate_windows: choose(true).collect() })
     }
-}
-
-/// Trains without files to read: the demo's way in.
-pub fn train_in(
-    context: &Context,
-    set: &DataSet,
-    split: &Split,
-    model: &Model,
-    config: &TrainConfig,
-    output: &Path,
-    interrupted: &AtomicBool,
-) -> Result<Hybrid> {
-    let wanted = Wanted { model: Path::new(""), output, config: None, resume: false };
-    fit(context, set, split, model, config, "", &wanted, interrupted)?;
-    Hybrid::read(&RunFolder::create(output)?.network())
 }

@@ -1,0 +1,187 @@
+//! Training as a user meets it: a resumed run is the run that was not interrupted, a killed one loses little and breaks
+//! nothing, the hybrid's file and its stream say what its batch prediction says.
+#![cfg(feature = "files")]
+
+use phyture::flight::split::{Protocol, Split};
+use phyture::flight::windows::windows;
+use phyture::flight::{DataSet, Window};
+use phyture::hybrid::linear::LinearConfig;
+use phyture::hybrid::{Description, Hybrid, sequence};
+use phyture::nn::PhyTureConfig;
+use phyture::physics::{Model, calibrate};
+use phyture::sim::{Simulation, simulate};
+use phyture::tape::Threads;
+use phyture::train::{Outcome, RunFolder, State, TrainConfig, Trainer};
+use phyture::{Error, Result};
+
+/// Any number; it tells one set of training data from another.
+const DATA: u64 = 7;
+
+struct Job {
+    set: DataSet,
+    config: TrainConfig,
+    description: Description,
+    windows: Vec<Window>,
+}
+
+fn job() -> Result<Job> {
+    let set = simulate(&Simulation { minutes: 2.0, seed: 3, ..Simulation::default() })?;
+    let split = Split::new(&set.flights, &[], &Protocol::Segments, 1)?;
+    let (model, _) = calibrate(&Model::paper("truth", 4.58, [0.18, 0.34, 0.28], 0.8), &set.flights, &split.training)?;
+    let network =
+        PhyTureConfig { history: 16, d_model: 8, heads: 2, levels: 2, stacks: 1, moving_average: 5, ..PhyTureConfig::default() };
+    let linear = LinearConfig { lags: 3, ..LinearConfig::default() };
+    let config =
+        TrainConfig { network, linear: Some(linear.clone()), epochs: 3, stride: 40, batch: 16, seed: 5, ..TrainConfig::default() };
+    let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
+    let description = Description {
+        scaling: sequence::scaling(&set.flights, &split.training, &model, &config.inputs, Some(&linear), &config.network)?,
+        model,
+        config: config.network.clone(),
+        inputs: config.inputs.clone(),
+        linear: Some(linear),
+        gate: [1.0; 6],
+        step_s: 0.01,
+    };
+    let windows = windows(&split.training, config.network.history, config.stride);
+    Ok(Job { set, config, description, windows })
+}
+
+/// Trains in `folder` from `state`, stopping after `stop` steps if it is given.
+fn train(job: &Job, folder: &RunFolder, state: Option<State>, threads: usize, stop: Option<u64>) -> Result<(Outcome, State)> {
+    let network = job.description.network(false)?;
+    let sequences = sequence::sequences(&job.set.flights, &job.description)?;
+    let mut trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, state, Threads(threads))?;
+    let outcome = folder.train(&job.config, DATA, &mut trainer, &mut |report| stop != Some(report.step.step))?;
+    Ok((outcome, trainer.state().clone()))
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn a_resumed_run_is_the_uninterrupted_one_bit_for_bit_on_any_number_of_threads() -> Result<()> {
+    let job = job()?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let whole = RunFolder::create(place.path().join("whole"))?;
+    let (outcome, uninterrupted) = train(&job, &whole, None, 1, None)?;
+    assert_eq!(outcome, Outcome::Finished);
+    let parts = RunFolder::create(place.path().join("parts"))?;
+    let mut last = train(&job, &parts, None, 2, Some(3))?;
+    assert_eq!(last.0, Outcome::Stopped);
+    for stop in [7, 8, u64::MAX] {
+        last = train(&job, &parts, Some(parts.resume(&job.config, DATA)?), 2, Some(stop))?;
+    }
+    assert_eq!(last.0, Outcome::Finished);
+    assert_eq!(last.1.step, uninterrupted.step);
+    for (one, other) in [
+        (&last.1.parameters, &uninterrupted.parameters),
+        (&last.1.first_moment, &uninterrupted.first_moment),
+        (&last.1.second_moment, &uninterrupted.second_moment),
+    ] {
+        assert_eq!(bits(one), bits(other));
+    }
+    Ok(())
+}
+
+#[test]
+fn a_checkpoint_of_other_data_or_another_configuration_is_refused() -> Result<()> {
+    let job = job()?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let folder = RunFolder::create(place.path().join("run"))?;
+    let message =
+        |config: &TrainConfig, data| folder.resume(config, data).map_err(|error| error.to_string()).err().unwrap_or_default();
+    assert!(message(&job.config, DATA).contains("no checkpoint to resume from"));
+    train(&job, &folder, None, 1, Some(1))?;
+    assert!(message(&job.config, DATA + 1).contains("other data"));
+    assert!(message(&TrainConfig { epochs: 4, ..job.config.clone() }, DATA).contains("another configuration"));
+    assert_eq!(folder.resume(&job.config, DATA)?.step, 1);
+    Ok(())
+}
+
+#[test]
+fn file_and_stream_say_what_the_batch_says() -> Result<()> {
+    let job = job()?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let folder = RunFolder::create(place.path().join("run"))?;
+    let (_, state) = train(&job, &folder, None, 2, None)?;
+    let hybrid = Hybrid::new(job.description.clone(), state.parameters)?;
+    hybrid.write(&folder.network())?;
+    let read = Hybrid::read(&folder.network())?;
+    let flight = &job.set.flights[0];
+    let all: Vec<Window> = (15..200).map(|last| Window { flight: 0, last }).collect();
+    let flights = std::slice::from_ref(flight);
+    let batch = hybrid.predict(flights, &all, Threads(2))?;
+    assert_eq!(batch, read.predict(flights, &all, Threads(1))?);
+    let mut stream = read.stream()?;
+    let mut streamed = Vec::new();
+    for sample in 0..200 {
+        let state = std::array::from_fn(|column| flight.column(phyture::flight::Column::STATE[column])[sample]);
+        streamed.extend(stream.push(&state)?);
+    }
+    assert_eq!(streamed, batch);
+    assert!(stream.push(&[f64::NAN; 16]).is_err());
+    // A file that is cut anywhere is refused, and so is one of another kind.
+    let bytes = std::fs::read(folder.network()).map_err(Error::io("network"))?;
+    let cut = place.path().join("cut.safetensors");
+    for length in [0, 7, 8, 100, bytes.len() / 2, bytes.len() - 1] {
+        std::fs::write(&cut, &bytes[..length]).map_err(Error::io(&cut))?;
+        assert!(Hybrid::read(&cut).is_err(), "cut to {length}");
+    }
+    Ok(())
+}
+
+/// The program itself, killed without warning at 20 moments of its run: what is on disk always loads, and the run goes on.
+#[cfg(feature = "cli")]
+#[test]
+fn a_killed_run_never_leaves_a_file_that_does_not_load() -> Result<()> {
+    use std::process::{Command, Stdio};
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let path = |name: &str| place.path().join(name);
+    let program = || {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
+        command.stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let run = |arguments: &[&str]| -> Result<()> {
+        let output = program().args(arguments).current_dir(place.path()).output().map_err(Error::io("phyture"))?;
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        Ok(())
+    };
+    run(&["simulate", "data", "--minutes", "2"])?;
+    run(&["calibrate", "data", "-m", "data/model.toml", "-o", "model.toml"])?;
+    let config = "epochs = 40\nstride = 20\ncheckpoint_s = 0.02\n[network]\nhistory = 16\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\nmoving_average = 5\n";
+    std::fs::write(path("train.toml"), config).map_err(Error::io("train.toml"))?;
+    let train = ["train", "data", "-m", "model.toml", "-o", "run", "--config", "train.toml"];
+    let checkpoint = path("run/checkpoint.phyture");
+    let mut done = 0;
+    for moment in 0..20_u64 {
+        let resume = checkpoint.exists().then_some("--resume");
+        let mut child = program().args(train).args(resume).current_dir(place.path()).spawn().map_err(Error::io("phyture"))?;
+        std::thread::sleep(std::time::Duration::from_millis(40 + 37 * (moment * 7 % 20)));
+        // It may be at its end already; that is as good.
+        let _ = child.kill();
+        child.wait().map_err(Error::io("phyture"))?;
+        if checkpoint.exists() {
+            let step = steps_of(&checkpoint)?;
+            assert!(step >= done, "went back from step {done} to {step}");
+            done = step;
+        }
+        let network = path("run/network.safetensors");
+        assert!(!network.exists() || Hybrid::read(&network).is_ok());
+    }
+    run(&[&train[..], &["--resume"]].concat())?;
+    let interrupted = std::fs::read(path("run/network.safetensors")).map_err(Error::io("network"))?;
+    run(&["train", "data", "-m", "model.toml", "-o", "whole", "--config", "train.toml"])?;
+    let whole = std::fs::read(path("whole/network.safetensors")).map_err(Error::io("network"))?;
+    assert!(interrupted == whole, "the killed and resumed run ends in other bits than the one that was left alone");
+    Ok(())
+}
+
+/// Steps in a checkpoint; an error if it does not load.
+#[cfg(feature = "cli")]
+fn steps_of(path: &std::path::Path) -> Result<u64> {
+    let (_, _, state): (String, u64, State) = phyture::train::container::read(path)?;
+    Ok(state.step)
+}
