@@ -113,14 +113,14 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
     let all: Vec<Window> = (15..200).map(|last| Window { flight: 0, last }).collect();
     let flights = std::slice::from_ref(flight);
     let batch = hybrid.predict(flights, &all, Threads(2))?;
-    assert_eq!(batch, read.predict(flights, &all, Threads(1))?);
+    assert!(batch == read.predict(flights, &all, Threads(1))?, "the file changes predictions");
     let mut stream = read.stream()?;
     let mut streamed = Vec::new();
     for sample in 0..200 {
         let state = std::array::from_fn(|column| flight.column(phyture::flight::Column::STATE[column])[sample]);
         streamed.extend(stream.push(&state)?);
     }
-    assert_eq!(streamed, batch);
+    assert!(streamed == batch, "stream and batch differ");
     assert!(stream.push(&[f64::NAN; 16]).is_err());
     // A file that is cut anywhere is refused, and so is one of another kind.
     let bytes = std::fs::read(folder.network()).map_err(Error::io("network"))?;
