@@ -44,3 +44,29 @@ fn true_coefficients_lie_in_their_intervals_as_often_as_they_should() -> Result<
     assert!(inside >= FEWEST_INSIDE, "{inside} of {} intervals hold the truth", SEEDS.count() * COEFFICIENT_COUNT);
     Ok(())
 }
+
+/// The set of the paper in its own layout, as far as its files are known: what the simulator writes, the reader reads back,
+/// having decided from the numbers what no header says.
+#[cfg(feature = "files")]
+#[test]
+fn simulated_flights_survive_the_layout_of_the_papers_data_set() -> Result<()> {
+    use phyture::flight::read::{ReadOptions, data_set};
+    use phyture::flight::{Column, write};
+    let place = tempfile::tempdir().map_err(phyture::Error::io("temporary folder"))?;
+    let classes = Some(vec!["hover".into(), "chaos".into(), "turn_demos1".into()]);
+    let set = simulate(&Simulation { minutes: 1.5, seed: 7200, classes, ..Simulation::default() })?;
+    write::stanford(place.path(), &set.flights)?;
+    let read = data_set(place.path(), &ReadOptions::default())?;
+    assert_eq!(read.manoeuvres(), set.manoeuvres());
+    for (found, written) in read.flights.iter().zip(&set.flights) {
+        // An idle start may have been left out: line the flights up at their ends.
+        let skipped = written.len() - found.len();
+        for column in [Column::Vx, Column::Wz, Column::U4, Column::VzDot, Column::WxDot] {
+            let (found, written) = (found.column(column), &written.column(column)[skipped..]);
+            let largest = written.iter().fold(1.0_f64, |largest, value| largest.max(value.abs()));
+            let apart = found.iter().zip(written).fold(0.0_f64, |apart, (a, b)| apart.max((a - b).abs()));
+            assert!(apart <= phyture_kernels::Tolerance::Approximate.relative_f64() * largest, "{}: {apart}", column.name());
+        }
+    }
+    Ok(())
+}

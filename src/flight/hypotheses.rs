@@ -9,7 +9,7 @@
 //! | --- | --- | --- |
 //! | direction of the quaternion, axes of ω | ω | differences of the quaternion |
 //! | Euler angles | the attitude | `euler_*` in rad or degrees |
-//! | axes of velocity | velocity | derivative of position |
+//! | axes of velocity | mean velocity over a second | change of position |
 //! | axes of v̇, gravity in it | derivative of velocity | `vdot_*` |
 //! | axes of ω̇ | derivative of ω | `wdot_*` |
 
@@ -24,6 +24,9 @@ use crate::error::Result;
 const FITS: f64 = 0.5;
 /// Errors within this factor of the smallest are equally good.
 const TIE: f64 = 1.1;
+/// Time over which position and velocity are compared, s: long enough that the noise of a position is small against the way gone,
+/// in a hover too.
+const POSITION_S: f64 = 1.0;
 /// Largest rms angle between quaternion and Euler angles, rad.
 const EULER_FITS_RAD: f64 = 0.1;
 
@@ -189,11 +192,11 @@ pub(super) fn decide(smoother: &Smoother) -> Result<Decided> {
     choose(smoother.table, answers, EULER_FITS_RAD, &mut sentence)?;
 
     let recorded_v = smoother.rows(["vel_n", "vel_e", "vel_d"]);
-    let moving = smoother.derivative(&smoother.rows(["pos_n", "pos_e", "pos_d"]))?;
+    let moving = mean_rates(&smoother.rows(["pos_n", "pos_e", "pos_d"]), smoother.step_s);
     let turned: Vec<[f64; 3]> = matrices.iter().zip(&recorded_v).map(|(matrix, &v)| rotate(matrix, v)).collect();
     let answers = vec![
-        ("velocity in NED", relative_error(&moving, &recorded_v), false),
-        ("velocity in body axes", relative_error(&moving, &turned), true),
+        ("velocity in NED", relative_error(&moving, &means(&recorded_v, smoother.step_s)), false),
+        ("velocity in body axes", relative_error(&moving, &means(&turned, smoother.step_s)), true),
     ];
     let velocity_in_body = choose(smoother.table, answers, FITS, &mut sentence)?;
     let v_inertial = if velocity_in_body { turned } else { recorded_v };
@@ -245,6 +248,31 @@ fn turning_error(rotations: &[Matrix3], w: &[[f64; 3]], step_s: f64) -> f64 {
         })
         .unzip();
     relative_error(&implied, &between)
+}
+
+/// Samples in [`POSITION_S`], at most what there is.
+fn span(samples: usize, step_s: f64) -> usize {
+    ((POSITION_S / step_s).round() as usize).clamp(1, samples.saturating_sub(1).max(1))
+}
+
+/// Change of a position over [`POSITION_S`] from each sample on, per second.
+fn mean_rates(rows: &[[f64; 3]], step_s: f64) -> Vec<[f64; 3]> {
+    let count = span(rows.len(), step_s);
+    let pairs = rows.iter().zip(rows.iter().skip(count));
+    pairs.map(|(from, to)| std::array::from_fn(|axis| (to[axis] - from[axis]) / (count as f64 * step_s))).collect()
+}
+
+/// Mean of a velocity over the same spans, by the trapezoidal rule.
+fn means(rows: &[[f64; 3]], step_s: f64) -> Vec<[f64; 3]> {
+    let count = span(rows.len(), step_s);
+    let of = |rows: &[[f64; 3]]| {
+        let (first, last) = (rows[0], rows[count]);
+        std::array::from_fn(|axis| {
+            let inner: f64 = rows[1..count].iter().map(|row| row[axis]).sum();
+            (inner + 0.5 * (first[axis] + last[axis])) / count as f64
+        })
+    };
+    rows.windows(count + 1).map(of).collect()
 }
 
 /// rms |a − b| / rms |b|.
