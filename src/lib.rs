@@ -20,6 +20,7 @@ pub mod physics;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;
+pub mod student;
 pub mod suggest;
 pub mod tape;
 pub mod train;

@@ -3,7 +3,7 @@
 //! Each step's arithmetic is in its own file; here stands the order, and what a person is told about it.
 
 use super::convert::{Columns, check_finite, convert, source};
-use super::derived::{DERIVED, derived};
+use super::derived::{Derived, derived};
 use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
 use super::resample::Resampler;
 use super::schema::Schema;
@@ -120,7 +120,7 @@ fn of_part(
     let targets = derive(&table, &mut columns, schema, step_s, done)?;
     let samples = columns.get(Column::Vx).map_or(0, <[f64]>::len);
 
-    let used = rows_in_use(&columns, &absent, schema, samples, step_s)?;
+    let used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s))?;
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();
@@ -241,19 +241,21 @@ fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64,
     Ok(targets)
 }
 
-/// Which samples the filter keeps; all without one.
-fn rows_in_use(columns: &Columns, absent: &[Column], schema: &Schema, samples: usize, step_s: f64) -> Result<Vec<bool>> {
+/// Which samples the filter keeps; all without one. The clock is the time of the first sample and the step, s.
+fn rows_in_use(columns: &Columns, absent: &[Column], schema: &Schema, samples: usize, clock: (f64, f64)) -> Result<Vec<bool>> {
+    let (start_s, step_s) = clock;
+    let time_s = |sample: usize| start_s + step_s * sample as f64;
     let mut used = vec![true; samples];
     let canonical = |column: Column| if absent.contains(&column) { None } else { columns.get(column) };
     let get = |name: &str| -> Option<Value> {
         if let Some(column) = Column::from_name(name) {
             return canonical(column).map(Value::from);
         }
-        columns.extra.get(name).map(Value::from).or_else(|| derived(name, &canonical).map(Value::from))
+        columns.extra.get(name).map(Value::from).or_else(|| derived(name, samples, &time_s, &canonical).map(Value::from))
     };
     for formula in &schema.rows {
         let names = Column::ALL.map(Column::name).into_iter().chain(columns.extra.keys().map(String::as_str));
-        let known: Vec<&str> = names.chain(DERIVED.map(|entry| entry.0)).filter(|name| get(name).is_some()).collect();
+        let known: Vec<&str> = names.chain(Derived::ALL.map(Derived::name)).filter(|name| get(name).is_some()).collect();
         formula.check_names(&known)?;
         let holds = formula.evaluate(samples, step_s, &get)?;
         used.iter_mut().zip(holds).for_each(|(used, holds)| *used &= holds.is_finite() && holds != 0.0);

@@ -1,46 +1,106 @@
-//! Quantities that formulas may name besides a log's columns: `height airspeed alpha beta g_x g_y g_z`.
+//! Quantities that formulas may name besides a log's columns: `t height airspeed alpha beta g_x g_y g_z`.
 //!
-//! Each is one line of geometry on canonical columns, without a model of anything.
+//! Each is one line of geometry on canonical columns, without a model of anything. Row filters, models and network inputs all read
+//! them here.
 
 use super::attitude::gravity_body;
 use super::{Column, Flight};
 
-/// Names, units and meanings.
-pub const DERIVED: [(&str, &str, &str); 7] = [
-    ("height", "m", "height above ground, -z"),
-    ("airspeed", "m/s", "|v|: speed through still air"),
-    ("alpha", "rad", "angle of attack, atan2(vz, vx)"),
-    ("beta", "rad", "sideslip, atan2(vy, hypot(vx, vz))"),
-    ("g_x", "m/s^2", "gravity along the nose (paper eqs. 3-4)"),
-    ("g_y", "m/s^2", "gravity to starboard"),
-    ("g_z", "m/s^2", "gravity along body down"),
-];
+/// A quantity made from the canonical columns of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Derived {
+    /// `t`, s.
+    Time,
+    /// `height` above ground, m: `-z`.
+    Height,
+    /// `airspeed` in still air, m/s: the length of `v`.
+    Airspeed,
+    /// `alpha`, angle of attack, rad: `atan2(vz, vx)`.
+    Alpha,
+    /// `beta`, sideslip, rad: `atan2(vy, hypot(vx, vz))`.
+    Beta,
+    /// `g_x`, gravity along the nose, m/s² (paper eqs. 3-4).
+    GravityX,
+    /// `g_y`, gravity to starboard, m/s².
+    GravityY,
+    /// `g_z`, gravity along body down, m/s².
+    GravityZ,
+}
+
+impl Derived {
+    /// All of them.
+    pub const ALL: [Self; 8] =
+        [Self::Time, Self::Height, Self::Airspeed, Self::Alpha, Self::Beta, Self::GravityX, Self::GravityY, Self::GravityZ];
+
+    /// Name in formulas.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Time => "t",
+            Self::Height => "height",
+            Self::Airspeed => "airspeed",
+            Self::Alpha => "alpha",
+            Self::Beta => "beta",
+            Self::GravityX => "g_x",
+            Self::GravityY => "g_y",
+            Self::GravityZ => "g_z",
+        }
+    }
+
+    /// The quantity of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|derived| derived.name() == name)
+    }
+
+    /// Appends the values at consecutive samples to `out`; `state` holds their columns in the order of [`Column::STATE`].
+    pub fn extend(self, state: &[&[f64]; 16], time_s: &dyn Fn(usize) -> f64, samples: usize, out: &mut Vec<f64>) {
+        let of = |column: Column| state.get(column as usize).copied().unwrap_or_default().iter().copied();
+        let velocity = || of(Column::Vx).zip(of(Column::Vy)).zip(of(Column::Vz));
+        let attitude = || of(Column::Roll).zip(of(Column::Pitch));
+        match self {
+            Self::Time => out.extend((0..samples).map(time_s)),
+            Self::Height => out.extend(of(Column::Z).map(|z| -z)),
+            Self::Airspeed => out.extend(velocity().map(|((vx, vy), vz)| vx.hypot(vy).hypot(vz))),
+            Self::Alpha => out.extend(velocity().map(|((vx, _), vz)| vz.atan2(vx))),
+            Self::Beta => out.extend(velocity().map(|((vx, vy), vz)| vy.atan2(vx.hypot(vz)))),
+            Self::GravityX => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[0])),
+            Self::GravityY => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[1])),
+            Self::GravityZ => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[2])),
+        }
+    }
+
+    /// Columns it is made from.
+    pub const fn reads(self) -> &'static [Column] {
+        match self {
+            Self::Time => &[],
+            Self::Height => &[Column::Z],
+            Self::Airspeed | Self::Alpha | Self::Beta => &[Column::Vx, Column::Vy, Column::Vz],
+            Self::GravityX | Self::GravityY | Self::GravityZ => &[Column::Roll, Column::Pitch],
+        }
+    }
+}
 
 /// A derived quantity as a column, from the canonical columns that `get` gives; `None` for another name or a missing column.
-pub fn derived<'a>(name: &str, get: &dyn Fn(Column) -> Option<&'a [f64]>) -> Option<Vec<f64>> {
-    let gravity = |axis: usize| {
-        let (roll, pitch) = (get(Column::Roll)?, get(Column::Pitch)?);
-        Some(roll.iter().zip(pitch).map(|(&roll, &pitch)| gravity_body(roll, pitch)[axis]).collect())
-    };
-    let of_velocity = |formula: fn([f64; 3]) -> f64| {
-        let (x, y, z) = (get(Column::Vx)?, get(Column::Vy)?, get(Column::Vz)?);
-        Some(x.iter().zip(y).zip(z).map(|((&x, &y), &z)| formula([x, y, z])).collect())
-    };
-    match name {
-        "height" => Some(get(Column::Z)?.iter().map(|z| -z).collect()),
-        "airspeed" => of_velocity(|[x, y, z]| (x * x + y * y + z * z).sqrt()),
-        "alpha" => of_velocity(|[x, _, z]| z.atan2(x)),
-        "beta" => of_velocity(|[x, y, z]| y.atan2(x.hypot(z))),
-        "g_x" => gravity(0),
-        "g_y" => gravity(1),
-        "g_z" => gravity(2),
-        _ => None,
+/// `time_s` is the time of a sample.
+pub fn derived<'a>(
+    name: &str,
+    samples: usize,
+    time_s: &dyn Fn(usize) -> f64,
+    get: &dyn Fn(Column) -> Option<&'a [f64]>,
+) -> Option<Vec<f64>> {
+    let derived = Derived::from_name(name)?;
+    let mut state: [&[f64]; 16] = [&[]; 16];
+    for column in derived.reads() {
+        state[*column as usize] = get(*column)?;
     }
+    let mut values = Vec::with_capacity(samples);
+    derived.extend(&state, time_s, samples, &mut values);
+    Some(values)
 }
 
 /// A derived quantity of a flight; `None` for another name, or if a column it needs was not in the log.
 pub fn of_flight(flight: &Flight, name: &str) -> Option<Vec<f64>> {
-    derived(name, &|column| (!flight.absent.contains(&column)).then(|| flight.column(column)))
+    let get = |column| (!flight.absent.contains(&column)).then(|| flight.column(column));
+    derived(name, flight.len(), &|sample| flight.time_s(sample), &get)
 }
 
 #[cfg(test)]
@@ -53,7 +113,8 @@ mod tests {
     fn every_name_is_known_and_absent_columns_give_nothing() -> crate::Result<()> {
         let columns = std::array::from_fn(|column| vec![if column == 2 { -3.0 } else { 0.3 }]);
         let mut flight = Flight::new("a", "hover", 0.0, 0.01, columns, Targets::Recorded)?;
-        for (name, ..) in DERIVED {
+        for derived in Derived::ALL {
+            let name = derived.name();
             assert!(of_flight(&flight, name).is_some_and(|values| values.len() == 1 && values[0].is_finite()), "{name}");
         }
         assert_eq!(of_flight(&flight, "height"), Some(vec![3.0]));

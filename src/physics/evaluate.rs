@@ -5,7 +5,7 @@
 
 use super::model::Model;
 use crate::error::{Error, Result};
-use crate::flight::attitude::gravity_body;
+use crate::flight::derived::Derived;
 use crate::flight::{Accelerations, Column, Flight};
 use crate::formula::{Formula, StreamingFormula, Value};
 use std::ops::Range;
@@ -13,63 +13,9 @@ use std::ops::Range;
 /// Samples of a flight evaluated at once.
 const BLOCK: usize = 1024;
 
-/// Quantities of a sample that formulas may use beside the columns of the log.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Derived {
-    Time,
-    Height,
-    Airspeed,
-    Alpha,
-    Beta,
-    GravityX,
-    GravityY,
-    GravityZ,
-}
-
-/// Names of the derived quantities: `t` s; `height` m, `-z`; `airspeed` m/s, the length of `v` (still air); `alpha` rad,
-/// `atan2(vz, vx)`; `beta` rad, `atan2(vy, hypot(vx, vz))`; `g_x g_y g_z` m/s², gravity in body axes.
-const DERIVED: [(&str, Derived); 8] = [
-    ("t", Derived::Time),
-    ("height", Derived::Height),
-    ("airspeed", Derived::Airspeed),
-    ("alpha", Derived::Alpha),
-    ("beta", Derived::Beta),
-    ("g_x", Derived::GravityX),
-    ("g_y", Derived::GravityY),
-    ("g_z", Derived::GravityZ),
-];
-
-impl Derived {
-    /// Appends the values at consecutive samples to `out`; `state` holds their columns in the order of [`Column::STATE`].
-    fn extend(self, state: &[&[f64]; 16], time_s: &dyn Fn(usize) -> f64, samples: usize, out: &mut Vec<f64>) {
-        let of = |column: Column| state.get(column as usize).copied().unwrap_or_default().iter().copied();
-        let velocity = || of(Column::Vx).zip(of(Column::Vy)).zip(of(Column::Vz));
-        let attitude = || of(Column::Roll).zip(of(Column::Pitch));
-        match self {
-            Self::Time => out.extend((0..samples).map(time_s)),
-            Self::Height => out.extend(of(Column::Z).map(|z| -z)),
-            Self::Airspeed => out.extend(velocity().map(|((vx, vy), vz)| vx.hypot(vy).hypot(vz))),
-            Self::Alpha => out.extend(velocity().map(|((vx, _), vz)| vz.atan2(vx))),
-            Self::Beta => out.extend(velocity().map(|((vx, vy), vz)| vy.atan2(vx.hypot(vz)))),
-            Self::GravityX => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[0])),
-            Self::GravityY => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[1])),
-            Self::GravityZ => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[2])),
-        }
-    }
-
-    const fn reads(self) -> &'static [Column] {
-        match self {
-            Self::Time => &[],
-            Self::Height => &[Column::Z],
-            Self::Airspeed | Self::Alpha | Self::Beta => &[Column::Vx, Column::Vy, Column::Vz],
-            Self::GravityX | Self::GravityY | Self::GravityZ => &[Column::Roll, Column::Pitch],
-        }
-    }
-}
-
 /// Names that formulas may use on every log: the 16 state and control columns and the derived quantities.
 pub fn standard_names() -> Vec<&'static str> {
-    Column::STATE.iter().map(|column| column.name()).chain(DERIVED.iter().map(|entry| entry.0)).collect()
+    Column::STATE.iter().map(|column| column.name()).chain(Derived::ALL.iter().map(|derived| derived.name())).collect()
 }
 
 /// A standard quantity of a whole flight by name: a column of the log, its own further columns, or a derived quantity.
@@ -77,7 +23,7 @@ pub fn quantity(flight: &Flight, name: &str) -> Option<Vec<f64>> {
     if let Some(column) = flight.named(name) {
         return Some(column.to_vec());
     }
-    let derived = DERIVED.iter().find(|entry| entry.0 == name)?.1;
+    let derived = Derived::from_name(name)?;
     let mut values = Vec::with_capacity(flight.len());
     derived.extend(&state_columns(flight, 0..flight.len()), &|sample| flight.time_s(sample), flight.len(), &mut values);
     Some(values)
@@ -88,7 +34,7 @@ pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
     if let Some(column) = Column::STATE.iter().find(|column| column.name() == name) {
         return state.get(*column as usize).copied();
     }
-    let derived = DERIVED.iter().find(|entry| entry.0 == name)?.1;
+    let derived = Derived::from_name(name)?;
     let columns = std::array::from_fn(|index| state.get(index..=index).unwrap_or_default());
     let mut value = Vec::with_capacity(1);
     derived.extend(&columns, &|_| time_s, 1, &mut value);
@@ -204,8 +150,8 @@ impl Program {
     fn source(&mut self, name: &str) -> usize {
         let source = if let Some(column) = Column::STATE.iter().find(|column| column.name() == name) {
             Source::State(*column)
-        } else if let Some((_, derived)) = DERIVED.iter().find(|entry| entry.0 == name) {
-            Source::Derived(*derived)
+        } else if let Some(derived) = Derived::from_name(name) {
+            Source::Derived(derived)
         } else {
             let known = self.extras.iter().position(|extra| extra == name);
             Source::Extra(known.unwrap_or_else(|| {

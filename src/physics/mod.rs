@@ -11,7 +11,6 @@ mod least_squares;
 mod model;
 #[cfg(feature = "files")]
 mod model_file;
-mod student;
 #[cfg(feature = "files")]
 mod toml_section;
 

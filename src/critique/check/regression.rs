@@ -1,6 +1,6 @@
 //! Least squares on sums by block, and intervals that hold where errors within a block depend on each other.
 
-use crate::blocks::student_975;
+use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Sums of one block: XᵀX, Xᵀy and Σy².
@@ -77,7 +77,7 @@ impl<const K: usize> BlockRegression<K> {
         }
         let blocks = count as f64;
         let covariance = &inverse * meat * &inverse * (blocks / (blocks - 1.0));
-        let quantile = student_975(count - K);
+        let quantile = quantile_975((count - K) as f64);
         let estimates = std::array::from_fn(|i| {
             let (value, half) = (beta[i] / scale[i], quantile * covariance[(i, i)].max(0.0).sqrt() / scale[i]);
             Estimate { value, interval: [value - half, value + half] }

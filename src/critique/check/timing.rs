@@ -6,8 +6,9 @@
 use super::increments::Motion;
 use super::regression::BlockRegression;
 use super::report::{Finding, Subject, Verdict};
-use crate::blocks::{FEW_BLOCKS, student_975};
+use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
+use crate::student::quantile_975;
 use serde::{Deserialize, Serialize};
 
 /// Streams are compared up to this shift to either side, s.
@@ -73,7 +74,7 @@ impl Profile {
         let left_out: Vec<f64> = (0..blocks).map(|block| self.lowest(Some(block), &totals)).collect::<Option<_>>()?;
         let (count, mean) = (blocks as f64, left_out.iter().sum::<f64>() / blocks as f64);
         let variance = (count - 1.0) / count * left_out.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-        let half = student_975(blocks - 1) * variance.sqrt();
+        let half = quantile_975((blocks - 1) as f64) * variance.sqrt();
         let curve = (0..self.shifts.len()).map(|shift| self.objective(shift, None, &totals));
         let (low, high) = curve.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
         Some(Minimum { at, interval: [at - half, at + half], depth: high - low })

@@ -1,9 +1,13 @@
-//! The quantile of Student's t that a 95 % interval needs. No other statistics.
+//! The quantile of Student's t that a 95 % interval needs: the one place for it. No other statistics.
 
-/// The 97.5 % quantile of Student's t with `degrees` degrees of freedom, which need not be whole; `degrees` below 1 counts as 1.
+/// The 97.5 % quantile of Student's t with `degrees` degrees of freedom, which need not be whole; between 0 and 1 they
+/// count as 1, and without any the quantile is infinite.
 ///
 /// Bisection on the distribution function, 1/2 + sign(t) (1 - I_x(ν/2, 1/2)) / 2 with x = ν/(ν + t²).
-pub(super) fn quantile_975(degrees: f64) -> f64 {
+pub fn quantile_975(degrees: f64) -> f64 {
+    if degrees <= 0.0 {
+        return f64::INFINITY;
+    }
     let degrees = if degrees >= 1.0 { degrees.min(1e7) } else { 1.0 };
     let upper_tail = |t: f64| 0.5 * incomplete_beta(0.5 * degrees, 0.5, degrees / (degrees + t * t));
     // 12.706… is the value for one degree of freedom, the largest.
@@ -84,5 +88,14 @@ mod tests {
     fn quantiles_fall_with_the_degrees_of_freedom() {
         let values: Vec<f64> = [1.0, 1.5, 2.0, 5.0, 9.3, 19.0, 40.0, 1000.0].into_iter().map(quantile_975).collect();
         assert!(values.windows(2).all(|pair| pair[0] > pair[1]), "{values:?}");
+    }
+
+    #[test]
+    fn quantiles_fall_to_the_normal_one() {
+        // Published values: t(0.975; 11) = 2.201, (30) = 2.042, (120) = 1.980; three decimals are printed.
+        for (degrees, published) in [(11, 2.201), (30, 2.042), (120, 1.980)] {
+            assert_eq!(format!("{:.3}", quantile_975(degrees as f64)), format!("{published:.3}"));
+        }
+        assert!((1..200).all(|degrees| quantile_975(degrees as f64) > quantile_975((degrees + 1) as f64)));
     }
 }
