@@ -171,7 +171,8 @@ fn a_killed_run_never_leaves_a_file_that_does_not_load() -> Result<()> {
         let network = path("run/network.safetensors");
         assert!(!network.exists() || Hybrid::read(&network).is_ok());
     }
-    run(&[&train[..], &["--resume"]].concat())?;
+    let resume: &[&str] = if checkpoint.exists() { &["--resume"] } else { &[] };
+    run(&[&train[..], resume].concat())?;
     let interrupted = std::fs::read(path("run/network.safetensors")).map_err(Error::io("network"))?;
     run(&["train", "data", "-m", "model.toml", "-o", "whole", "--config", "train.toml"])?;
     let whole = std::fs::read(path("whole/network.safetensors")).map_err(Error::io("network"))?;
