@@ -3,7 +3,7 @@
 //! Separated by spaces, without a header. `smoother.txt` has 24 columns: number, time (s), position NED (m), quaternion (x, y, z, w),
 //! velocity, angular velocity, their derivatives, Euler angles; `controls.txt` has 6: number, time, aileron, elevator,
 //! rudder, collective. What the files' authors do not state (which way the quaternion turns, axes of the rates and accelerations,
-//! whether these contain gravity, scale of the controls) is decided by consistency within each file; see [`hypotheses`](super::hypotheses).
+//! whether these contain gravity, scale of the controls) is decided by consistency within each file; see `hypotheses.rs`.
 //! Source of the layout: the set's own notes (P. Abbeel, A. Coates, A. Y. Ng, Int. J. Robotics Research 29 (2010) 1608).
 
 use super::assemble::{Assembled, Cuts, assemble};

@@ -103,7 +103,7 @@ pub fn csv(flight: &Flight, path: &Path) -> Result<()> {
     with_table(flight, &flight.absent, |table| table_csv(path, table))
 }
 
-/// Writes one flight as Parquet with the same columns as [`csv`].
+/// Writes one flight as Parquet with the same columns as [`csv()`].
 ///
 /// # Errors
 /// [`Error::Io`].

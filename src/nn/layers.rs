@@ -61,7 +61,7 @@ impl<T: Real> Recorder<T> {
         Ok(var)
     }
 
-    /// y[t] = W x[t] + b, x [n, in] to y [n, out]: `name.weight` [out, in] and, if asked for, `name.bias` [out].
+    /// `y[t] = W x[t] + b`, x `[n, in]` to y `[n, out]`: `name.weight` `[out, in]` and, if asked for, `name.bias` `[out]`.
     ///
     /// # Errors
     /// As [`Graph::apply`].
@@ -75,7 +75,7 @@ impl<T: Real> Recorder<T> {
         self.graph.apply(Linear, &operands)
     }
 
-    /// y = W x + b along time, x [n, C] to y [rows, C]: `name.weight` [rows, n] and, if asked for, `name.bias` [rows].
+    /// y = W x + b along time, x `[n, C]` to y `[rows, C]`: `name.weight` `[rows, n]` and, if asked for, `name.bias` `[rows]`.
     ///
     /// # Errors
     /// As [`Graph::apply`].
@@ -89,7 +89,7 @@ impl<T: Real> Recorder<T> {
         self.graph.apply(Temporal, &operands)
     }
 
-    /// Layer norm over channels: `name.weight` and `name.bias` [C].
+    /// Layer norm over channels: `name.weight` and `name.bias` `[C]`.
     ///
     /// # Errors
     /// As [`Graph::apply`].
@@ -101,7 +101,7 @@ impl<T: Real> Recorder<T> {
     }
 
     /// Convolution along time with replicate padding, x [n, in] to y [n + padding − k + 1, out]: `name.weight` [out, in, k] and
-    /// `name.bias` [out].
+    /// `name.bias` `[out]`.
     ///
     /// # Errors
     /// As [`Graph::apply`].

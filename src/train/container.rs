@@ -41,7 +41,7 @@ pub fn write<S: Serialize>(path: &Path, state: &S) -> Result<()> {
     })
 }
 
-/// Reads what [`write`] wrote.
+/// Reads what [`write()`] wrote.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be read; [`Error::File`] saying whether it is of another kind, newer, cut or changed.
