@@ -43,8 +43,9 @@ impl Scale {
         if !quick {
             return Self { minutes: 20.0, config: full };
         }
+        // 20 flights of 30 s: one of each class, so that the locked ones are among them.
         let network = PhyTureConfig { history: 64, d_model: 16, ..full.network.clone() };
-        Self { minutes: 7.0, config: TrainConfig { network, epochs: 6, ..full } }
+        Self { minutes: 10.0, config: TrainConfig { network, epochs: 6, ..full } }
     }
 }
 
