@@ -132,6 +132,17 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn a_nan_never_reaches_the_network() -> Result<()> {
+    let mut job = job()?;
+    // Not a number on every sample: the logarithm of a negative one.
+    job.description.inputs[3] = "log(-1 - vx^2)".into();
+    let refused =
+        sequence::sequences(&job.set.flights, &job.description).map_err(|error| error.to_string()).err().unwrap_or_default();
+    assert!(refused.contains("log(-1 - vx^2)") && refused.contains("not a finite number"), "{refused}");
+    Ok(())
+}
+
 /// The program itself, killed without warning at 20 moments of its run: what is on disk always loads, and the run goes on.
 #[cfg(feature = "cli")]
 #[test]

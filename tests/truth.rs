@@ -12,7 +12,7 @@ const SEEDS: std::ops::Range<u64> = 7100..7110;
 /// Coefficients of the baseline, one of each a seed.
 const COEFFICIENT_COUNT: usize = 14;
 
-/// Of 140 intervals of 95 %, fewer than 124 hold the truth with a probability of 0.2 % if all were independent (binomial).
+/// Of 140 intervals of 95 %, fewer than 124 hold the truth with a probability of 0.07 % if all were independent (binomial).
 /// The regressors of a seed share flights, so they are not quite; the bound is not tightened for it.
 const FEWEST_INSIDE: usize = 124;
 
