@@ -122,6 +122,20 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
     }
     assert!(streamed == batch, "stream and batch differ");
     assert!(stream.push(&[f64::NAN; 16]).is_err());
+    // Parts that do not fit each other are refused when they are joined, before anything is predicted.
+    let broken: [fn(&mut Description); 6] = [
+        |description| description.inputs.truncate(3),
+        |description| description.scaling.state.truncate(3),
+        |description| description.scaling.physics[2].deviation = 0.0,
+        |description| description.config.outputs = 5,
+        |description| description.gate[1] = f64::NAN,
+        |description| description.step_s = 0.0,
+    ];
+    for breakage in broken {
+        let mut description = job.description.clone();
+        breakage(&mut description);
+        assert!(Hybrid::new(description, vec![]).is_err_and(|error| error.to_string().starts_with("hybrid: ")));
+    }
     // A file that is cut anywhere is refused, and so is one of another kind.
     let bytes = std::fs::read(folder.network()).map_err(Error::io("network"))?;
     let cut = place.path().join("cut.safetensors");

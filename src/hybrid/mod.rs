@@ -63,6 +63,34 @@ impl Description {
         Network::new(&self.config, &output, standardise_loss)
     }
 
+    /// Refuses sizes that do not fit each other and numbers that are not finite: a description may come from any file.
+    fn check(&self) -> Result<()> {
+        let fault = |field: &str, found: String, expected: String| {
+            Err(Error::Config { place: "hybrid".into(), field: field.into(), found, expected })
+        };
+        let Self { config, inputs, linear, scaling, gate, step_s, .. } = self;
+        let sizes = [
+            ("network.state_channels", config.state_channels, inputs.len()),
+            ("scaling.state", scaling.state.len(), inputs.len()),
+            ("network.physics_channels", config.physics_channels, 6),
+            ("network.outputs", config.outputs, 6),
+        ];
+        if let Some((field, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
+            return fault(field, found.to_string(), expected.to_string());
+        }
+        let scales = scaling.state.iter().chain(&scaling.physics).chain(&scaling.output);
+        if !scales.clone().all(|scale| scale.mean.is_finite() && scale.deviation.is_finite() && scale.deviation > 0.0) {
+            return fault("scaling", "a mean or deviation that is none".into(), "finite means and positive deviations".into());
+        }
+        if !(step_s.is_finite() && *step_s > 0.0 && gate.iter().all(|factor| factor.is_finite())) {
+            return fault("step_s, gate", format!("{step_s}, {gate:?}"), "a positive step and finite factors".into());
+        }
+        match linear.as_ref().map_or(Ok(()), Linear::check) {
+            Ok(()) => self.model.check(),
+            Err(message) => fault("linear", message, "numbers that fit".into()),
+        }
+    }
+
     /// Refuses a flight sampled at another step than the training data.
     fn check_step(&self, flight: &Flight) -> Result<()> {
         if (flight.step_s / self.step_s - 1.0).abs() <= STEP_TOLERANCE {
@@ -90,6 +118,7 @@ impl Hybrid {
     /// # Errors
     /// [`Error::Config`] if the configuration is impossible; [`Error::Shape`] if the number of weights is not the network's.
     pub fn new(description: Description, parameters: Vec<f32>) -> Result<Self> {
+        description.check()?;
         let network = description.network(false)?;
         let count = network.graph().parameter_count();
         if parameters.len() != count {
@@ -156,9 +185,7 @@ impl Hybrid {
         let text = file.metadata.get(METADATA).ok_or_else(|| fault("holds no hybrid of phyture (no such metadata)".into()))?;
         let description: Description =
             serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;
-        if let Some(linear) = &description.linear {
-            linear.check().map_err(fault)?;
-        }
+        description.check().map_err(|error| fault(error.to_string()))?;
         let network = description.network(false)?;
         let mut parameters = vec![0.0; network.graph().parameter_count()];
         for parameter in network.parameters() {
