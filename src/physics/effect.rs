@@ -4,6 +4,7 @@ use super::evaluate::standard_names;
 use crate::error::{Error, Result};
 use crate::flight::Column;
 use crate::formula::Formula;
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Kind of the effects that a user writes as a formula.
@@ -37,6 +38,15 @@ pub struct Coefficient {
     pub ci95: Option<[f64; 2]>,
     /// What it stands for, in a few words.
     pub meaning: String,
+    /// For a property of each flight (wind, bias): its value by name of the flight; `value` is then what other flights get.
+    pub by_flight: Option<BTreeMap<String, f64>>,
+}
+
+impl Coefficient {
+    /// The value in a flight.
+    pub fn in_flight(&self, flight: &str) -> f64 {
+        self.by_flight.as_ref().and_then(|values| values.get(flight)).copied().unwrap_or(self.value)
+    }
 }
 
 /// A number inside a regressor that calibration leaves alone: geometry, a time constant.
@@ -104,6 +114,7 @@ impl Effect {
                 unit: format!("{unit} per unit"),
                 ci95: None,
                 meaning: "factor of the formula".into(),
+                by_flight: None,
             }],
             parameters: Vec::new(),
             swaps: Vec::new(),

@@ -97,8 +97,9 @@ pub(super) struct Program {
 }
 
 impl Program {
-    /// `extra` lists the further columns that are there; `None` accepts any name as one.
-    fn compile(model: &Model, step_s: f64, extra: Option<&[&str]>) -> Result<Self> {
+    /// `extra` lists the further columns that are there; `None` accepts any name as one. `flight` names the flight, if it is known,
+    /// for coefficients that differ from flight to flight.
+    fn compile(model: &Model, step_s: f64, extra: Option<&[&str]>, flight: Option<&str>) -> Result<Self> {
         model.check()?;
         let mut program = Self { sources: Vec::new(), extras: Vec::new(), terms: Vec::new(), step_s };
         for (effect_index, effect) in model.effects.iter().enumerate().filter(|(_, effect)| effect.enabled) {
@@ -107,15 +108,17 @@ impl Program {
                 let constant = |name: &str| model.constant(effect, name);
                 if let Some(extra) = extra {
                     let constants = effect.parameters.iter().map(|parameter| parameter.name.as_str()).chain(Model::CONSTANTS);
-                    let known: Vec<&str> = standard_names().into_iter().chain(extra.iter().copied()).chain(constants).collect();
+                    let mut known: Vec<&str> = standard_names().into_iter().chain(extra.iter().copied()).chain(constants).collect();
+                    known.extend(regressor.names().into_iter().filter(|name| model.constant(effect, name).is_some()));
                     regressor.check_names(&known).map_err(|error| effect.name_error(error))?;
                 }
                 let formula = regressor.stream_with(step_s, &constant).map_err(|error| effect.name_error(error))?;
                 let inputs = formula.inputs().iter().map(|name| program.source(name)).collect();
                 let coefficient =
                     term.coefficient.as_ref().and_then(|name| effect.coefficients.iter().position(|c| c.name == *name));
-                let factor =
-                    coefficient.and_then(|index| effect.coefficients.get(index)).map_or(1.0, |coefficient| coefficient.value);
+                let factor = coefficient
+                    .and_then(|index| effect.coefficients.get(index))
+                    .map_or(1.0, |coefficient| flight.map_or(coefficient.value, |flight| coefficient.in_flight(flight)));
                 let place = Place { effect: effect_index, coefficient, channel: term.channel };
                 program.terms.push(CompiledTerm { place, factor, formula, inputs });
             }
@@ -126,7 +129,7 @@ impl Program {
     /// Compiles for one flight, refusing what the flight does not carry.
     pub(super) fn for_flight(model: &Model, flight: &Flight) -> Result<Self> {
         let extra: Vec<&str> = flight.extra.keys().map(String::as_str).collect();
-        let program = Self::compile(model, flight.step_s, Some(&extra))?;
+        let program = Self::compile(model, flight.step_s, Some(&extra), Some(&flight.name))?;
         for term in &program.terms {
             for source in term.inputs.iter().filter_map(|&input| program.sources.get(input)) {
                 let reads: &[Column] = match source {
@@ -258,7 +261,7 @@ pub struct StreamingModel {
 impl StreamingModel {
     pub(super) fn new(model: &Model, step_s: f64) -> Result<Self> {
         Ok(Self {
-            program: Program::compile(model, step_s, None)?,
+            program: Program::compile(model, step_s, None, None)?,
             start_s: 0.0,
             samples: 0,
             values: Vec::new(),

@@ -5,6 +5,8 @@
 
 mod baseline;
 mod calibrate;
+pub mod catalogue;
+mod definition;
 mod effect;
 mod evaluate;
 mod least_squares;
@@ -14,8 +16,11 @@ mod model_file;
 #[cfg(feature = "files")]
 mod toml_section;
 
-pub use baseline::{PAPER, built_in, kinds};
+pub use baseline::PAPER;
 pub use calibrate::{Calibration, Estimate, calibrate};
+pub use definition::{
+    AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, coefficient,
+};
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};
 pub use model::{Entry, Model, ModelData};

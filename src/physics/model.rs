@@ -2,6 +2,7 @@
 //! to a file is in `model_file`; how its numbers are found, in `calibrate`.
 
 use super::baseline;
+use super::definition::Vehicle;
 use super::effect::Effect;
 use super::evaluate::{self, StreamingModel};
 use crate::error::{Error, Result};
@@ -50,6 +51,9 @@ pub struct Model {
     pub inertia: [f64; 3],
     /// Rotor radius, m.
     pub rotor_radius_m: f64,
+    /// What kind of aircraft it is: which effects of the catalogue make sense.
+    #[serde(default)]
+    pub vehicle: Vehicle,
     /// Effects, in the order in which they are summed.
     pub effects: Vec<Effect>,
     /// What is known about the data.
@@ -72,7 +76,8 @@ impl Model {
             mass_kg,
             inertia,
             rotor_radius_m,
-            effects: baseline::paper(),
+            vehicle: Vehicle::default(),
+            effects: baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
             data: ModelData::default(),
             provenance: BTreeMap::new(),
         }
@@ -166,14 +171,24 @@ impl Model {
         Ok(())
     }
 
-    /// A constant as the formulas of `effect` see it: its own parameters first, then the model's.
+    /// A constant as the formulas of `effect` see it: its own parameters first, then the model's numbers, then the current value of
+    /// another enabled effect's coefficient, named `<effect>_<coefficient>`.
     pub(super) fn constant(&self, effect: &Effect, name: &str) -> Option<f64> {
         if let Some(parameter) = effect.parameters.iter().find(|parameter| parameter.name == name) {
             return Some(parameter.value);
         }
         let [ix, iy, iz] = self.inertia;
         let values = [self.mass_kg, ix, iy, iz, self.rotor_radius_m, self.data.control_delay_s];
-        Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1)
+        let own = Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1);
+        own.or_else(|| self.coefficient_named(name).map(|coefficient| coefficient.value))
+    }
+
+    /// The coefficient that formulas call `<effect>_<coefficient>`.
+    fn coefficient_named(&self, name: &str) -> Option<&super::effect::Coefficient> {
+        self.effects.iter().filter(|effect| effect.enabled).find_map(|effect| {
+            let coefficient = name.strip_prefix(effect.name.as_str())?.strip_prefix('_')?;
+            effect.coefficient(coefficient)
+        })
     }
 
     /// A regressor of `effect` as it is evaluated: the swaps of the enabled effects applied in order, then the control delay.

@@ -1,6 +1,8 @@
 //! The model file: a [`Model`] as TOML, read strictly and written so that it reads back the same.
 
 use super::baseline::{self, PAPER};
+use super::catalogue;
+use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::model::{Entry, Model, ModelData};
 use super::toml_section::{Section, line_of, number};
@@ -45,17 +47,26 @@ impl Model {
         let file = Section { path, text, name: "", table: parsed.get_ref() };
         file.allow(&["model", "data", "effect", "provenance"])?;
         let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
-        model.allow(&["name", "mass_kg", "inertia", "rotor_radius_m", "baseline"])?;
+        model.allow(&["name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
+        let mass_kg = model.number("mass_kg")?.unwrap_or(NOMINAL_MASS_KG);
+        let rotor_radius_m = model.number("rotor_radius_m")?.unwrap_or(NOMINAL_ROTOR_RADIUS_M);
+        let vehicle = match model.text("vehicle")? {
+            None => Vehicle::default(),
+            Some(name) => Vehicle::ALL.into_iter().find(|vehicle| vehicle.name() == name).ok_or_else(|| {
+                let names = Vehicle::ALL.map(Vehicle::name);
+                model.fault("vehicle", format!("`{name}`{}", did_you_mean(name, names)), format!("one of `{}`", names.join("`, `")))
+            })?,
+        };
         let mut effects = match model.text("baseline")? {
             None => Vec::new(),
-            Some(PAPER) => baseline::paper(),
+            Some(PAPER) => baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
             Some(other) => {
                 return Err(model.fault("baseline", format!("`{other}`{}", did_you_mean(other, [PAPER])), "`paper`, or none"));
             }
         };
         let mut listed: Vec<String> = Vec::new();
         for section in file.sections("effect", "effect")? {
-            let effect = read_effect(&section)?;
+            let effect = read_effect(&section, mass_kg, rotor_radius_m)?;
             if listed.contains(&effect.name) {
                 return Err(section.fault(
                     "kind",
@@ -89,9 +100,10 @@ impl Model {
         let stem = path.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
         let result = Self {
             name: model.text("name")?.map_or(stem, str::to_owned),
-            mass_kg: model.number("mass_kg")?.unwrap_or(NOMINAL_MASS_KG),
+            mass_kg,
             inertia: model.numbers("inertia")?.unwrap_or(NOMINAL_INERTIA),
-            rotor_radius_m: model.number("rotor_radius_m")?.unwrap_or(NOMINAL_ROTOR_RADIUS_M),
+            rotor_radius_m,
+            vehicle,
             effects,
             data,
             provenance,
@@ -119,6 +131,7 @@ impl Model {
         // Writing to a String does not fail.
         let _ = writeln!(text, "[model]\nname = {}\nmass_kg = {:?}", quoted(&self.name), self.mass_kg);
         let _ = writeln!(text, "inertia = [{ix:?}, {iy:?}, {iz:?}]\nrotor_radius_m = {:?}", self.rotor_radius_m);
+        let _ = writeln!(text, "vehicle = {}", quoted(self.vehicle.name()));
         let locked: Vec<String> = self.data.locked.iter().map(|name| quoted(name)).collect();
         let _ = writeln!(text, "\n[data]\ncontrol_delay_s = {:?}\nlocked = [{}]", self.data.control_delay_s, locked.join(", "));
         let _ = writeln!(text, "split = {}", quoted(&self.data.split.to_string()));
@@ -140,10 +153,10 @@ impl Model {
     }
 }
 
-fn read_effect(section: &Section<'_>) -> Result<Effect> {
+fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Result<Effect> {
     let missing = |key: &str| section.fault(key, "nothing", format!("`{key} = …` in this [[effect]]"));
     let kind = section.text("kind")?.ok_or_else(|| missing("kind"))?;
-    let common = ["kind", "name", "enabled", "ci95", "added_by", "parameters"];
+    let common = ["kind", "name", "enabled", "ci95", "added_by", "parameters", "flights"];
     let mut effect = if kind == FORMULA_KIND {
         section.allow(&[&common[..], &["channel", "formula", "coefficient", "unit"]].concat())?;
         let name = section.text("name")?.ok_or_else(|| missing("name"))?;
@@ -170,11 +183,12 @@ fn read_effect(section: &Section<'_>) -> Result<Effect> {
         }
         effect
     } else {
-        let mut effect = baseline::built_in(kind).ok_or_else(|| {
-            let known: Vec<&str> = baseline::kinds().chain([FORMULA_KIND]).collect();
-            let found = format!("`{kind}`{}", did_you_mean(kind, known.iter().copied()));
-            section.fault("kind", found, format!("one of `{}`", known.join("`, `")))
-        })?;
+        let mut effect =
+            catalogue::definition(kind).map(|definition| definition.effect(mass_kg, rotor_radius_m)).ok_or_else(|| {
+                let known: Vec<&str> = catalogue::kinds().chain([FORMULA_KIND]).collect();
+                let found = format!("`{kind}`{}", did_you_mean(kind, known.iter().copied()));
+                section.fault("kind", found, format!("one of `{}`", known.join("`, `")))
+            })?;
         section.allow(&[&common[..], &["coefficients"]].concat())?;
         if let Some(name) = section.text("name")? {
             effect.name = name.into();
@@ -199,6 +213,20 @@ fn read_effect(section: &Section<'_>) -> Result<Effect> {
             coefficient.ci95 = intervals.numbers(&coefficient.name)?;
             if let Some([low, high]) = coefficient.ci95.filter(|interval| interval[0] > interval[1]) {
                 return Err(intervals.fault(&coefficient.name, format!("[{low}, {high}]"), "the lower end first"));
+            }
+        }
+    }
+    if let Some(flights) = section.section("flights", "effect.flights")? {
+        for flight in flights.keys() {
+            let Some(values) = flights.section(flight, "effect.flights")? else { continue };
+            let differing =
+                effect.coefficients.iter_mut().filter_map(|c| c.by_flight.as_mut().map(|by_flight| (&c.name, by_flight)));
+            let differing: Vec<_> = differing.collect();
+            values.allow(&differing.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>())?;
+            for (name, by_flight) in differing {
+                if let Some(value) = values.number(name)? {
+                    by_flight.insert(flight.to_owned(), value);
+                }
             }
         }
     }
@@ -260,6 +288,15 @@ fn write_effect(text: &mut String, effect: &Effect) {
         .collect();
     if !intervals.is_empty() {
         line("ci95", table(intervals));
+    }
+    let mut flights: BTreeMap<&str, Vec<(&str, String)>> = BTreeMap::new();
+    for coefficient in &effect.coefficients {
+        for (flight, value) in coefficient.by_flight.iter().flatten() {
+            flights.entry(flight).or_default().push((&coefficient.name, format!("{value:?}")));
+        }
+    }
+    if !flights.is_empty() {
+        line("flights", table(flights.into_iter().map(|(flight, values)| (flight, table(values))).collect()));
     }
 }
 
