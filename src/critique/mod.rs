@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod diagnose;
 pub mod locate;
 pub mod regime;
 pub mod table;

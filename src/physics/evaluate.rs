@@ -126,6 +126,20 @@ impl Program {
         Ok(program)
     }
 
+    /// Formulas without constants, each a term of its own.
+    pub(super) fn of_formulas(formulas: &[Formula], flight: &Flight) -> Result<Self> {
+        let mut program = Self { sources: Vec::new(), extras: Vec::new(), terms: Vec::new(), step_s: flight.step_s };
+        let known: Vec<&str> = standard_names().into_iter().chain(flight.extra.keys().map(String::as_str)).collect();
+        for formula in formulas {
+            formula.check_names(&known)?;
+            let formula = formula.stream(flight.step_s)?;
+            let inputs = formula.inputs().iter().map(|name| program.source(name)).collect();
+            let place = Place { effect: 0, coefficient: None, channel: 0 };
+            program.terms.push(CompiledTerm { place, factor: 1.0, formula, inputs });
+        }
+        Ok(program)
+    }
+
     /// Compiles for one flight, refusing what the flight does not carry.
     pub(super) fn for_flight(model: &Model, flight: &Flight) -> Result<Self> {
         let extra: Vec<&str> = flight.extra.keys().map(String::as_str).collect();

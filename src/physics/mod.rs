@@ -6,6 +6,7 @@
 mod baseline;
 mod calibrate;
 pub mod catalogue;
+mod columns;
 mod definition;
 mod effect;
 mod evaluate;
@@ -18,6 +19,7 @@ mod toml_section;
 
 pub use baseline::PAPER;
 pub use calibrate::{Calibration, Estimate, calibrate};
+pub use columns::{Regressor, evaluate_blocks, missing_input};
 pub use definition::{
     AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, coefficient,
 };

@@ -1,0 +1,219 @@
+//! Models tried on the same blocks: one pass for the columns of all of them, then for each its held-out error block by block.
+
+use super::design::{Design, Layout, enlarged};
+use super::fit::{Component, Prior, Reduced, Solution, components};
+use super::gram::{Block, BlockGram, grams};
+use crate::error::Result;
+use crate::flight::Flight;
+use crate::physics::{Model, Regressor, catalogue};
+
+/// Folds over the blocks.
+pub(super) const FOLDS: usize = 10;
+
+/// Flights, and what they are cut into.
+pub(super) struct Engine<'a> {
+    pub flights: &'a [Flight],
+    pub blocks: Vec<Block>,
+    /// Fold of each block.
+    pub fold: Vec<usize>,
+    /// Samples over which a residual is correlated.
+    pub correlation: f64,
+}
+
+/// A model on the blocks.
+#[derive(Clone, Debug)]
+pub(super) struct Trial {
+    /// With coefficients fitted on all blocks.
+    pub model: Model,
+    pub layout: Layout,
+    /// For each channel the squared error of each block under coefficients of other folds.
+    pub errors: [Vec<f64>; 6],
+    /// Channels that the model changes against the one it is compared with.
+    pub changed: [bool; 6],
+    /// Whether a coefficient of the last effect is on a bound.
+    pub at_bound: bool,
+    /// Values by position in `layout.free`.
+    pub values: Vec<f64>,
+}
+
+/// What one pass brought: a model, others that change it, and the Gram matrices behind them.
+pub(super) struct Pass {
+    pub base: Trial,
+    /// `None` where the blocks do not determine the coefficients.
+    pub trials: Vec<Option<Trial>>,
+    pub grams: Vec<BlockGram>,
+}
+
+/// What is presumed about each free coefficient.
+pub(super) fn priors(model: &Model, layout: &Layout) -> Vec<Prior> {
+    layout
+        .free
+        .iter()
+        .map(|free| {
+            let Some(effect) = model.effects.get(free.effect) else { return Prior::FREE };
+            let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
+            let known = effect.coefficients.get(free.coefficient).zip(definition);
+            match known.and_then(|(coefficient, definition)| definition.coefficient(&coefficient.name)) {
+                Some(known) => Prior { bounds: known.bounds, by_flight: known.by_flight },
+                None => Prior::FREE,
+            }
+        })
+        .collect()
+}
+
+impl Engine<'_> {
+    pub fn rows(&self) -> usize {
+        self.blocks.iter().map(|block| block.end - block.start).sum()
+    }
+
+    /// Mean squared error of each channel.
+    pub fn mse(&self, trial: &Trial) -> [f64; 6] {
+        let rows = self.rows().max(1) as f64;
+        std::array::from_fn(|channel| trial.errors[channel].iter().sum::<f64>() / rows)
+    }
+
+    /// Tries a model and others that have its effects and one more, or one less, or other numbers inside.
+    pub fn pass(&self, base: &Model, models: &[Model]) -> Result<Pass> {
+        let mut design = Design::default();
+        let regressors = base.regressors(|_| true)?;
+        let layout = design.add(&regressors);
+        let mut layouts = Vec::with_capacity(models.len());
+        for model in models {
+            layouts.push(design.add(&self.regressors_of(model, base, &regressors)?));
+        }
+        let grams = grams(self.flights, &self.blocks, &design)?;
+        let base = self.base(base, layout, &grams);
+        let one = |(model, layout): (&Model, &Layout)| self.trial(model, layout, &base, &grams);
+        #[cfg(feature = "rayon")]
+        let trials = {
+            use rayon::prelude::*;
+            models.par_iter().zip(layouts.par_iter()).map(one).collect()
+        };
+        #[cfg(not(feature = "rayon"))]
+        let trials = models.iter().zip(&layouts).map(one).collect();
+        Ok(Pass { base, trials, grams })
+    }
+
+    fn regressors_of(&self, model: &Model, base: &Model, known: &[Regressor]) -> Result<Vec<Regressor>> {
+        let common = base.effects.len();
+        if model.effects.len() == common + 1 && model.effects.iter().zip(&base.effects).all(|(left, right)| left == right) {
+            return enlarged(model, known);
+        }
+        model.regressors(|_| true)
+    }
+
+    /// A model by itself.
+    fn base(&self, model: &Model, layout: Layout, grams: &[BlockGram]) -> Trial {
+        let nothing = Trial {
+            model: model.clone(),
+            layout: Layout::default(),
+            errors: std::array::from_fn(|_| vec![f64::NAN; self.blocks.len()]),
+            changed: [true; 6],
+            at_bound: false,
+            values: Vec::new(),
+        };
+        // Twice: channels that share coefficients are weighted by an error that is known only then.
+        let first = self.fit(model, &layout, &nothing, &[1.0; 6], grams);
+        let Some(first) = first else { return Trial { layout, ..nothing } };
+        let weights = self.weights(&first);
+        self.fit(model, &layout, &nothing, &weights, grams).unwrap_or(first)
+    }
+
+    /// Weight of each channel: the inverse of its mean squared error.
+    pub fn weights(&self, trial: &Trial) -> [f64; 6] {
+        self.mse(trial).map(|mse| 1.0 / mse.max(f64::MIN_POSITIVE))
+    }
+
+    fn trial(&self, model: &Model, layout: &Layout, base: &Trial, grams: &[BlockGram]) -> Option<Trial> {
+        self.fit(model, layout, base, &self.weights(base), grams)
+    }
+
+    /// Fits the channels in which a layout differs from that of `base`, and those that share coefficients with them.
+    fn fit(&self, model: &Model, layout: &Layout, base: &Trial, weights: &[f64; 6], grams: &[BlockGram]) -> Option<Trial> {
+        let named = |layout: &Layout, channel: usize| {
+            let columns = &layout.channels[channel];
+            let free: Vec<_> = columns.free.iter().map(|(free, columns)| (layout.free[*free], columns.clone())).collect();
+            (free, columns.fixed.clone())
+        };
+        let differs: [bool; 6] = std::array::from_fn(|channel| {
+            base.errors[channel].iter().any(|error| error.is_nan()) || named(layout, channel) != named(&base.layout, channel)
+        });
+        let mut trial = Trial {
+            model: model.clone(),
+            layout: layout.clone(),
+            errors: base.errors.clone(),
+            changed: [false; 6],
+            at_bound: false,
+            values: layout.free.iter().map(|free| value(model, *free)).collect(),
+        };
+        let priors = priors(model, layout);
+        for (channels, members) in components(layout) {
+            if !channels.iter().any(|&channel| differs[channel]) {
+                continue;
+            }
+            let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(layout, channel, grams)).collect();
+            let component = self.component(&channels, &members, &reduced, weights, &priors);
+            let solution = component.solve(&|_| 1.0)?;
+            for (channel, errors) in component.held_out(FOLDS, &|block| self.fold[block])? {
+                trial.errors[channel] = errors;
+                trial.changed[channel] = true;
+            }
+            self.store(&component, &solution, &mut trial);
+        }
+        Some(trial)
+    }
+
+    pub fn component<'b>(
+        &'b self,
+        channels: &[usize],
+        members: &[usize],
+        reduced: &'b [Reduced],
+        weights: &[f64; 6],
+        priors: &[Prior],
+    ) -> Component<'b> {
+        let single = channels.len() == 1;
+        Component {
+            channels: channels
+                .iter()
+                .zip(reduced)
+                .map(|(&channel, reduced)| (channel, if single { 1.0 } else { weights[channel] }, reduced))
+                .collect(),
+            members: members.to_vec(),
+            priors: members.iter().map(|&member| priors[member]).collect(),
+            blocks: &self.blocks,
+            correlation: self.correlation,
+        }
+    }
+
+    /// Writes what was found into the trial's model.
+    fn store(&self, component: &Component<'_>, solution: &Solution, trial: &mut Trial) {
+        let last = trial.model.effects.len().saturating_sub(1);
+        let locals: Vec<usize> =
+            (0..component.members.len()).filter(|&member| component.priors[member].by_flight.is_some()).collect();
+        for (position, &member) in component.members.iter().enumerate() {
+            let free = trial.layout.free[member];
+            let Some(coefficient) =
+                trial.model.effects.get_mut(free.effect).and_then(|effect| effect.coefficients.get_mut(free.coefficient))
+            else {
+                continue;
+            };
+            match locals.iter().position(|&local| local == position) {
+                None => coefficient.value = solution.values[position],
+                Some(local) => {
+                    let name = |flight: usize| self.flights.get(flight).map_or_else(String::new, |flight| flight.name.clone());
+                    let values: std::collections::BTreeMap<String, f64> =
+                        solution.by_flight.iter().map(|(flight, values)| (name(*flight), values[local])).collect();
+                    coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
+                    coefficient.by_flight = Some(values);
+                }
+            }
+            trial.values[member] = coefficient.value;
+            trial.at_bound |= free.effect == last && solution.bound[position];
+        }
+    }
+}
+
+fn value(model: &Model, free: super::design::Free) -> f64 {
+    let effect = model.effects.get(free.effect);
+    effect.and_then(|effect| effect.coefficients.get(free.coefficient)).map_or(0.0, |coefficient| coefficient.value)
+}

@@ -1,0 +1,350 @@
+//! Constrained least squares from Gram matrices, and the squared error of each block under coefficients that have not seen it.
+//!
+//! Channels that share a coefficient are fitted together, weighted by the inverse of their error; a channel by itself is
+//! unweighted, as in calibration. A coefficient outside its bounds is put on the bound and the others are fitted again. A property of
+//! each flight is shrunk towards zero by its usual spread (ridge), and eliminated flight by flight.
+
+use super::design::Layout;
+use super::gram::{Block, BlockGram};
+use nalgebra::{Cholesky, DMatrix, DVector};
+use ndarray::Array2;
+
+/// What is known about each coefficient of a layout.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Prior {
+    pub bounds: [f64; 2],
+    /// Spread from flight to flight, for a property of each flight.
+    pub by_flight: Option<f64>,
+}
+
+impl Prior {
+    pub const FREE: Self = Self { bounds: [f64::NEG_INFINITY, f64::INFINITY], by_flight: None };
+}
+
+/// The Gram matrices of one channel in terms of its coefficients: `[X | y − fixed]`, one square a block.
+#[derive(Clone, Debug)]
+pub(super) struct Reduced {
+    /// Index into [`Layout::free`] of each column but the last.
+    pub free: Vec<usize>,
+    pub blocks: Vec<DMatrix<f64>>,
+}
+
+impl Reduced {
+    pub fn new(layout: &Layout, channel: usize, grams: &[BlockGram]) -> Self {
+        let layout = &layout.channels[channel];
+        let size = layout.free.len() + 1;
+        let blocks = grams
+            .iter()
+            .map(|gram| {
+                let gram: &Array2<f64> = &gram.channels[channel];
+                let target = gram.nrows() - 1;
+                // The last column: measured minus the fixed terms.
+                let mut parts: Vec<Vec<(usize, f64)>> =
+                    layout.free.iter().map(|(_, columns)| columns.clone()).collect();
+                parts.push(std::iter::once((target, 1.0)).chain(layout.fixed.iter().map(|&column| (column, -1.0))).collect());
+                let entry = |row: usize, column: usize| {
+                    let mut sum = 0.0;
+                    for &(i, a) in &parts[row] {
+                        for &(j, b) in &parts[column] {
+                            sum += a * b * gram[(i, j)];
+                        }
+                    }
+                    sum
+                };
+                let mut matrix = DMatrix::zeros(size, size);
+                for row in 0..size {
+                    for column in 0..=row {
+                        let value = entry(row, column);
+                        matrix[(row, column)] = value;
+                        matrix[(column, row)] = value;
+                    }
+                }
+                matrix
+            })
+            .collect();
+        Self { free: layout.free.iter().map(|entry| entry.0).collect(), blocks }
+    }
+
+    fn sum(&self, wanted: impl Fn(usize) -> f64) -> DMatrix<f64> {
+        let size = self.free.len() + 1;
+        let mut sum = DMatrix::zeros(size, size);
+        for (index, block) in self.blocks.iter().enumerate() {
+            let weight = wanted(index);
+            if weight != 0.0 {
+                sum.zip_apply(block, |sum, value| *sum += weight * value);
+            }
+        }
+        sum
+    }
+
+    /// Squared error of a block under these values of the layout's coefficients.
+    pub fn error(&self, block: usize, values: &dyn Fn(usize) -> f64) -> f64 {
+        let matrix = &self.blocks[block];
+        let last = self.free.len();
+        let at = |index: usize| if index == last { 1.0 } else { -values(self.free[index]) };
+        let factors: Vec<f64> = (0..=last).map(at).collect();
+        let mut sum = 0.0;
+        for (column, b) in factors.iter().enumerate() {
+            let inner: f64 = factors.iter().enumerate().map(|(row, a)| a * matrix[(row, column)]).sum();
+            sum += b * inner;
+        }
+        sum.max(0.0)
+    }
+}
+
+/// Channels that are fitted together, with their coefficients.
+pub(super) fn components(layout: &Layout) -> Vec<(Vec<usize>, Vec<usize>)> {
+    let of_channel = |channel: usize| layout.channels[channel].free.iter().map(|entry| entry.0);
+    let mut group: Vec<usize> = (0..6).collect();
+    for left in 0..6 {
+        for right in left + 1..6 {
+            if of_channel(left).any(|free| of_channel(right).any(|other| other == free)) {
+                let (from, to) = (group[right], group[left]);
+                group.iter_mut().filter(|group| **group == from).for_each(|group| *group = to);
+            }
+        }
+    }
+    (0..6)
+        .filter(|root| group.contains(root))
+        .map(|root| {
+            let channels: Vec<usize> = (0..6).filter(|&channel| group[channel] == root).collect();
+            let mut members: Vec<usize> = channels.iter().flat_map(|&channel| of_channel(channel)).collect();
+            members.sort_unstable();
+            members.dedup();
+            (channels, members)
+        })
+        .collect()
+}
+
+/// Values of the coefficients of one component.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Solution {
+    /// By position in the component's members; those of a property of each flight are zero here.
+    pub values: Vec<f64>,
+    /// Whether a bound holds.
+    pub bound: Vec<bool>,
+    /// By flight: the values of the properties of each flight, by position among those.
+    pub by_flight: Vec<(usize, Vec<f64>)>,
+}
+
+/// One component ready to be fitted on any choice of blocks.
+pub(super) struct Component<'a> {
+    /// Channel, weight, reduced matrices.
+    pub channels: Vec<(usize, f64, &'a Reduced)>,
+    /// Indices into [`Layout::free`].
+    pub members: Vec<usize>,
+    pub priors: Vec<Prior>,
+    pub blocks: &'a [Block],
+    /// Samples over which residuals are correlated: a mean over n samples knows as much as n over this many independent ones.
+    pub correlation: f64,
+}
+
+impl Component<'_> {
+    fn place(&self, free: usize) -> usize {
+        self.members.binary_search(&free).unwrap_or_default()
+    }
+
+    fn is_local(&self, member: usize) -> bool {
+        self.priors[member].by_flight.is_some()
+    }
+
+    /// Adds `weight` times the sum of a channel's blocks to the normal equations `(matrix, right-hand side)`.
+    fn add(&self, sum: &DMatrix<f64>, reduced: &Reduced, weight: f64, matrix: &mut DMatrix<f64>, side: &mut DVector<f64>) {
+        let last = reduced.free.len();
+        let places: Vec<usize> = reduced.free.iter().map(|&free| self.place(free)).collect();
+        for (column, &to) in places.iter().enumerate() {
+            for (row, &from) in places.iter().enumerate() {
+                matrix[(from, to)] += weight * sum[(row, column)];
+            }
+            side[to] += weight * sum[(column, last)];
+        }
+    }
+
+    /// Least squares on the blocks with a weight. `None` if they do not determine the coefficients.
+    pub fn solve(&self, weight: &dyn Fn(usize) -> f64) -> Option<Solution> {
+        let size = self.members.len();
+        let (mut matrix, mut side) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        if !(0..size).any(|member| self.is_local(member)) {
+            for (_, channel_weight, reduced) in &self.channels {
+                self.add(&reduced.sum(weight), reduced, *channel_weight, &mut matrix, &mut side);
+            }
+            let (values, bound) = self.bounded(&matrix, &side)?;
+            return Some(Solution { values, bound, by_flight: Vec::new() });
+        }
+        let flights = self.flights();
+        let local: Vec<usize> = (0..size).filter(|&member| self.is_local(member)).collect();
+        let mut eliminated = Vec::with_capacity(flights.len());
+        for &flight in &flights {
+            let (own, own_side) = self.of_flight(flight, weight);
+            // Shrinks W_f: [A_ll + P] W = b_l − A_lg θ.
+            let (a_ll, a_lg, b_l) = self.split(&own, &own_side, &local);
+            let inverse = Cholesky::new(a_ll)?;
+            let (to_global, to_side) = (inverse.solve(&a_lg), inverse.solve(&b_l));
+            matrix += &own - a_lg.transpose() * &to_global;
+            side += &own_side - a_lg.transpose() * &to_side;
+            eliminated.push((flight, to_global, to_side));
+        }
+        // The rows of local coefficients in the global system are those of numbers fixed at zero.
+        for &member in &local {
+            matrix.row_mut(member).fill(0.0);
+            matrix.column_mut(member).fill(0.0);
+            matrix[(member, member)] = 1.0;
+            side[member] = 0.0;
+        }
+        let (values, bound) = self.bounded(&matrix, &side)?;
+        let global = DVector::from_column_slice(&values);
+        let by_flight = eliminated
+            .into_iter()
+            .map(|(flight, to_global, to_side)| (flight, (to_side - to_global * &global).iter().copied().collect()))
+            .collect();
+        Some(Solution { values, bound, by_flight })
+    }
+
+    fn flights(&self) -> Vec<usize> {
+        let mut flights: Vec<usize> = self.blocks.iter().map(|block| block.flight).collect();
+        flights.dedup();
+        flights
+    }
+
+    /// Normal equations of one flight.
+    fn of_flight(&self, flight: usize, weight: &dyn Fn(usize) -> f64) -> (DMatrix<f64>, DVector<f64>) {
+        let size = self.members.len();
+        let (mut matrix, mut side) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        let first = self.blocks.partition_point(|block| block.flight < flight);
+        for (index, _) in self.blocks.iter().enumerate().skip(first).take_while(|(_, block)| block.flight == flight) {
+            let factor = weight(index);
+            if factor != 0.0 {
+                for (_, channel_weight, reduced) in &self.channels {
+                    self.add(&reduced.blocks[index], reduced, channel_weight * factor, &mut matrix, &mut side);
+                }
+            }
+        }
+        (matrix, side)
+    }
+
+    /// `(A_ll + prior, A_lg with the local columns zero, b_l)`.
+    fn split(
+        &self,
+        matrix: &DMatrix<f64>,
+        side: &DVector<f64>,
+        local: &[usize],
+    ) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+        let mut a_ll = DMatrix::from_fn(local.len(), local.len(), |row, column| matrix[(local[row], local[column])]);
+        for (index, &member) in local.iter().enumerate() {
+            let spread = self.priors[member].by_flight.unwrap_or(1.0);
+            // Weights of the channels are inverse variances of one sample; the prior counts as one independent observation.
+            a_ll[(index, index)] += self.correlation / (spread * spread);
+        }
+        let mut a_lg = DMatrix::from_fn(local.len(), matrix.ncols(), |row, column| matrix[(local[row], column)]);
+        for &member in local {
+            a_lg.column_mut(member).fill(0.0);
+        }
+        (a_ll, a_lg, DVector::from_fn(local.len(), |row, _| side[local[row]]))
+    }
+
+    /// The properties of one flight given the other coefficients, from the blocks with a weight.
+    fn local(&self, flight: usize, weight: &dyn Fn(usize) -> f64, global: &[f64]) -> Option<Vec<f64>> {
+        let local: Vec<usize> = (0..self.members.len()).filter(|&member| self.is_local(member)).collect();
+        let (matrix, side) = self.of_flight(flight, weight);
+        let (a_ll, a_lg, b_l) = self.split(&matrix, &side, &local);
+        let values = Cholesky::new(a_ll)?.solve(&(b_l - a_lg * DVector::from_column_slice(global)));
+        Some(values.iter().copied().collect())
+    }
+
+    /// Solves `matrix θ = side` within the bounds: the worst offender is put on its bound until none is left.
+    fn bounded(&self, matrix: &DMatrix<f64>, side: &DVector<f64>) -> Option<(Vec<f64>, Vec<bool>)> {
+        let size = self.members.len();
+        let mut values = vec![0.0; size];
+        let mut bound = vec![false; size];
+        for _ in 0..=size {
+            let open: Vec<usize> = (0..size).filter(|&member| !bound[member]).collect();
+            if open.is_empty() {
+                break;
+            }
+            let pinned = |row: usize| -> f64 {
+                (0..size).filter(|&member| bound[member]).map(|member| matrix[(row, member)] * values[member]).sum()
+            };
+            let scale: Vec<f64> = open.iter().map(|&member| matrix[(member, member)].sqrt()).collect();
+            if scale.iter().any(|scale| !(scale.is_finite() && *scale > 0.0)) {
+                return None;
+            }
+            let scaled =
+                DMatrix::from_fn(open.len(), open.len(), |i, j| matrix[(open[i], open[j])] / (scale[i] * scale[j]));
+            // Correlations of more than about 1 − 1e-8 cannot be resolved by these flights.
+            let factor = Cholesky::new(scaled).filter(|factor| factor.l_dirty().diagonal().min() > SMALLEST_PIVOT)?;
+            let right = DVector::from_fn(open.len(), |i, _| (side[open[i]] - pinned(open[i])) / scale[i]);
+            let found = factor.solve(&right);
+            let mut worst: Option<(usize, f64, f64)> = None;
+            for (i, &member) in open.iter().enumerate() {
+                let value = found[i] / scale[i];
+                values[member] = value;
+                let [low, high] = self.priors[member].bounds;
+                let nearest = value.clamp(low, high);
+                let excess = (value - nearest).abs() * scale[i];
+                if excess > 0.0 && worst.is_none_or(|worst| excess > worst.1) {
+                    worst = Some((member, excess, nearest));
+                }
+            }
+            let Some((member, _, nearest)) = worst else { break };
+            (values[member], bound[member]) = (nearest, true);
+        }
+        Some((values, bound))
+    }
+
+    /// Squared errors of each channel's blocks, each under coefficients from the other folds. `fold` gives the fold of a block; a
+    /// property of a flight is found from the flight's blocks of other folds.
+    pub fn held_out(&self, folds: usize, fold: &dyn Fn(usize) -> usize) -> Option<Vec<(usize, Vec<f64>)>> {
+        let mut errors: Vec<(usize, Vec<f64>)> =
+            self.channels.iter().map(|(channel, ..)| (*channel, vec![0.0; self.blocks.len()])).collect();
+        for held in 0..folds {
+            let weight = |block: usize| if fold(block) == held { 0.0 } else { 1.0 };
+            let solution = self.solve(&weight)?;
+            for index in (0..self.blocks.len()).filter(|&index| fold(index) == held) {
+                self.block_errors(&solution, index, &mut errors);
+            }
+        }
+        Some(errors)
+    }
+
+    /// Squared errors of the blocks under coefficients found elsewhere; the properties of a flight are found from its blocks of other
+    /// folds.
+    pub fn errors_under(&self, solution: &Solution, folds: usize, fold: &dyn Fn(usize) -> usize) -> Option<Vec<(usize, Vec<f64>)>> {
+        let mut errors: Vec<(usize, Vec<f64>)> =
+            self.channels.iter().map(|(channel, ..)| (*channel, vec![0.0; self.blocks.len()])).collect();
+        let any_local = (0..self.members.len()).any(|member| self.is_local(member));
+        for held in 0..folds {
+            let weight = |block: usize| if fold(block) == held { 0.0 } else { 1.0 };
+            let mut solution = solution.clone();
+            if any_local {
+                solution.by_flight = self
+                    .flights()
+                    .into_iter()
+                    .map(|flight| Some((flight, self.local(flight, &weight, &solution.values)?)))
+                    .collect::<Option<_>>()?;
+            }
+            for index in (0..self.blocks.len()).filter(|&index| fold(index) == held) {
+                self.block_errors(&solution, index, &mut errors);
+            }
+        }
+        Some(errors)
+    }
+
+    fn block_errors(&self, solution: &Solution, index: usize, errors: &mut [(usize, Vec<f64>)]) {
+        let flight = self.blocks[index].flight;
+        let own = solution.by_flight.iter().find(|entry| entry.0 == flight).map(|entry| entry.1.as_slice());
+        let locals: Vec<usize> = (0..self.members.len()).filter(|&member| self.is_local(member)).collect();
+        let value = |free: usize| {
+            let member = self.place(free);
+            match locals.iter().position(|&local| local == member) {
+                Some(position) => own.and_then(|own| own.get(position)).copied().unwrap_or_default(),
+                None => solution.values[member],
+            }
+        };
+        for ((_, _, reduced), (_, errors)) in self.channels.iter().zip(errors) {
+            errors[index] = reduced.error(index, &value);
+        }
+    }
+}
+
+/// Smallest diagonal element of the Cholesky factor of a correlation matrix.
+const SMALLEST_PIVOT: f64 = 1e-4;

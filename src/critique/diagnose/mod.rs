@@ -1,0 +1,21 @@
+//! Which physical effect is missing, and how sure is that? A grouped, constrained forward search over the catalogue.
+//!
+//! Every effect is one candidate with its physical bounds. It is judged by the error on blocks of flight that its numbers have not
+//! seen, by a p-value from sign flips of blocks, and by whether it removes enough to be worth while; then once more on flights that the
+//! whole search has not seen. What is searched is in `candidate`, what is fitted in `fit`, what is chance in `significance`.
+//!
+//! Nothing here reads a file or draws a picture, and nothing knows of the built-in simulator.
+
+mod candidate;
+mod design;
+mod engine;
+mod fit;
+mod gram;
+mod report;
+mod search;
+mod significance;
+
+pub use report::{
+    CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
+};
+pub use search::{Options, Outcome, diagnose};

@@ -1,0 +1,230 @@
+//! How surely an effect is more than chance: sign flips of block scores.
+//!
+//! A block's score is the covariance of the effect's regressors, made orthogonal to the model's, with what the model leaves over in
+//! the block. Were the effect absent, each block's score would be as likely with the other sign, whatever the noise is like inside
+//! the block; so the share of random sign choices that reach the observed statistic is a p-value that needs neither whiteness nor
+//! normality (Hemerik, Goeman & Finos 2020, J. Royal Statistical Society B 82:841). The statistic is studentised, S = sᵀ V⁻¹ s with
+//! s the sum and V the sum of squares of the block scores, and the largest over the effect's grid, under the same signs.
+//!
+//! A swap has no coefficient; its regressor is the change it makes to the prediction, and its test is one-sided. Blocks are weighted by the
+//! inverse of their error, or a few aerobatic ones would decide everything.
+
+use super::design::Layout;
+use super::engine::Trial;
+use super::fit::Reduced;
+use super::gram::BlockGram;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use ndarray::Array2;
+use phyture_kernels::random::Stream;
+
+/// Where in a run the signs are drawn; other draws have other sites.
+const SITE: u64 = 0x7369_676e;
+
+/// Random sign choices.
+pub(super) const FLIPS: usize = 10_000;
+
+/// Whitened block scores of one variant: `Σ z_b` is standard normal in each column if the effect is absent.
+#[derive(Clone, Debug)]
+pub(super) struct Scores {
+    /// Blocks by columns.
+    pub blocks: DMatrix<f64>,
+    /// Only a positive sum speaks for the effect.
+    pub one_sided: bool,
+}
+
+/// Block scores of a variant's own coefficients, and how much its regressors move.
+pub(super) struct Raw {
+    /// Blocks by coefficients: `x̃ᵀ e`.
+    pub scores: DMatrix<f64>,
+    /// Blocks by coefficients: `x̃ᵀ x̃`.
+    pub energy: DMatrix<f64>,
+    /// As of [`Scores::one_sided`].
+    pub one_sided: bool,
+}
+
+/// Scores of a variant against the model it would enlarge. `None` where its regressors are those of the model.
+pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weights: &[Vec<f64>; 6]) -> Option<Raw> {
+    let effect = trial.model.effects.last()?;
+    let one_sided = effect.coefficients.is_empty();
+    let layout = if effect.swaps.is_empty() { trial.layout.clone() } else { difference(base, trial) };
+    let known = base.layout.free.len();
+    let channels: Vec<usize> =
+        (0..6).filter(|&channel| layout.channels[channel].free.iter().any(|entry| entry.0 >= known)).collect();
+    let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, grams)).collect();
+    // The model's own coefficients that act in these channels, then the effect's.
+    let mut members: Vec<usize> = reduced.iter().flat_map(|reduced| reduced.free.iter().copied()).collect();
+    members.sort_unstable();
+    members.dedup();
+    let split = members.partition_point(|&member| member < known);
+    let (size, new) = (members.len(), members.len() - split);
+    let place = |free: usize| members.binary_search(&free).unwrap_or_default();
+    let each = |block: usize, visit: &mut dyn FnMut(f64, &[usize], &DMatrix<f64>)| {
+        for (&channel, reduced) in channels.iter().zip(&reduced) {
+            let places: Vec<usize> = reduced.free.iter().map(|&free| place(free)).collect();
+            visit(weights[channel][block], &places, &reduced.blocks[block]);
+        }
+    };
+    // One square a block: `[X | y]ᵀ W [X | y]` over the channels.
+    let blocks: Vec<DMatrix<f64>> = (0..grams.len())
+        .map(|block| {
+            let mut square = DMatrix::zeros(size + 1, size + 1);
+            each(block, &mut |weight, places, gram| {
+                let to = |index: usize| places.get(index).copied().unwrap_or(size);
+                for column in 0..=places.len() {
+                    for row in 0..=places.len() {
+                        square[(to(row), to(column))] += weight * gram[(row, column)];
+                    }
+                }
+            });
+            square
+        })
+        .collect();
+    let mut total = DMatrix::zeros(size + 1, size + 1);
+    blocks.iter().for_each(|block| total += block);
+    let scale = DVector::from_fn(size, |index, _| 1.0 / total[(index, index)].sqrt());
+    if scale.iter().any(|scale| !scale.is_finite()) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(size, size, |row, column| total[(row, column)] * scale[row] * scale[column]);
+    let own = Cholesky::new(scaled.view((0, 0), (split, split)).into_owned())?;
+    let null = own.solve(&DVector::from_fn(split, |row, _| total[(row, size)] * scale[row]));
+    let onto = own.solve(&scaled.view((0, split), (split, new)).into_owned());
+    // Each of the effect's regressors as it is after the model's have been taken out, and the residual, in terms of the columns.
+    let mut tilde = DMatrix::zeros(size + 1, new);
+    let mut residual = DVector::zeros(size + 1);
+    residual[size] = 1.0;
+    for row in 0..split {
+        residual[row] = -null[row] * scale[row];
+        for column in 0..new {
+            tilde[(row, column)] = -onto[(row, column)] * scale[row] / scale[split + column];
+        }
+    }
+    for column in 0..new {
+        tilde[(split + column, column)] = 1.0;
+    }
+    let (mut scores, mut energy) = (DMatrix::zeros(grams.len(), new), DMatrix::zeros(grams.len(), new));
+    for (index, block) in blocks.iter().enumerate() {
+        let half = block * &tilde;
+        for column in 0..new {
+            scores[(index, column)] = half.column(column).dot(&residual);
+            energy[(index, column)] = half.column(column).dot(&tilde.column(column)).max(0.0);
+        }
+    }
+    // What the model's columns already say is not the effect's.
+    let independent = (0..new).all(|column| energy.column(column).sum() > SMALLEST_REMAINDER * total[(split + column, split + column)]);
+    independent.then_some(Raw { scores, energy, one_sided })
+}
+
+/// Share of a regressor that must remain once the model's regressors are taken out; less is rounding or collinearity.
+const SMALLEST_REMAINDER: f64 = 1e-6;
+
+impl Raw {
+    /// Studentised.
+    pub fn whitened(&self) -> Option<Scores> {
+        let variance = self.scores.transpose() * &self.scores;
+        let size = variance.nrows();
+        let scale = DVector::from_fn(size, |index, _| 1.0 / variance[(index, index)].sqrt());
+        if scale.iter().any(|scale| !scale.is_finite()) {
+            return None;
+        }
+        let correlation = DMatrix::from_fn(size, size, |row, column| variance[(row, column)] * scale[row] * scale[column]);
+        let scaled = DMatrix::from_fn(size, self.scores.nrows(), |row, column| self.scores[(column, row)] * scale[row]);
+        let whitened = Cholesky::new(correlation)?.l().solve_lower_triangular(&scaled)?;
+        Some(Scores { blocks: whitened.transpose(), one_sided: self.one_sided })
+    }
+}
+
+/// The layout of `base` and one coefficient more, that of the change a swap makes to the prediction.
+fn difference(base: &Trial, trial: &Trial) -> Layout {
+    let mut layout = base.layout.clone();
+    let new = layout.free.len();
+    layout.free.push(super::design::Free { effect: trial.model.effects.len() - 1, coefficient: 0 });
+    for channel in (0..6).filter(|&channel| trial.changed[channel]) {
+        let mut columns: Vec<(usize, f64)> = Vec::new();
+        let mut add = |column: usize, weight: f64| match columns.iter_mut().find(|known| known.0 == column) {
+            Some(known) => known.1 += weight,
+            None => columns.push((column, weight)),
+        };
+        for (layout, sign) in [(&trial.layout, 1.0), (&base.layout, -1.0)] {
+            for (free, weighted) in &layout.channels[channel].free {
+                let value = trial.values.get(*free).copied().unwrap_or_default();
+                weighted.iter().for_each(|&(column, weight)| add(column, sign * weight * value));
+            }
+            layout.channels[channel].fixed.iter().for_each(|&column| add(column, sign));
+        }
+        columns.retain(|column| column.1 != 0.0);
+        if !columns.is_empty() {
+            layout.channels[channel].free.push((new, columns));
+        }
+    }
+    layout
+}
+
+/// Weights of blocks: 2/(1 + e/m) of the channel's inverse error, with e the block's mean squared error and m the channel's.
+pub(super) fn block_weights(base: &Trial, rows: &[usize]) -> [Vec<f64>; 6] {
+    let total: usize = rows.iter().sum();
+    std::array::from_fn(|channel| {
+        let mse = base.errors[channel].iter().sum::<f64>() / total.max(1) as f64;
+        let weight = |(error, rows): (&f64, &usize)| 2.0 / (1.0 + error / *rows as f64 / mse) / mse;
+        base.errors[channel].iter().zip(rows).map(weight).collect()
+    })
+}
+
+/// Random signs, the same for every candidate of a step.
+pub(super) struct Flips {
+    /// Choices by blocks.
+    signs: Array2<f32>,
+}
+
+impl Flips {
+    pub fn new(blocks: usize, seed: u64) -> Self {
+        let stream = Stream::new(seed, 0, SITE, 0);
+        let mut signs = Array2::zeros((FLIPS, blocks));
+        for (index, mut row) in signs.rows_mut().into_iter().enumerate() {
+            let words = stream.sub(index as u64);
+            for (block, sign) in row.iter_mut().enumerate() {
+                *sign = if words.word((block / 32) as u32) >> (block % 32) & 1 == 0 { 1.0 } else { -1.0 };
+            }
+        }
+        Self { signs }
+    }
+
+    /// p-value of the largest statistic over the variants of one effect.
+    pub fn p_value(&self, variants: &[Scores]) -> f64 {
+        let mut observed = f64::NEG_INFINITY;
+        let mut largest = vec![f32::NEG_INFINITY; FLIPS];
+        for scores in variants {
+            let (blocks, columns) = scores.blocks.shape();
+            let z = Array2::from_shape_fn((blocks, columns), |(row, column)| scores.blocks[(row, column)] as f32);
+            let statistic = |sums: &dyn Fn(usize) -> f64| {
+                if scores.one_sided { sums(0) } else { (0..columns).map(|column| sums(column).powi(2)).sum() }
+            };
+            observed = observed.max(statistic(&|column| scores.blocks.column(column).sum()));
+            let flipped = self.signs.dot(&z);
+            for (largest, sums) in largest.iter_mut().zip(flipped.rows()) {
+                *largest = largest.max(statistic(&|column| f64::from(sums[column])) as f32);
+            }
+        }
+        self.share(observed, &largest)
+    }
+
+    /// p-value of a sum of independent gains, one for each row of the signs that is used.
+    pub fn p_value_of_sums(&self, variants: &[Vec<f64>]) -> f64 {
+        let mut observed = f64::NEG_INFINITY;
+        let mut largest = vec![f32::NEG_INFINITY; FLIPS];
+        for gains in variants {
+            observed = observed.max(gains.iter().sum());
+            for (largest, signs) in largest.iter_mut().zip(self.signs.rows()) {
+                *largest = largest.max(signs.iter().zip(gains).map(|(sign, gain)| sign * *gain as f32).sum());
+            }
+        }
+        self.share(observed, &largest)
+    }
+
+    fn share(&self, observed: f64, flipped: &[f32]) -> f64 {
+        // The slack of single precision counts against the effect.
+        let bar = (observed - 1e-5 * observed.abs()) as f32;
+        let reached = flipped.iter().filter(|value| **value >= bar).count();
+        (reached + 1) as f64 / (FLIPS + 1) as f64
+    }
+}
