@@ -16,7 +16,12 @@ fn main() {
     let verbose = arguments.get(4).is_some();
     for name in names {
         for &scale in &scales {
-            let mut simulation = Simulation { seed, mechanisms: Mechanisms::none(), level: if level == "1" { Level::ONE } else { Level::TWO }, ..Simulation::default() };
+            let mut simulation = Simulation {
+                seed,
+                mechanisms: Mechanisms::none(),
+                level: if level == "1" { Level::ONE } else { Level::TWO },
+                ..Simulation::default()
+            };
             for part in name.split('+').filter(|p| *p != "null") {
                 simulation = simulation.hide(part, scale).unwrap();
             }
@@ -27,17 +32,48 @@ fn main() {
                 let span = Span { flight, start: 0, end: log.len() };
                 if flight % 5 == 2 { locked.push(span) } else { searched.push(span) }
             }
-            let outcome = diagnose(&set.flights, &model, &searched, &locked, "locked", &Options { seed, ..Options::default() }).unwrap();
+            let outcome =
+                diagnose(&set.flights, &model, &searched, &locked, "locked", &Options { seed, ..Options::default() }).unwrap();
             let d = outcome.diagnosis;
-            let steps: Vec<String> = d.steps.iter().map(|s| {
-                let fall = s.held_out_mse_fall.values().copied().fold(0.0, f64::max);
-                let parameters: Vec<String> = s.parameters.iter().filter(|p| !p.fixed).map(|p| format!("{}={:.3}", p.name, p.value)).collect();
-                format!("{} {:.1}% p{:.4} f{:.2} {}{}", s.effect, 100.0*fall, s.p_value, s.selection_frequency, parameters.join(","), if s.indistinguishable.is_empty() { String::new() } else { format!(" ~{}", s.indistinguishable.join("/")) })
-            }).collect();
+            let steps: Vec<String> = d
+                .steps
+                .iter()
+                .map(|s| {
+                    let fall = s.held_out_mse_fall.values().copied().fold(0.0, f64::max);
+                    let parameters: Vec<String> =
+                        s.parameters.iter().filter(|p| !p.fixed).map(|p| format!("{}={:.3}", p.name, p.value)).collect();
+                    format!(
+                        "{} {:.1}% p{:.4} f{:.2} {}{}",
+                        s.effect,
+                        100.0 * fall,
+                        s.p_value,
+                        s.selection_frequency,
+                        parameters.join(","),
+                        if s.indistinguishable.is_empty() { String::new() } else { format!(" ~{}", s.indistinguishable.join("/")) }
+                    )
+                })
+                .collect();
             let locked_fall = d.locked.as_ref().map_or(0.0, |l| l.mse_fall.values().map(|v| v[0]).fold(0.0, f64::max));
-            let hit = if name == "null" { if steps.is_empty() { "ok  " } else { "FALSE" } } else if d.accepted.first() == Some(&name) { "HIT " } else if d.accepted.is_empty() { "miss" } else { "WRONG" };
-            println!("{hit} L{level} {name} x{scale} seed {seed}: {} | locked {:.1}% | {:.1}s", steps.join("; "), 100.0*locked_fall, d.seconds);
-            if verbose { println!("{d}"); } else if let Some(own) = d.candidates.iter().find(|c| c.effect == name && steps.is_empty()) { println!("      own: {own:?}"); }
+            let hit = if name == "null" {
+                if steps.is_empty() { "ok  " } else { "FALSE" }
+            } else if d.accepted.first() == Some(&name) {
+                "HIT "
+            } else if d.accepted.is_empty() {
+                "miss"
+            } else {
+                "WRONG"
+            };
+            println!(
+                "{hit} L{level} {name} x{scale} seed {seed}: {} | locked {:.1}% | {:.1}s",
+                steps.join("; "),
+                100.0 * locked_fall,
+                d.seconds
+            );
+            if verbose {
+                println!("{d}");
+            } else if let Some(own) = d.candidates.iter().find(|c| c.effect == name && steps.is_empty()) {
+                println!("      own: {own:?}");
+            }
         }
     }
 }

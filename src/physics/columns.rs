@@ -31,7 +31,8 @@ impl Model {
         for (index, effect) in self.effects.iter().enumerate().filter(|(index, effect)| effect.enabled && wanted(*index)) {
             for term in &effect.terms {
                 let regressor = self.effective_regressor(effect, &term.regressor)?;
-                let number = |name: &str| self.constant(effect, name).and_then(|value| Formula::parse(&format!("({value:?})")).ok());
+                let number =
+                    |name: &str| self.constant(effect, name).and_then(|value| Formula::parse(&format!("({value:?})")).ok());
                 let formula = regressor.substitute(&number).map_err(|error| effect.name_error(error))?;
                 let coefficient =
                     term.coefficient.as_ref().and_then(|name| effect.coefficients.iter().position(|c| c.name == *name));

@@ -25,11 +25,6 @@ impl Candidate {
         self.effect.coefficients.len() + self.effect.parameters.iter().filter(|parameter| !parameter.fixed).count()
     }
 
-    /// Whether it changes signals and has no coefficient.
-    pub fn is_swap(&self) -> bool {
-        self.effect.coefficients.is_empty()
-    }
-
     /// Whether its coefficients are properties of each flight.
     pub fn is_by_flight(&self) -> bool {
         self.effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some())
@@ -84,7 +79,9 @@ fn grid(definition: &Definition, effect: &Effect) -> Vec<Effect> {
 }
 
 fn inapplicable(model: &Model, effect: &Effect, flights: &[Flight]) -> Option<String> {
-    if let Some(within) = effect.swaps.iter().flat_map(|swap| &swap.within).find(|name| model.effect(name).is_none_or(|e| !e.enabled)) {
+    if let Some(within) =
+        effect.swaps.iter().flat_map(|swap| &swap.within).find(|name| model.effect(name).is_none_or(|e| !e.enabled))
+    {
         return Some(format!("the model has no effect `{within}`, which it would change"));
     }
     let mut enlarged = model.clone();
@@ -94,9 +91,9 @@ fn inapplicable(model: &Model, effect: &Effect, flights: &[Flight]) -> Option<St
         Ok(regressors) => regressors,
         Err(error) => return Some(error.to_string()),
     };
-    let missing = regressors.iter().find_map(|regressor| {
-        flights.iter().find_map(|flight| missing_input(&regressor.formula, flight).map(str::to_owned))
-    });
+    let missing = regressors
+        .iter()
+        .find_map(|regressor| flights.iter().find_map(|flight| missing_input(&regressor.formula, flight).map(str::to_owned)));
     missing.map(|name| format!("the flights or the model do not carry `{name}`"))
 }
 

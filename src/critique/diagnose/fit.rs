@@ -39,8 +39,7 @@ impl Reduced {
                 let gram: &Array2<f64> = &gram.channels[channel];
                 let target = gram.nrows() - 1;
                 // The last column: measured minus the fixed terms.
-                let mut parts: Vec<Vec<(usize, f64)>> =
-                    layout.free.iter().map(|(_, columns)| columns.clone()).collect();
+                let mut parts: Vec<Vec<(usize, f64)>> = layout.free.iter().map(|(_, columns)| columns.clone()).collect();
                 parts.push(std::iter::once((target, 1.0)).chain(layout.fixed.iter().map(|&column| (column, -1.0))).collect());
                 let entry = |row: usize, column: usize| {
                     let mut sum = 0.0;
@@ -223,12 +222,7 @@ impl Component<'_> {
     }
 
     /// `(A_ll + prior, A_lg with the local columns zero, b_l)`.
-    fn split(
-        &self,
-        matrix: &DMatrix<f64>,
-        side: &DVector<f64>,
-        local: &[usize],
-    ) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
+    fn split(&self, matrix: &DMatrix<f64>, side: &DVector<f64>, local: &[usize]) -> (DMatrix<f64>, DMatrix<f64>, DVector<f64>) {
         let mut a_ll = DMatrix::from_fn(local.len(), local.len(), |row, column| matrix[(local[row], local[column])]);
         for (index, &member) in local.iter().enumerate() {
             let spread = self.priors[member].by_flight.unwrap_or(1.0);
@@ -268,8 +262,7 @@ impl Component<'_> {
             if scale.iter().any(|scale| !(scale.is_finite() && *scale > 0.0)) {
                 return None;
             }
-            let scaled =
-                DMatrix::from_fn(open.len(), open.len(), |i, j| matrix[(open[i], open[j])] / (scale[i] * scale[j]));
+            let scaled = DMatrix::from_fn(open.len(), open.len(), |i, j| matrix[(open[i], open[j])] / (scale[i] * scale[j]));
             // Correlations of more than about 1 − 1e-8 cannot be resolved by these flights.
             let factor = Cholesky::new(scaled).filter(|factor| factor.l_dirty().diagonal().min() > SMALLEST_PIVOT)?;
             let right = DVector::from_fn(open.len(), |i, _| (side[open[i]] - pinned(open[i])) / scale[i]);

@@ -12,6 +12,7 @@ mod engine;
 mod fit;
 mod gram;
 mod report;
+mod resample;
 mod search;
 mod significance;
 

@@ -264,7 +264,9 @@ impl fmt::Display for Diagnosis {
                 writeln!(f, "   {} = {:.4}{ci} {}{usual}{spread}", number.name, number.value, number.unit)?;
             }
             for parameter in &step.parameters {
-                let how = if parameter.fixed { "known".into() } else {
+                let how = if parameter.fixed {
+                    "known".into()
+                } else {
                     parameter.profile.map_or("fitted".into(), |[low, high]| format!("fitted, {low:.4} to {high:.4}"))
                 };
                 writeln!(f, "   {} = {:.4} {} ({how})", parameter.name, parameter.value, parameter.unit)?;
@@ -294,11 +296,24 @@ impl fmt::Display for Diagnosis {
         if let Some(locked) = &self.locked {
             writeln!(f, "\nOn {:.0} s that no search has seen ({}):", locked.duration_s, locked.part)?;
             let row = |values: &PerChannel| {
-                values.channels().iter().map(|value| value.map_or_else(|| format!("{:>9}", "-"), |value| format!("{value:>9.4}"))).collect::<String>()
+                values
+                    .channels()
+                    .iter()
+                    .map(|value| value.map_or_else(|| format!("{:>9}", "-"), |value| format!("{value:>9.4}")))
+                    .collect::<String>()
             };
-            writeln!(f, "   {:<28}{}", "RMSE", crate::flight::Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat())?;
+            writeln!(
+                f,
+                "   {:<28}{}",
+                "RMSE",
+                crate::flight::Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat()
+            )?;
             for (step, values) in locked.waterfall.iter().enumerate() {
-                let name = if step == 0 { "model".into() } else { self.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}")) };
+                let name = if step == 0 {
+                    "model".into()
+                } else {
+                    self.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}"))
+                };
                 writeln!(f, "   {name:<28}{}", row(values))?;
             }
             for (channel, [fall, low, high]) in &locked.mse_fall {

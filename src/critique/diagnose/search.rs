@@ -5,12 +5,13 @@ use super::engine::{Engine, FOLDS, Pass, Trial, priors};
 use super::fit::{Reduced, components};
 use super::gram::{blocks, grams};
 use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, Verdict};
+use super::resample::{RESAMPLES, draw, intervals, quantile};
 use super::significance::{Flips, Raw, block_weights, raw_scores};
 use crate::critique::compare::PerChannel;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};
-use crate::physics::{Effect, Model};
-use phyture_kernels::random::{Stream, permutation};
+use crate::physics::Model;
+use phyture_kernels::random::permutation;
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -40,8 +41,9 @@ const CARRIED_SHARE: f64 = 0.8;
 const DETECTION: f64 = 4.0;
 /// One effect shadows another if that one's gain beside it is less than this share of its gain alone.
 const SHADOW: f64 = 0.2;
-/// Blocks resampled so many times for intervals and selection frequency.
-const RESAMPLES: usize = 500;
+/// What an effect removes beside one that it is mistaken for has to be this share of what that one removed: less is a flaw in the
+/// form of the first, in other words.
+const SMALLEST_SHARE_OF_RIVAL: f64 = 0.1;
 
 /// How a search is done.
 #[derive(Clone, Debug)]
@@ -82,6 +84,8 @@ struct Scored<'a> {
     excited: bool,
     plausible: bool,
     carrying: usize,
+    /// An accepted effect whose flaw it describes.
+    rival: Option<String>,
 }
 
 impl Scored<'_> {
@@ -90,7 +94,12 @@ impl Scored<'_> {
     }
 
     fn passes(&self, largest_p: f64) -> bool {
-        self.excited && self.plausible && self.gain > 0.0 && self.p_value <= largest_p && self.largest_fall() >= SMALLEST_FALL
+        self.rival.is_none()
+            && self.excited
+            && self.plausible
+            && self.gain > 0.0
+            && self.p_value <= largest_p
+            && self.largest_fall() >= SMALLEST_FALL
     }
 
     fn status(&self, largest_p: f64) -> Status {
@@ -98,6 +107,7 @@ impl Scored<'_> {
             () if !self.excited => Status::NotExcited,
             () if self.p_value > largest_p || self.gain <= 0.0 => Status::NotSignificant,
             () if !self.plausible => Status::Implausible,
+            () if self.rival.is_some() && self.largest_fall() >= SMALLEST_FALL => Status::SamePhysics,
             () => Status::Negligible,
         }
     }
@@ -180,14 +190,17 @@ pub fn diagnose(
     diagnosis.steps = found.into_iter().map(|found| found.step).collect();
     diagnosis.candidates = left;
     for step in &diagnosis.steps {
-        diagnosis.candidates.insert(0, CandidateReport {
-            effect: step.effect.clone(),
-            status: Status::Accepted,
-            held_out_mse_fall: step.held_out_mse_fall.clone(),
-            p_value: Some(step.p_value),
-            detection_limit_mse_fall: None,
-            note: None,
-        });
+        diagnosis.candidates.insert(
+            0,
+            CandidateReport {
+                effect: step.effect.clone(),
+                status: Status::Accepted,
+                held_out_mse_fall: step.held_out_mse_fall.clone(),
+                p_value: Some(step.p_value),
+                detection_limit_mse_fall: None,
+                note: None,
+            },
+        );
     }
     diagnosis.locked = confirm(flights, &models, locked, part, block_s, search.engine.correlation)?;
     diagnosis.verdict = if diagnosis.accepted.is_empty() { Verdict::Explained } else { Verdict::EffectsMissing };
@@ -199,7 +212,52 @@ pub fn diagnose(
 /// One accepted effect and the model that has it.
 struct Found {
     step: Step,
+    gain: f64,
     model: Model,
+    /// Effects that it is mistaken for.
+    confusable: &'static [&'static str],
+    /// Mean squared errors before it was accepted, and what it took from them.
+    mse_before: [f64; 6],
+    removed: [f64; 6],
+}
+
+impl Found {
+    /// Effects that lose nearly all of their gain beside this one, while this one would lose nearly all of its beside them, cannot be
+    /// told from it. `scored` are gains beside it, `earlier` those of the effects that passed when it was chosen.
+    fn shadows(&mut self, scored: &[Scored<'_>], earlier: &BTreeMap<String, f64>) {
+        for other in scored {
+            let Some(&alone) = earlier.get(&other.candidate.id) else { continue };
+            let beside = self.gain + other.gain - alone;
+            let mutual = other.gain < SHADOW * alone && beside < SHADOW * self.gain;
+            if mutual && !self.step.indistinguishable.contains(&other.candidate.id) {
+                self.step.indistinguishable.push(other.candidate.id.clone());
+            }
+        }
+    }
+
+    /// Whether a candidate is mistaken for this effect and removes little beside what this one did, in every channel in which it is
+    /// worth while.
+    fn is_flawed_by(&self, other: &Scored<'_>, mse: &[f64; 6]) -> bool {
+        let related = self.confusable.contains(&other.candidate.id.as_str())
+            || other
+                .candidate
+                .definition
+                .and_then(|definition| definition.notes)
+                .is_some_and(|notes| notes.confusable_with.contains(&self.step.effect.as_str()));
+        let mut worthy = other.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).peekable();
+        related
+            && worthy.peek().is_some()
+            && worthy.all(|(&channel, fall)| fall * mse[channel] < SMALLEST_SHARE_OF_RIVAL * self.removed[channel])
+    }
+}
+
+/// A selection frequency in a word.
+fn stability(frequency: f64) -> &'static str {
+    match frequency {
+        frequency if frequency >= 0.9 => "stable",
+        frequency if frequency >= 0.6 => "likely",
+        _ => "tentative",
+    }
 }
 
 struct Search<'a> {
@@ -213,42 +271,37 @@ impl Search<'_> {
     fn forward(&self, before: &Model, candidates: &[Candidate]) -> Result<(Vec<Found>, Vec<CandidateReport>)> {
         let mut model = before.clone();
         let mut found: Vec<Found> = Vec::new();
-        // Of every candidate at the last step before something was accepted.
+        // Gains of all that passed at the last step.
         let mut earlier: BTreeMap<String, f64> = BTreeMap::new();
-        let mut winner: Option<(String, f64, Vec<String>)> = None;
         loop {
-            let open: Vec<&Candidate> =
-                candidates.iter().filter(|c| model.effect(&c.id).is_none()).collect();
-            let (base, scored) = self.score(&model, &open)?;
-            // Now it shows what the last winner took from the others.
-            if let (Some((name, gain, tied)), Some(last)) = (&winner, found.last_mut()) {
-                for other in &scored {
-                    let alone = earlier.get(&other.candidate.id).copied().unwrap_or_default();
-                    let beside = gain + other.gain - alone;
-                    let mutual = other.gain < SHADOW * alone && beside < SHADOW * gain && alone > 0.0;
-                    if mutual && tied.contains(&other.candidate.id) && !last.step.indistinguishable.contains(&other.candidate.id) {
-                        last.step.indistinguishable.push(other.candidate.id.clone());
-                    }
-                }
-                debug_assert_eq!(*name, last.step.effect);
+            let open: Vec<&Candidate> = candidates.iter().filter(|candidate| model.effect(&candidate.id).is_none()).collect();
+            let (base, mut scored) = self.score(&model, &open)?;
+            let mse = self.engine.mse(&base);
+            if let Some(last) = found.last_mut() {
+                last.shadows(&scored, &earlier);
+                last.removed = std::array::from_fn(|channel| last.mse_before[channel] - mse[channel]);
+            }
+            for scored in &mut scored {
+                scored.rival = found.iter().find(|found| found.is_flawed_by(scored, &mse)).map(|found| found.step.effect.clone());
             }
             let passing: Vec<&Scored<'_>> = scored.iter().filter(|scored| scored.passes(self.largest_p)).collect();
             let best = passing.iter().max_by(|left, right| left.gain.total_cmp(&right.gain));
             let Some(best) = best.filter(|_| found.len() < self.options.max_effects) else {
-                return Ok((found, self.reports(&open, &scored)));
+                let reports = self.reports(&open, &scored);
+                self.backward(&mut found, before)?;
+                self.intervals(&mut found)?;
+                return Ok((found, reports));
             };
             // The simplest of those that are as good to within one standard error.
-            let chosen = passing
-                .iter()
-                .filter(|other| {
-                    let (difference, error) = paired(&best.gains, &other.gains);
-                    difference <= error
-                })
-                .min_by(|left, right| {
-                    let freedom = left.candidate.freedom().cmp(&right.candidate.freedom());
-                    freedom.then(right.gain.total_cmp(&left.gain))
-                })
-                .unwrap_or(best);
+            let as_good = |other: &&&Scored<'_>| {
+                let (difference, error) = paired(&best.gains, &other.gains);
+                difference <= error
+            };
+            let simpler = |left: &&&Scored<'_>, right: &&&Scored<'_>| {
+                let freedom = left.candidate.freedom().cmp(&right.candidate.freedom());
+                freedom.then(right.gain.total_cmp(&left.gain))
+            };
+            let chosen = passing.iter().filter(as_good).min_by(simpler).unwrap_or(best);
             let mut tied: Vec<(&str, f64)> = passing
                 .iter()
                 .filter(|other| other.candidate.id != chosen.candidate.id)
@@ -259,19 +312,89 @@ impl Search<'_> {
                 .map(|other| (other.candidate.id.as_str(), other.gain))
                 .collect();
             tied.sort_by(|left, right| right.1.total_cmp(&left.1));
-            let refined = self.refine(&base, chosen)?;
-            let selection = self.selection_frequency(chosen, &passing);
-            let step = self.step(chosen, &refined, selection, tied.iter().map(|entry| entry.0.to_owned()).collect());
-            earlier = scored.iter().map(|scored| (scored.candidate.id.clone(), scored.gain)).collect();
-            winner = Some((
-                chosen.candidate.id.clone(),
-                chosen.gain,
-                passing.iter().map(|other| other.candidate.id.clone()).collect(),
-            ));
-            model = refined.model.clone();
-            found.push(Found { step, model: model.clone() });
-            let _ = &base;
+            let (refined, profiles) = self.refine(&base, chosen)?;
+            let mut step = self.step(chosen, &refined, tied.iter().map(|entry| entry.0.to_owned()).collect());
+            step.selection_frequency = self.selection_frequency(chosen, &passing);
+            step.stability = stability(step.selection_frequency).into();
+            for parameter in &mut step.parameters {
+                parameter.profile = profiles.get(&parameter.name).copied();
+            }
+            earlier = passing.iter().map(|scored| (scored.candidate.id.clone(), scored.gain)).collect();
+            let confusable =
+                chosen.candidate.definition.and_then(|definition| definition.notes).map_or(&[][..], |notes| notes.confusable_with);
+            found.push(Found {
+                step,
+                gain: chosen.gain,
+                model: refined.model.clone(),
+                confusable,
+                mse_before: mse,
+                removed: [0.0; 6],
+            });
+            model = refined.model;
         }
+    }
+
+    /// Drops accepted effects that the later ones have made needless, and refits.
+    fn backward(&self, found: &mut Vec<Found>, before: &Model) -> Result<()> {
+        while found.len() > 1 {
+            let Some(last) = found.last() else { return Ok(()) };
+            let without: Vec<Model> = found
+                .iter()
+                .map(|found| {
+                    let mut model = last.model.clone();
+                    model.effects.retain(|effect| effect.name != found.step.effect);
+                    model
+                })
+                .collect();
+            let pass = self.engine.pass(&last.model, &without)?;
+            let whole = self.engine.mse(&pass.base);
+            let cost = |trial: &Option<Trial>| {
+                let Some(trial) = trial else { return f64::INFINITY };
+                let mse = self.engine.mse(trial);
+                (0..6).map(|channel| 1.0 - whole[channel] / mse[channel]).fold(f64::NEG_INFINITY, f64::max)
+            };
+            let costs: Vec<f64> = pass.trials.iter().map(cost).collect();
+            let Some(needless) = (0..costs.len()).min_by(|&left, &right| costs[left].total_cmp(&costs[right])) else {
+                return Ok(());
+            };
+            if costs[needless] >= SMALLEST_FALL {
+                return Ok(());
+            }
+            found.remove(needless);
+            // The models of the steps from there on are rebuilt without it.
+            let kept: Vec<crate::physics::Effect> =
+                found.iter().filter_map(|found| found.model.effect(&found.step.effect).cloned()).collect();
+            let mut model = before.clone();
+            for (found, effect) in found.iter_mut().zip(kept) {
+                model = self.engine.pass(&with(&model, &effect), &[])?.base.model;
+                found.model = model.clone();
+            }
+        }
+        Ok(())
+    }
+
+    /// Intervals of the accepted effects' coefficients, all of them in the model.
+    fn intervals(&self, found: &mut [Found]) -> Result<()> {
+        let Some(model) = found.last().map(|last| last.model.clone()) else { return Ok(()) };
+        let intervals = intervals(&self.engine, &model, self.options.seed)?;
+        for found in found.iter_mut() {
+            let Some(index) = model.effects.iter().position(|effect| effect.name == found.step.effect) else { continue };
+            for (position, number) in found.step.coefficients.iter_mut().enumerate() {
+                number.value =
+                    model.effects[index].coefficients.get(position).map_or(number.value, |coefficient| coefficient.value);
+                number.ci95 = intervals.get(&(index, position)).copied();
+            }
+        }
+        if let Some(last) = found.last_mut() {
+            for (&(effect, coefficient), interval) in &intervals {
+                if let Some(coefficient) =
+                    last.model.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(coefficient))
+                {
+                    coefficient.ci95 = Some(*interval);
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Tries every candidate beside a model.
@@ -292,8 +415,12 @@ impl Search<'_> {
             std::array::from_fn(|index| vec![channel[index]; rows.len()])
         };
         let one = |(index, candidate): (usize, &&'c Candidate)| {
-            let trials: Vec<&Trial> =
-                owner.iter().zip(&pass.trials).filter(|(owner, _)| **owner == index).filter_map(|(_, trial)| trial.as_ref()).collect();
+            let trials: Vec<&Trial> = owner
+                .iter()
+                .zip(&pass.trials)
+                .filter(|(owner, _)| **owner == index)
+                .filter_map(|(_, trial)| trial.as_ref())
+                .collect();
             self.scored(candidate, &trials, &pass, &weights, &even)
         };
         #[cfg(feature = "rayon")]
@@ -347,6 +474,7 @@ impl Search<'_> {
             excited: movement.as_ref().is_some_and(|movement| movement.excited),
             plausible: plausible(&pass.base.model, trial),
             carrying: movement.map_or(0, |movement| movement.carrying),
+            rival: None,
         })
     }
 
@@ -404,8 +532,10 @@ impl Search<'_> {
     }
 
     /// Open parameters between the points of the grid: each in turn, three times on an ever finer grid around its best value.
-    fn refine(&self, base: &Trial, chosen: &Scored<'_>) -> Result<Trial> {
-        let Some(definition) = chosen.candidate.definition else { return Ok(chosen.best.clone()) };
+    /// Also the values of each parameter whose gain is within two standard errors of the best.
+    fn refine(&self, base: &Trial, chosen: &Scored<'_>) -> Result<(Trial, BTreeMap<String, [f64; 2]>)> {
+        let Some(definition) = chosen.candidate.definition else { return Ok((chosen.best.clone(), BTreeMap::new())) };
+        let mut tried: Vec<(usize, f64, Vec<f64>)> = Vec::new();
         let open: Vec<usize> =
             (0..definition.parameters.len()).filter(|&index| !definition.parameters[index].grid.is_empty()).collect();
         let mut best = chosen.best.clone();
@@ -413,7 +543,11 @@ impl Search<'_> {
         let spacing = |index: usize, value: f64| {
             let grid = definition.parameters[index].grid;
             let near = grid.windows(2).filter(|pair| pair[0] <= value && value <= pair[1]).map(|pair| pair[1] - pair[0]);
-            near.fold(f64::NAN, f64::max).max(if grid.len() < 2 { 0.1 } else { (grid[grid.len() - 1] - grid[0]) / grid.len() as f64 * 0.25 })
+            near.fold(f64::NAN, f64::max).max(if grid.len() < 2 {
+                0.1
+            } else {
+                (grid[grid.len() - 1] - grid[0]) / grid.len() as f64 * 0.25
+            })
         };
         let number = |trial: &Trial, index: usize| {
             trial.model.effects.last().and_then(|effect| effect.parameters.get(index)).map_or(0.0, |parameter| parameter.value)
@@ -423,7 +557,8 @@ impl Search<'_> {
             for (&index, step) in open.iter().zip(&mut steps) {
                 let centre = number(&best, index);
                 let [low, high] = definition.parameters[index].bounds;
-                let values = [-0.8, -0.55, -0.3, -0.12, 0.12, 0.3, 0.55, 0.8].map(|share| (centre + share * *step).clamp(low, high));
+                let values =
+                    [-0.8, -0.55, -0.3, -0.12, 0.12, 0.3, 0.55, 0.8].map(|share| (centre + share * *step).clamp(low, high));
                 let effect = best.model.effects.last().cloned();
                 let Some(effect) = effect else { continue };
                 let models: Vec<Model> = values
@@ -438,7 +573,9 @@ impl Search<'_> {
                     .collect();
                 let pass = self.engine.pass(&base.model, &models)?;
                 for trial in pass.trials.into_iter().flatten() {
-                    let found: f64 = gains(base, &trial).iter().sum();
+                    let gains = gains(base, &trial);
+                    let found: f64 = gains.iter().sum();
+                    tried.push((index, number(&trial, index), gains));
                     if found > gain {
                         (best, gain) = (trial, found);
                     }
@@ -446,7 +583,18 @@ impl Search<'_> {
                 *step *= 0.35;
             }
         }
-        Ok(best)
+        let at_best = gains(base, &best);
+        let mut profiles = BTreeMap::new();
+        for &index in &open {
+            let centre = number(&best, index);
+            let near = tried.iter().filter(|tried| {
+                let (difference, error) = paired(&at_best, &tried.2);
+                tried.0 == index && difference <= 2.0 * error
+            });
+            let profile = near.fold([centre, centre], |[low, high], tried| [low.min(tried.1), high.max(tried.1)]);
+            profiles.insert(definition.parameters[index].name.to_owned(), profile);
+        }
+        Ok((best, profiles))
     }
 
     /// Share of resampled block sets in which a candidate has the largest gain of those that pass.
@@ -463,22 +611,18 @@ impl Search<'_> {
         wins as f64 / RESAMPLES as f64
     }
 
-    fn step(&self, chosen: &Scored<'_>, refined: &Trial, selection_frequency: f64, indistinguishable: Vec<String>) -> Step {
+    fn step(&self, chosen: &Scored<'_>, refined: &Trial, indistinguishable: Vec<String>) -> Step {
         let definition = chosen.candidate.definition;
         let empty = Vec::new();
         let effect = refined.model.effects.last();
         let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
         let worthy = chosen.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
-        let stability = match selection_frequency {
-            frequency if frequency >= 0.9 => "stable",
-            frequency if frequency >= 0.6 => "likely",
-            _ => "tentative",
-        };
         let number = |coefficient: &crate::physics::Coefficient| {
             let known = definition.and_then(|definition| definition.coefficient(&coefficient.name));
-            let rms = coefficient.by_flight.as_ref().map(|values| {
-                (values.values().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt()
-            });
+            let rms = coefficient
+                .by_flight
+                .as_ref()
+                .map(|values| (values.values().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt());
             Number {
                 name: coefficient.name.clone(),
                 value: coefficient.value,
@@ -494,8 +638,8 @@ impl Search<'_> {
             channels: worthy.map(|(&channel, _)| name(channel)).collect(),
             held_out_mse_fall: chosen.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
             p_value: chosen.p_value,
-            selection_frequency,
-            stability: stability.into(),
+            selection_frequency: 0.0,
+            stability: String::new(),
             indistinguishable,
             coefficients: effect.map_or(&empty, |effect| &effect.coefficients).iter().map(number).collect(),
             parameters: effect.map_or_else(Vec::new, |effect| {
@@ -512,8 +656,17 @@ impl Search<'_> {
                 .and_then(|definition| definition.notes)
                 .map_or_else(String::new, |notes| notes.would_tell_apart.into()),
             formula: effect.map_or_else(String::new, ToString::to_string),
-            rests_on_flight: None,
+            rests_on_flight: self.decisive_flight(&chosen.gains),
         }
+    }
+
+    /// A flight without which the gain would be gone.
+    fn decisive_flight(&self, gains: &[f64]) -> Option<String> {
+        let total: f64 = gains.iter().sum();
+        let mut flights: Vec<usize> = self.engine.blocks.iter().map(|block| block.flight).collect();
+        flights.dedup();
+        let flight = flights.iter().zip(self.by_flight(gains)).find(|(_, gain)| total - gain <= 0.0)?.0;
+        self.engine.flights.get(*flight).map(|flight| flight.name.clone()).filter(|_| flights.len() > 1)
     }
 
     fn reports(&self, open: &[&Candidate], scored: &[Scored<'_>]) -> Vec<CandidateReport> {
@@ -530,10 +683,15 @@ impl Search<'_> {
                         held_out_mse_fall: scored.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
                         p_value: Some(scored.p_value),
                         detection_limit_mse_fall: scored.detection.filter(|_| scored.excited),
-                        note: (status == Status::NotExcited).then(|| {
-                            let wanted = notes.map(|notes| format!("; wanted: {}", notes.excitation)).unwrap_or_default();
-                            format!("{} blocks carry it{wanted}", scored.carrying)
-                        }),
+                        note: (status == Status::NotExcited)
+                            .then(|| {
+                                let wanted = notes.map(|notes| format!("; wanted: {}", notes.excitation)).unwrap_or_default();
+                                format!("{} blocks carry it{wanted}", scored.carrying)
+                            })
+                            .or_else(|| {
+                                let rival = scored.rival.as_ref().filter(|_| status == Status::SamePhysics)?;
+                                Some(format!("little beside what `{rival}` removed, and mistaken for it"))
+                            }),
                     }
                 }
                 None => CandidateReport {
@@ -589,14 +747,6 @@ fn tolerance(chosen: &Scored<'_>, other: &Scored<'_>) -> f64 {
     if other.candidate.freedom() > chosen.candidate.freedom() { paired(&other.gains, &chosen.gains).1 } else { 0.0 }
 }
 
-/// Blocks drawn with replacement.
-fn draw(count: usize, seed: u64, world: usize) -> Vec<usize> {
-    /// Where in a run the draws are made.
-    const SITE: u64 = 0x626f_6f74;
-    let stream = Stream::new(seed, world as u64, SITE, 0);
-    (0..count).map(|index| ((stream.uniform(index as u64) * count as f64) as usize).min(count.saturating_sub(1))).collect()
-}
-
 /// The controls must keep acting the way they act without the effect; an effect whose every coefficient had to be put on a bound of
 /// zero does nothing.
 fn plausible(base: &Model, trial: &Trial) -> bool {
@@ -609,7 +759,8 @@ fn plausible(base: &Model, trial: &Trial) -> bool {
         })
     });
     let acts = trial.model.effects.last().is_none_or(|effect| {
-        effect.coefficients.is_empty() || effect.coefficients.iter().any(|coefficient| coefficient.value != 0.0 || coefficient.by_flight.is_some())
+        effect.coefficients.is_empty()
+            || effect.coefficients.iter().any(|coefficient| coefficient.value != 0.0 || coefficient.by_flight.is_some())
     });
     keeps && acts
 }
@@ -648,12 +799,10 @@ fn confirm(
                 1.0 - a / b
             };
             let whole = fall(&mut (0..before.len()));
-            let mut worlds: Vec<f64> =
-                (0..RESAMPLES).map(|world| fall(&mut draw(before.len(), 0, world).into_iter())).collect();
+            let mut worlds: Vec<f64> = (0..RESAMPLES).map(|world| fall(&mut draw(before.len(), 0, world).into_iter())).collect();
             worlds.sort_by(f64::total_cmp);
-            let at = |share: f64| worlds[((worlds.len() - 1) as f64 * share).round() as usize];
             let name = Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
-            (name, [whole, at(0.025), at(0.975)])
+            (name, [whole, quantile(&worlds, 0.025), quantile(&worlds, 0.975)])
         })
         .collect();
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
@@ -687,7 +836,8 @@ fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
         let weights: [f64; 6] = std::array::from_fn(|channel| {
             let position = channels.iter().position(|&other| other == channel);
             let global = |free: usize| if priors[free].by_flight.is_some() { 0.0 } else { value(free) };
-            let error = position.map(|position| (0..engine.blocks.len()).map(|block| reduced[position].error(block, &global)).sum::<f64>());
+            let error =
+                position.map(|position| (0..engine.blocks.len()).map(|block| reduced[position].error(block, &global)).sum::<f64>());
             error.map_or(1.0, |error| engine.rows() as f64 / error.max(f64::MIN_POSITIVE))
         });
         let component = engine.component(&channels, &members, &reduced, &weights, &priors);
@@ -706,18 +856,17 @@ fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
 fn summary(diagnosis: &Diagnosis) -> String {
     let falls = |effect: &Step| {
         let best = effect.held_out_mse_fall.iter().max_by(|left, right| left.1.total_cmp(right.1));
-        best.map(|(channel, fall)| format!("`{}` ({:.0} % of the error of {channel})", effect.effect, 100.0 * fall)).unwrap_or_default()
+        best.map(|(channel, fall)| format!("`{}` ({:.0} % of the error of {channel})", effect.effect, 100.0 * fall))
+            .unwrap_or_default()
     };
     match diagnosis.verdict {
         Verdict::EffectsMissing => {
             let names: Vec<String> = diagnosis.steps.iter().map(falls).collect();
             format!("The model lacks {}.", names.join(", then "))
         }
-        Verdict::Explained => "No effect of the catalogue is missing that these flights could show and that would be worth while.".into(),
+        Verdict::Explained => {
+            "No effect of the catalogue is missing that these flights could show and that would be worth while.".into()
+        }
         _ => String::new(),
     }
 }
-
-/// Kept for the type of an effect in signatures.
-#[allow(dead_code)]
-type Unused = Effect;

@@ -111,7 +111,8 @@ pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weigh
         }
     }
     // What the model's columns already say is not the effect's.
-    let independent = (0..new).all(|column| energy.column(column).sum() > SMALLEST_REMAINDER * total[(split + column, split + column)]);
+    let independent =
+        (0..new).all(|column| energy.column(column).sum() > SMALLEST_REMAINDER * total[(split + column, split + column)]);
     independent.then_some(Raw { scores, energy, one_sided })
 }
 
