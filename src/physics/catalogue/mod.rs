@@ -73,4 +73,6 @@ pub fn kinds() -> impl Iterator<Item = &'static str> {
 }
 
 #[cfg(test)]
+mod derivations;
+#[cfg(test)]
 mod tests;
