@@ -10,7 +10,7 @@ use std::borrow::Cow;
 /// Samples evaluated at once: a few operands of this length stay in the first-level cache.
 const BLOCK: usize = 512;
 
-/// A formula ready to run: constants folded in, hidden state of its `lag`, `delay` and `rate` inside.
+/// A formula ready to run: constants folded in, hidden state of its `lag`, `delay`, `rate` and `slew` inside.
 ///
 /// Samples must be pushed in order; the first one after [`Formula::stream`] or [`StreamingFormula::reset`] is taken to follow
 /// a long rest at its own value.
@@ -76,6 +76,16 @@ impl Builder<'_> {
     fn recall(&mut self, history: History, at: usize) -> Result<()> {
         let memory = match history {
             History::Rate => Memory::rate(self.step_s),
+            History::Slew => {
+                let (start, constant) = self.operands.pop().unwrap_or((0, None));
+                let Some(per_s) = constant.filter(|per_s| *per_s > 0.0) else {
+                    let found = constant.map_or("varies in flight".into(), |per_s| format!("is {per_s} per second"));
+                    let message = format!("the largest rate of `slew` {found}, expected a number or a parameter above 0");
+                    return Err(self.fault(message, at));
+                };
+                self.program.truncate(start);
+                Memory::slew(per_s, self.step_s)
+            }
             History::Lag | History::Delay => {
                 let (start, constant) = self.operands.pop().unwrap_or((0, None));
                 let (name, largest) = if history == History::Lag { ("lag", f64::MAX) } else { ("delay", MAX_DELAY_S) };
@@ -93,7 +103,7 @@ impl Builder<'_> {
             }
         };
         if let Some((start, Some(value))) = self.operands.last().copied() {
-            // At rest since ever: a lag or a delay passes a constant on, its rate is zero.
+            // At rest since ever: a lag, a delay or a slew passes a constant on, its rate is zero.
             let value = if history == History::Rate { 0.0 } else { value };
             self.operands.pop();
             self.program.truncate(start);

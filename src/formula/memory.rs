@@ -1,7 +1,7 @@
-//! The three operators that remember: lag, delay, rate. Each is one state that takes samples in order.
+//! The four operators that remember: lag, delay, rate, slew. Each is one state that takes samples in order.
 //!
-//! All take the signal between two samples to be a straight line, and before the first sample to have been at rest at its
-//! first value.
+//! Lag and delay take the signal between two samples to be a straight line;
+//! all take it to have been at rest at its first value before the first sample.
 
 use super::operation::History;
 use std::collections::VecDeque;
@@ -10,7 +10,7 @@ impl History {
     /// Number of arguments.
     pub(super) const fn operands(self) -> usize {
         match self {
-            Self::Lag | Self::Delay => 2,
+            Self::Lag | Self::Delay | Self::Slew => 2,
             Self::Rate => 1,
         }
     }
@@ -29,6 +29,8 @@ pub(super) enum Memory {
     Delay { whole: usize, part: f64, past: VecDeque<f64> },
     /// `y[k] = (x[k] - x[k-1]) / T`, zero at the first sample: causal, so half a sample late.
     Rate { step_s: f64, last: Option<f64> },
+    /// `y[k] = y[k-1] + clamp(x[k] - y[k-1], -limit, limit)`: a servo at its largest speed.
+    Slew { limit: f64, last: Option<f64> },
 }
 
 impl Memory {
@@ -50,12 +52,16 @@ impl Memory {
         Self::Rate { step_s, last: None }
     }
 
+    pub(super) fn slew(per_s: f64, step_s: f64) -> Self {
+        Self::Slew { limit: per_s * step_s, last: None }
+    }
+
     /// Forgets everything: the next sample is a first one.
     pub(super) fn reset(&mut self) {
         match self {
             Self::Lag { last, .. } => *last = None,
             Self::Delay { past, .. } => past.clear(),
-            Self::Rate { last, .. } => *last = None,
+            Self::Rate { last, .. } | Self::Slew { last, .. } => *last = None,
         }
     }
 
@@ -87,6 +93,17 @@ impl Memory {
                     let x = *value;
                     *value = (x - last.unwrap_or(x)) / *step_s;
                     *last = Some(x);
+                }
+            }
+            Self::Slew { limit, last } => {
+                for value in values {
+                    let before = last.unwrap_or(*value);
+                    // A not-a-number passes through and is forgotten, so that what follows is defined again.
+                    let change = *value - before;
+                    if change.abs() > *limit {
+                        *value = before + limit.copysign(change);
+                    }
+                    *last = Some(*value).filter(|value| value.is_finite());
                 }
             }
         }
@@ -130,6 +147,13 @@ mod tests {
         let values: Vec<f64> = (0..8).map(f64::from).collect();
         assert_eq!(run(Memory::delay(0.02, STEP_S), values.clone()), [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
         assert_eq!(run(Memory::delay(0.005, STEP_S), values), [0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5]);
+    }
+
+    #[test]
+    fn a_slew_follows_no_faster_than_its_limit() {
+        let found = run(Memory::slew(100.0, STEP_S), vec![0.0, 3.0, 3.0, 3.5, 3.2, -9.0, f64::NAN, 5.0]);
+        assert_eq!(found[..6], [0.0, 1.0, 2.0, 3.0, 3.2, 2.2]);
+        assert!(found[6].is_nan() && found[7] == 5.0);
     }
 
     #[test]

@@ -12,9 +12,10 @@
 //! | `lag(x, tau_s)` | first-order lag `tau y' = x - y`, exact for a signal that is straight between samples |
 //! | `delay(x, s)` | `x` so many seconds ago, linear between samples; 0 to 60 s |
 //! | `rate(x)` | backward difference over one step, per second: causal, hence half a step late |
+//! | `slew(x, per_s)` | follows `x`, changing by at most so much per second: a servo at its largest speed |
 //!
-//! The last three remember. Before the first sample their argument is taken to have rested at its first value. Their times are
-//! numbers or parameters, never columns.
+//! The last four remember. Before the first sample their argument is taken to have rested at its first value. Their second
+//! arguments are numbers or parameters, never columns.
 
 mod lexer;
 mod machine;
@@ -96,7 +97,7 @@ impl Formula {
         self.names.iter().map(|name| name.0.as_str()).collect()
     }
 
-    /// Whether it contains `lag`, `delay` or `rate`: then its value depends on earlier samples.
+    /// Whether it contains `lag`, `delay`, `rate` or `slew`: then its value depends on earlier samples.
     pub fn remembers(&self) -> bool {
         self.program.iter().any(|(instruction, _)| matches!(instruction, Instruction::Recall(_)))
     }

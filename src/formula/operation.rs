@@ -35,6 +35,7 @@ pub(super) enum History {
     Lag,
     Delay,
     Rate,
+    Slew,
 }
 
 /// What a function name stands for.
@@ -46,7 +47,7 @@ pub(super) enum Function {
 
 /// Every function: name, meaning, fewest and most arguments.
 #[rustfmt::skip]
-pub(super) const FUNCTIONS: [(&str, Function, usize, usize); 17] = [
+pub(super) const FUNCTIONS: [(&str, Function, usize, usize); 18] = [
     ("abs", Function::Plain(Operation::Abs), 1, 1),
     ("sqrt", Function::Plain(Operation::Sqrt), 1, 1),
     ("exp", Function::Plain(Operation::Exp), 1, 1),
@@ -64,6 +65,7 @@ pub(super) const FUNCTIONS: [(&str, Function, usize, usize); 17] = [
     ("lag", Function::History(History::Lag), 2, 2),
     ("delay", Function::History(History::Delay), 2, 2),
     ("rate", Function::History(History::Rate), 1, 1),
+    ("slew", Function::History(History::Slew), 2, 2),
 ];
 
 /// The name a function is printed with.

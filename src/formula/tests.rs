@@ -26,6 +26,7 @@ fn formulas() -> impl Strategy<Value = String> {
             (double, inner.clone(), inner.clone()).prop_map(|(f, x, y)| format!("{f}({x}, {y})")),
             (inner.clone(), inner.clone(), inner.clone()).prop_map(|(x, y, z)| format!("clamp({x}, {y}, {z})")),
             (inner.clone(), 0.0..0.1f64).prop_map(|(x, t)| format!("lag({x}, {t:?})")),
+            (inner.clone(), 0.1..90.0f64).prop_map(|(x, limit)| format!("slew({x}, {limit:?})")),
             (inner, 0.0..0.1f64).prop_map(|(x, t)| format!("delay({x}, {t:?} * p / p)")),
         ]
     })
@@ -147,6 +148,8 @@ fn errors_point_at_the_character_and_say_what_to_do() {
         ("lag(vx, -1)", 0, "expected at least 0"),
         ("delay(vx, 1e9)", 0, "at most 60"),
         ("1 + lag(vx, vx)", 4, "must be a number or a parameter"),
+        ("slew(vx, 0)", 0, "is 0 per second, expected a number or a parameter above 0"),
+        ("slew(vx, vx)", 0, "varies in flight"),
     ] {
         let found = Formula::parse(text).and_then(|formula| formula.stream(STEP_S).map(|_| ()));
         match found {

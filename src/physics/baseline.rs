@@ -119,7 +119,6 @@ pub fn definitions() -> &'static [Definition] {
 #[cfg(test)]
 mod tests {
     use super::super::{Model, catalogue};
-    use super::*;
 
     #[test]
     fn every_effect_of_the_baseline_is_whole_and_has_a_name_of_its_own() -> crate::Result<()> {

@@ -112,6 +112,49 @@ pub struct ParameterDefinition {
     pub tied_to: Option<&'static str>,
 }
 
+impl ParameterDefinition {
+    /// The same with this number before any search.
+    #[must_use]
+    pub const fn starting(mut self, number: f64) -> Self {
+        self.origin = Origin::Number(number);
+        self
+    }
+
+    /// The same, taken from what the model knows about the vehicle.
+    #[must_use]
+    pub const fn known_by(mut self, origin: Origin) -> Self {
+        self.origin = origin;
+        self
+    }
+
+    /// The same, these values being tried by a search.
+    #[must_use]
+    pub const fn tried(mut self, grid: &'static [f64]) -> Self {
+        self.grid = grid;
+        self
+    }
+
+    /// The same, to lie within bounds.
+    #[must_use]
+    pub const fn within(mut self, low: f64, high: f64) -> Self {
+        self.bounds = [low, high];
+        self
+    }
+
+    /// The same, moving on the grid together with another parameter of the effect.
+    #[must_use]
+    pub const fn tied(mut self, to: &'static str) -> Self {
+        self.tied_to = Some(to);
+        self
+    }
+}
+
+/// A parameter that is zero, known and without bounds; see the methods of [`ParameterDefinition`] for more.
+pub const fn parameter(name: &'static str, unit: &'static str, meaning: &'static str) -> ParameterDefinition {
+    let bounds = [f64::NEG_INFINITY, f64::INFINITY];
+    ParameterDefinition { name, unit, meaning, origin: Origin::Number(0.0), grid: &[], bounds, tied_to: None }
+}
+
 /// A change to signals that other effects read; see [`Swap`].
 #[derive(Clone, Copy, Debug)]
 pub struct SwapDefinition {

@@ -22,6 +22,7 @@ pub use calibrate::{Calibration, Estimate, calibrate};
 pub use columns::{Regressor, evaluate_blocks, missing_input};
 pub use definition::{
     AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, coefficient,
+    parameter,
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};

@@ -1,22 +1,20 @@
 //! The way from a stick to what it moves: delay, lags, limits, cross-coupling, linkage.
 
-use super::super::definition::{Definition, Notes, Origin, ParameterDefinition, SwapDefinition};
+use super::super::definition::{Definition, Notes, SwapDefinition, coefficient, parameter};
 use super::{ANY, HELICOPTER};
+
+/// Effects in which the cyclic makes a moment, the predicted angular accelerations included.
+const CYCLIC_MOMENTS: &[&str] = &["control_moment", "imu_lever", "inertia_cross", "rotor_droop"];
 
 pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "ctrl_delay",
         meaning: "between a recorded control and its effect passes a fixed time",
         coefficients: &[],
-        parameters: &[ParameterDefinition {
-            name: "delay_s",
-            unit: "s",
-            meaning: "delay of all four controls",
-            origin: Origin::Number(0.02),
-            grid: &[0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1],
-            bounds: [0.0, 0.15],
-            tied_to: None,
-        }],
+        parameters: &[parameter("delay_s", "s", "delay of all four controls")
+            .starting(0.02)
+            .tried(&[0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1])
+            .within(0.0, 0.15)],
         terms: &[],
         swaps: &[
             SwapDefinition { name: "u1", with: "delay(u1, delay_s)", within: &[] },
@@ -38,47 +36,174 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "the rotor disc tilts with a first-order lag behind the cyclic, and most of the rate damping comes through the disc",
         coefficients: &[],
         parameters: &[
-            ParameterDefinition {
-                name: "tau_x_s",
-                unit: "s",
-                meaning: "flapping time constant in roll",
-                origin: Origin::Number(0.05),
-                grid: &[0.015, 0.03, 0.05, 0.075, 0.11, 0.15],
-                bounds: [0.0, 0.4],
-                tied_to: None,
-            },
-            ParameterDefinition {
-                name: "tau_y_s",
-                unit: "s",
-                meaning: "flapping time constant in pitch",
-                origin: Origin::Number(0.05),
-                grid: &[0.015, 0.03, 0.05, 0.075, 0.11, 0.15],
-                bounds: [0.0, 0.4],
-                tied_to: Some("tau_x_s"),
-            },
-            ParameterDefinition {
-                name: "share",
-                unit: "1",
-                meaning: "share of the roll and pitch damping that comes through the disc",
-                origin: Origin::Number(0.7),
-                grid: &[0.0, 0.5, 1.0],
-                bounds: [0.0, 1.0],
-                tied_to: None,
-            },
+            parameter("tau_x_s", "s", "flapping time constant in roll")
+                .starting(0.05)
+                .tried(&[0.03, 0.05, 0.085, 0.15])
+                .within(0.0, 0.4),
+            parameter("tau_y_s", "s", "flapping time constant in pitch")
+                .starting(0.05)
+                .tried(&[0.03, 0.05, 0.085, 0.15])
+                .within(0.0, 0.4)
+                .tied("tau_x_s"),
+            parameter("share", "1", "share of the roll and pitch damping that comes through the disc")
+                .starting(0.7)
+                .tried(&[0.0, 0.5, 1.0])
+                .within(0.0, 1.0),
         ],
         terms: &[],
         swaps: &[
-            SwapDefinition { name: "u1", with: "lag(u1, tau_x_s)", within: &["control_moment"] },
-            SwapDefinition { name: "u2", with: "lag(u2, tau_y_s)", within: &["control_moment"] },
+            SwapDefinition { name: "u1", with: "lag(u1, tau_x_s)", within: CYCLIC_MOMENTS },
+            SwapDefinition { name: "u2", with: "lag(u2, tau_y_s)", within: CYCLIC_MOMENTS },
             SwapDefinition { name: "wx", with: "(1 - share) * wx + share * lag(wx, tau_x_s)", within: &["rate_damping"] },
             SwapDefinition { name: "wy", with: "(1 - share) * wy + share * lag(wy, tau_y_s)", within: &["rate_damping"] },
         ],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick cyclic inputs",
-            confusable_with: &["ctrl_delay", "servo_rate_limit", "rate_cross"],
+            confusable_with: &["ctrl_delay", "servo_rate_limit", "rate_cross", "ctrl_cross", "ctrl_nonlin"],
             would_tell_apart: "3-2-1-1 inputs on the cyclic",
             source: "tau = 16 / (gamma Omega): 35 to 100 ms, Mettler, Tischler & Kanade CMU-RI-TR-00-03; Walker & Tischler 2021",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "tail_lag",
+        meaning: "tail servo and yaw gyro act with a first-order lag behind the tail stick",
+        coefficients: &[],
+        parameters: &[parameter("tau_s", "s", "time constant")
+            .starting(0.06)
+            .tried(&[0.02, 0.04, 0.06, 0.1, 0.15])
+            .within(0.0, 0.5)],
+        terms: &[],
+        swaps: &[SwapDefinition { name: "u3", with: "lag(u3, tau_s)", within: &[] }],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "quick tail inputs",
+            confusable_with: &["ctrl_delay", "collective_torque"],
+            would_tell_apart: "3-2-1-1 inputs on the tail at constant collective",
+            source: "Gavrilets: tail servo of 7 Hz, damping 0.6",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "collective_lag",
+        meaning: "the collective servos act with a first-order lag behind the stick",
+        coefficients: &[],
+        parameters: &[parameter("tau_s", "s", "time constant")
+            .starting(0.06)
+            .tried(&[0.02, 0.04, 0.06, 0.1, 0.15])
+            .within(0.0, 0.5)],
+        terms: &[],
+        swaps: &[SwapDefinition { name: "u4", with: "lag(u4, tau_s)", within: &[] }],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "quick collective inputs",
+            confusable_with: &["ctrl_delay", "inflow_lag", "rotor_droop"],
+            would_tell_apart: "3-2-1-1 inputs on the collective in hover",
+            source: "Gavrilets: servos of 36 rad/s, damping 0.5, with a slow pole",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "servo_rate_limit",
+        meaning: "servos turn no faster than they can, so quick inputs arrive as ramps",
+        coefficients: &[],
+        parameters: &[parameter("rate_per_s", "1/s", "largest rate, in full sticks per second")
+            .starting(3.0)
+            .tried(&[1.0, 2.0, 3.0, 4.5, 6.5])
+            .within(0.2, 20.0)],
+        terms: &[],
+        swaps: &[
+            SwapDefinition { name: "u1", with: "slew(u1, rate_per_s)", within: &[] },
+            SwapDefinition { name: "u2", with: "slew(u2, rate_per_s)", within: &[] },
+            SwapDefinition { name: "u3", with: "slew(u3, rate_per_s)", within: &[] },
+            SwapDefinition { name: "u4", with: "slew(u4, rate_per_s)", within: &[] },
+        ],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "full-stick reversals within a tenth of a second",
+            confusable_with: &["cyclic_lag", "ctrl_nonlin"],
+            would_tell_apart: "the same step at a tenth and at the whole of the stick: a lag takes as long for both, a limit does not",
+            source: "model servos: 60 degrees in 0.05 to 0.15 s unloaded",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "ctrl_nonlin",
+        meaning: "linkage and exponential curves: a stick's effect is not in proportion to its travel",
+        coefficients: &[
+            coefficient("k_x", "rad/s²", "lateral cyclic").within(-100.0, 100.0).usually(-7.0, 7.0),
+            coefficient("k_y", "rad/s²", "longitudinal cyclic").within(-100.0, 100.0).usually(-6.0, 6.0),
+            coefficient("k_z", "rad/s²", "tail").within(-100.0, 100.0).usually(-5.0, 5.0),
+            coefficient("k_c", "m/s²", "collective").within(-30.0, 30.0).usually(-2.0, 2.0),
+        ],
+        parameters: &[parameter("exponent", "1", "power of the travel").starting(3.0).tried(&[2.0, 3.0]).within(1.5, 4.0)],
+        terms: &[
+            (3, Some("k_x"), "sign(u1) * abs(u1)^exponent"),
+            (4, Some("k_y"), "sign(u2) * abs(u2)^exponent"),
+            (5, Some("k_z"), "sign(u3) * abs(u3)^exponent"),
+            (2, Some("k_c"), "sign(u4) * abs(u4)^exponent"),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "each stick over most of its travel",
+            confusable_with: &["cyclic_lag", "servo_rate_limit", "stall_saturation", "tail_rotor_inflow"],
+            would_tell_apart: "slow ramps of each stick from end to end",
+            source: "crank geometry of servo linkages; a transmitter's exponential curve",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "ctrl_cross",
+        meaning: "a stick moves another axis too: swash plate phase, delta-3, linkage",
+        coefficients: &[
+            coefficient("x_u2", "rad/s²", "roll by longitudinal cyclic").within(-40.0, 40.0).usually(-10.0, 10.0),
+            coefficient("x_u3", "rad/s²", "roll by tail").within(-40.0, 40.0).usually(-3.0, 3.0),
+            coefficient("x_u4", "rad/s²", "roll by collective").within(-40.0, 40.0).usually(-5.0, 5.0),
+            coefficient("y_u1", "rad/s²", "pitch by lateral cyclic").within(-40.0, 40.0).usually(-10.0, 10.0),
+            coefficient("y_u3", "rad/s²", "pitch by tail").within(-40.0, 40.0).usually(-3.0, 3.0),
+            coefficient("y_u4", "rad/s²", "pitch by collective").within(-40.0, 40.0).usually(-5.0, 5.0),
+            coefficient("z_u1", "rad/s²", "yaw by lateral cyclic").within(-40.0, 40.0).usually(-3.0, 3.0),
+            coefficient("z_u2", "rad/s²", "yaw by longitudinal cyclic").within(-40.0, 40.0).usually(-3.0, 3.0),
+        ],
+        parameters: &[],
+        terms: &[
+            (3, Some("x_u2"), "u2"),
+            (3, Some("x_u3"), "u3"),
+            (3, Some("x_u4"), "u4"),
+            (4, Some("y_u1"), "u1"),
+            (4, Some("y_u3"), "u3"),
+            (4, Some("y_u4"), "u4"),
+            (5, Some("z_u1"), "u1"),
+            (5, Some("z_u2"), "u2"),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "each stick moved on its own",
+            confusable_with: &["rate_cross", "cyclic_lag", "cg_offset"],
+            would_tell_apart: "doublets on one stick at a time, the others held",
+            source: "cyclic cross-feed of 12 to 35 %: Walker & Tischler 2021 and ArduPilot's identified models",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "rate_cross",
+        meaning: "pitching rolls the rotor and rolling pitches it: flapping and the rotor's angular momentum",
+        coefficients: &[
+            coefficient("x_q", "1/s", "roll by pitch rate").within(-15.0, 15.0).usually(-5.0, 5.0),
+            coefficient("y_p", "1/s", "pitch by roll rate").within(-15.0, 15.0).usually(-5.0, 5.0),
+        ],
+        parameters: &[],
+        terms: &[(3, Some("x_q"), "wy"), (4, Some("y_p"), "wx")],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "rolls without pitch and flips without roll",
+            confusable_with: &["ctrl_cross", "inertia_cross", "cyclic_lag"],
+            would_tell_apart: "coasting after a roll or flip input with the cyclic centred",
+            source: "flap cross coupling of 1 to 1.3 over the flapping time constant: Walker & Tischler 2021; Padfield ch. 4",
             searched: true,
         }),
     },

@@ -1,0 +1,101 @@
+//! Mass and its distribution: products of inertia, centre of mass, fuel, displaced air.
+
+use super::super::definition::{Definition, Notes, coefficient};
+use super::{ANY, HELICOPTER};
+
+pub(super) const DEFINITIONS: &[Definition] = &[
+    // Euler's equation with the tensor I - J, J symmetric with a zero diagonal, solved to first order in J:
+    // I w' = I w'_0 + J w'_0 + w x (J w), w'_0 being the baseline's prediction.
+    Definition {
+        kind: "inertia_cross",
+        meaning: "products of inertia couple the axes, and the ratios of the moments of inertia may be wrong",
+        coefficients: &[
+            coefficient("i_xz", "kg m²", "product of inertia xz").within(-0.1, 0.1).usually(0.01, 0.04),
+            coefficient("i_xy", "kg m²", "product of inertia xy").within(-0.1, 0.1).usually(-0.01, 0.01),
+            coefficient("i_yz", "kg m²", "product of inertia yz").within(-0.1, 0.1).usually(-0.01, 0.01),
+            coefficient("ratio_x", "1", "error of (iy - iz) / ix").within(-1.0, 1.0).usually(-0.2, 0.2),
+            coefficient("ratio_y", "1", "error of (iz - ix) / iy").within(-1.0, 1.0).usually(-0.2, 0.2),
+            coefficient("ratio_z", "1", "error of (ix - iy) / iz").within(-1.0, 1.0).usually(-0.2, 0.2),
+        ],
+        parameters: &[],
+        terms: &[
+            (3, Some("i_xz"), concat!("(", predicted!(wz), " + wx * wy) / ix")),
+            (4, Some("i_xz"), "(wz^2 - wx^2) / iy"),
+            (5, Some("i_xz"), concat!("(", predicted!(wx), " - wy * wz) / iz")),
+            (3, Some("i_xy"), concat!("(", predicted!(wy), " - wx * wz) / ix")),
+            (4, Some("i_xy"), concat!("(", predicted!(wx), " + wy * wz) / iy")),
+            (5, Some("i_xy"), "(wx^2 - wy^2) / iz"),
+            (3, Some("i_yz"), "(wy^2 - wz^2) / ix"),
+            (4, Some("i_yz"), concat!("(", predicted!(wz), " - wx * wy) / iy")),
+            (5, Some("i_yz"), concat!("(", predicted!(wy), " + wx * wz) / iz")),
+            (3, Some("ratio_x"), "wy * wz"),
+            (4, Some("ratio_y"), "wz * wx"),
+            (5, Some("ratio_z"), "wx * wy"),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "turning about two axes at once, beyond 2 rad/s",
+            confusable_with: &["rate_cross"],
+            would_tell_apart: "rolls and flips during a pirouette, and the same without it",
+            source: "Euler's equation: Stevens & Lewis, Aircraft Control and Simulation, 2nd ed., sec. 1.4",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "cg_offset",
+        meaning: "the thrust does not pass through the centre of mass",
+        coefficients: &[
+            coefficient("x_m", "m", "centre of mass ahead of the mast").within(-0.05, 0.05).usually(-0.01, 0.01),
+            coefficient("y_m", "m", "centre of mass to starboard of the mast").within(-0.05, 0.05).usually(-0.01, 0.01),
+        ],
+        parameters: &[],
+        terms: &[(4, Some("x_m"), concat!("mass_kg / iy * ", thrust!())), (3, Some("y_m"), concat!("-mass_kg / ix * ", thrust!()))],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "collective over half of its range",
+            confusable_with: &["ctrl_cross", "dihedral_speedstab"],
+            would_tell_apart: "collective steps with the cyclic held",
+            source: "moment m T times the offset: 1 cm is 0.45 N m in hover",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "mass_drift",
+        meaning: "fuel burns, the mass falls, and the same thrust accelerates it more",
+        coefficients: &[coefficient("k", "1/s", "share of the mass lost per second").within(0.0, 0.01).usually(0.0002, 0.002)],
+        parameters: &[],
+        // Time as the log counts it: each flight is taken to start with full tanks at t = 0.
+        terms: &[(2, Some("k"), concat!(thrust!(), " * t"))],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "flights of several minutes each, with the time counted from take-off",
+            confusable_with: &["rotor_droop"],
+            would_tell_apart: "the same hover at the beginning and at the end of a flight",
+            source: "0.5 kg of fuel in 4.6 kg; drag over mass changes too, by less",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "added_mass",
+        meaning: "the aircraft moves some air along: every force accelerates a little more mass",
+        coefficients: &[coefficient("k", "1", "mass of that air over the aircraft's").within(0.0, 0.05).usually(0.002, 0.01)],
+        parameters: &[],
+        terms: &[
+            (0, Some("k"), "-(g_x + linear_drag_a_x * vx)"),
+            (1, Some("k"), "-(g_y + linear_drag_a_y * vy)"),
+            (2, Some("k"), concat!("-(g_z + linear_drag_a_z * vz + ", thrust!(), ")")),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "nothing that flies like this: below 1 % of any force",
+            confusable_with: &[],
+            would_tell_apart: "no manoeuvre; it is listed so that it is known to be negligible",
+            source: "displaced air of about 0.02 kg",
+            searched: false,
+        }),
+    },
+];

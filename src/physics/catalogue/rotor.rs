@@ -1,0 +1,104 @@
+//! The main rotor as a whole: its torque, its speed, and the tilt of its disc.
+
+use super::super::definition::{Definition, Notes, coefficient, parameter};
+use super::HELICOPTER;
+
+/// Power beyond hover, in hover powers, behind the rotor's and governor's lag; momentum theory: power goes as thrust to the 3/2.
+macro_rules! slow_power {
+    () => {
+        concat!("lag(abs(", thrust!(), " / 9.80665)^1.5 - 1, tau_s)")
+    };
+}
+
+pub(super) const DEFINITIONS: &[Definition] = &[
+    Definition {
+        kind: "collective_torque",
+        meaning: "the torque that drives the main rotor turns the fuselage the other way",
+        coefficients: &[coefficient("k", "rad/s²", "yaw acceleration at 1 g of thrust").within(-60.0, 60.0).usually(-6.0, 6.0)],
+        parameters: &[parameter("exponent", "1", "power of the thrust").starting(1.5).tried(&[1.0, 1.5, 2.0]).within(1.0, 2.0)],
+        terms: &[(5, Some("k"), concat!("abs(", thrust!(), " / 9.80665)^exponent"))],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "collective over half of its range",
+            confusable_with: &["heave_torque", "rotor_droop", "tail_lag"],
+            would_tell_apart: "slow and fast collective steps with the tail held still",
+            source: "momentum theory: power goes as thrust to the 3/2",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "heave_torque",
+        meaning: "climbing takes torque and descending gives it back, which turns the nose",
+        coefficients: &[coefficient("n_w", "rad/(m s)", "yaw by descent").within(-20.0, 20.0).usually(-6.0, 6.0)],
+        parameters: &[],
+        terms: &[(5, Some("n_w"), "vz")],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "climbs and descents beyond 2 m/s",
+            confusable_with: &["collective_torque"],
+            would_tell_apart: "steady climbs and descents against quick collective doublets",
+            source: "power T v_z over rotor speed; N_w 5.8: Walker & Tischler 2021",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "rotor_droop",
+        meaning: "under load the rotor slows down before the governor catches it, and thrust and control power fall with its speed squared",
+        coefficients: &[coefficient("k", "1", "change of speed squared at twice the hover power")
+            .within(-0.6, 0.0)
+            .usually(-0.25, -0.03)],
+        parameters: &[parameter("tau_s", "s", "time constant of rotor and governor")
+            .starting(0.3)
+            .tried(&[0.15, 0.3, 0.6, 1.2])
+            .within(0.03, 4.0)],
+        terms: &[
+            (2, Some("k"), concat!(thrust!(), " * ", slow_power!())),
+            (3, Some("k"), concat!("control_moment_c_x * u1 * ", slow_power!())),
+            (4, Some("k"), concat!("control_moment_c_y * u2 * ", slow_power!())),
+            (5, Some("k"), concat!("control_moment_c_z * u3 * ", slow_power!())),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "collective pulses of half a second and longer",
+            confusable_with: &[
+                "ground_effect",
+                "collective_torque",
+                "inflow_lag",
+                "collective_lag",
+                "mass_drift",
+                "stall_saturation",
+            ],
+            would_tell_apart: "collective steps held for 3 s with small cyclic and tail doublets during them, or a log of the rotor speed",
+            source: "Gavrilets: Omega' = (Q_e - Q) / I_rot with a PI governor, thrust as Omega squared",
+            searched: true,
+        }),
+    },
+    // The moment that a stick makes tells which way it tilts the disc: signs hold for any convention of the sticks.
+    Definition {
+        kind: "flap_tilt",
+        meaning: "the thrust tilts with the disc: with the cyclic, and behind the fuselage when it turns",
+        coefficients: &[
+            coefficient("tilt", "rad", "tilt at full cyclic").within(0.0, 0.5).usually(0.05, 0.15),
+            coefficient("lag_s", "s", "by how long the disc stays behind the fuselage").within(0.0, 0.3).usually(0.005, 0.1),
+        ],
+        parameters: &[],
+        terms: &[
+            (0, Some("tilt"), concat!("sign(control_moment_c_y) * u2 * ", thrust!())),
+            (1, Some("tilt"), concat!("-sign(control_moment_c_x) * u1 * ", thrust!())),
+            (0, Some("lag_s"), concat!("-wy * ", thrust!())),
+            (1, Some("lag_s"), concat!("wx * ", thrust!())),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "cyclic inputs and rolls",
+            confusable_with: &["imu_lever", "tail_side_force"],
+            would_tell_apart: "cyclic doublets at low and at high collective: the tilt goes with the thrust, a lever arm does not",
+            source: "Gavrilets: X = -T a1, Y = T b1, quasi-steady a1 = -tau q + A u2",
+            searched: true,
+        }),
+    },
+];

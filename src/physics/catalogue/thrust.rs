@@ -1,0 +1,168 @@
+//! What the main rotor's thrust depends on beside the collective: ground, speed, climb, descent, stall.
+
+use super::super::definition::{Definition, Notes, Origin, SwapDefinition, coefficient, parameter};
+use super::{ANY, HELICOPTER};
+
+pub(super) const DEFINITIONS: &[Definition] = &[
+    Definition {
+        kind: "ground_effect",
+        meaning: "near the ground the rotor's wake is blocked and the same power lifts more: T/T_inf = 1 / (1 - (R/4z)^2 / (1 + (V/v_i)^2))",
+        coefficients: &[coefficient("k", "1", "share of the theoretical gain").within(0.0, 3.0).usually(0.6, 1.3)],
+        parameters: &[
+            parameter("radius_m", "m", "rotor radius").known_by(Origin::RotorRadius).within(0.01, 20.0),
+            parameter("hub_m", "m", "height of the rotor hub above the recorded position")
+                .starting(0.2)
+                .tried(&[0.0, 0.2, 0.4])
+                .within(0.0, 0.6),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        ],
+        terms: &[(
+            2,
+            Some("k"),
+            concat!(
+                thrust!(),
+                " * (1 / (1 - (radius_m / (4 * max(height + hub_m, 0.5 * radius_m)))^2 / (1 + (airspeed / induced_m_s)^2)) - 1)"
+            ),
+        )],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "flight below two rotor radii",
+            confusable_with: &["rotor_droop", "sensor_bias"],
+            would_tell_apart: "hover at 0.5, 1, 2 and 4 m",
+            source: "Cheeseman & Bennett 1955, ARC R&M 3021",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "transl_lift",
+        meaning: "in forward flight the rotor meets undisturbed air, the induced velocity falls and the same collective lifts more",
+        coefficients: &[coefficient("k", "1", "share of the thrust gained at high speed").within(0.0, 2.0).usually(0.15, 0.5)],
+        parameters: &[
+            parameter("ratio", "1", "speed of half the gain over the induced velocity in hover")
+                .starting(1.5)
+                .tried(&[0.7, 1.5, 3.0])
+                .within(0.3, 8.0),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        ],
+        terms: &[(2, Some("k"), concat!(thrust!(), " * hypot(vx, vy) / (hypot(vx, vy) + ratio * induced_m_s)"))],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "speeds from hover to three times the induced velocity",
+            confusable_with: &["climb_inflow", "quad_drag"],
+            would_tell_apart: "level flight at constant height at 0, 3, 6 and 12 m/s, and climbs at each",
+            source: "momentum theory: v_i = T / (2 rho A sqrt(V^2 + v_i^2)); Padfield ch. 3",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "climb_inflow",
+        meaning: "how strongly climb and descent change the thrust depends on speed and on the climb itself",
+        coefficients: &[
+            coefficient("k_speed", "1/s", "heave damping gained at high speed").within(-10.0, 1.0).usually(-4.0, -1.0),
+            coefficient("k_climb", "1/m", "heave damping in proportion to the climb").within(-1.0, 1.0).usually(-0.2, 0.2),
+        ],
+        parameters: &[
+            parameter("ratio", "1", "speed of half the gain over the induced velocity in hover")
+                .starting(1.5)
+                .tried(&[0.7, 1.5, 3.0])
+                .within(0.3, 8.0),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        ],
+        terms: &[
+            (2, Some("k_speed"), "vz * hypot(vx, vy) / (hypot(vx, vy) + ratio * induced_m_s)"),
+            (2, Some("k_climb"), "vz * abs(vz)"),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "climbs and descents in hover and above 6 m/s",
+            confusable_with: &["transl_lift", "quad_drag", "vortex_ring"],
+            would_tell_apart: "collective doublets in hover and at 10 m/s, climbs and descents at 1 and 3 m/s",
+            source: "blade element and momentum theory: Z_w from -1.6 1/s in hover to -3.9 1/s at 10 m/s; Heffley & Mnich",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "vortex_ring",
+        meaning: "descending into its own wake at about the induced velocity, the rotor loses thrust",
+        coefficients: &[coefficient("k", "1", "share of the thrust at the worst rate of descent")
+            .within(-1.0, 0.0)
+            .usually(-0.4, -0.1)],
+        parameters: &[
+            parameter("centre", "1", "worst rate of descent over the induced velocity in hover")
+                .starting(1.0)
+                .tried(&[0.7, 1.0, 1.3])
+                .within(0.4, 1.8),
+            parameter("width", "1", "width of the range over the induced velocity in hover").starting(0.4).within(0.1, 1.0),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        ],
+        // Descent is motion against the thrust: along +z for an upright rotor.
+        terms: &[(
+            2,
+            Some("k"),
+            concat!(
+                thrust!(),
+                " * exp(-((-sign",
+                thrust!(),
+                " * vz / induced_m_s - centre) / width)^2) * exp(-(hypot(vx, vy) / induced_m_s)^2)"
+            ),
+        )],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "steep descents faster than half the induced velocity",
+            confusable_with: &["climb_inflow", "quad_drag"],
+            would_tell_apart: "vertical descents at 1, 2, 3 and 4 m/s, and the same descents at 6 m/s forward",
+            source: "Leishman, Principles of Helicopter Aerodynamics, sec. 2.13.6; Johnson, NASA TP 2005-213477",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "stall_saturation",
+        meaning: "beyond some load the blades stall and more collective gives less thrust than before",
+        coefficients: &[coefficient("k", "1", "change of the thrust's slope beyond the knee")
+            .within(-1.0, 0.0)
+            .usually(-0.8, -0.2)],
+        parameters: &[parameter("knee_g", "1", "load at which it begins, in g")
+            .starting(1.3)
+            .tried(&[1.1, 1.3, 1.6, 2.0])
+            .within(1.0, 4.0)],
+        terms: &[(2, Some("k"), concat!("sign", thrust!(), " * max(abs", thrust!(), " - knee_g * 9.80665, 0)"))],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: ANY,
+            excitation: "collective to the ends of its range, right way up and inverted",
+            confusable_with: &["ctrl_nonlin", "rotor_droop"],
+            would_tell_apart: "collective steps of growing size, each held for a second",
+            source: "Gavrilets: CT limited to 0.0055, T to 2.5 m g",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "inflow_lag",
+        meaning: "thrust follows a change of pitch or climb at once and in excess, then the induced flow builds up and takes some back",
+        coefficients: &[],
+        parameters: &[
+            parameter("tau_s", "s", "time constant of the induced flow")
+                .starting(0.06)
+                .tried(&[0.03, 0.06, 0.12, 0.25])
+                .within(0.005, 0.6),
+            parameter("overshoot", "1", "excess at once over the steady change").starting(0.4).tried(&[0.4, 1.0]).within(0.0, 2.0),
+        ],
+        terms: &[],
+        swaps: &[
+            SwapDefinition { name: "u4", with: "u4 + overshoot * (u4 - lag(u4, tau_s))", within: &["collective_thrust"] },
+            SwapDefinition { name: "vz", with: "vz + overshoot * (vz - lag(vz, tau_s))", within: &["linear_drag"] },
+        ],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "quick collective inputs",
+            confusable_with: &["collective_lag", "rotor_droop"],
+            would_tell_apart: "collective steps: the flow overshoots, a servo lag never does",
+            source: "Carpenter & Fridovich, NACA TN 3044, 1953; apparent mass 8/3 rho R^3: Pitt & Peters 1981",
+            searched: true,
+        }),
+    },
+];
