@@ -133,6 +133,29 @@ impl Split {
     }
 }
 
+/// Of so many flights one is kept from a search.
+const SEARCH_SHARE: usize = 5;
+
+impl Split {
+    /// Keeps whole flights from a search: one of every five in the order of class and name, which one by `seed`; of fewer than ten
+    /// flights the last fifth of each. Nothing validates.
+    pub fn for_search(flights: &[Flight], seed: u64) -> Self {
+        if flights.len() < 2 * SEARCH_SHARE {
+            let share = 1.0 - 1.0 / SEARCH_SHARE as f64;
+            return by_protocol(flights, &Protocol::First(share), seed);
+        }
+        let offset = permutation(SEARCH_SHARE, seed, 0).first().map_or(0, |first| *first as usize);
+        let mut order: Vec<usize> = (0..flights.len()).collect();
+        order.sort_by(|&left, &right| {
+            let key = |index: usize| (&flights[index].manoeuvre, &flights[index].name);
+            key(left).cmp(&key(right))
+        });
+        let kept = |flight: usize| order.iter().position(|&other| other == flight).is_some_and(|at| at % SEARCH_SHARE == offset);
+        let (test, training) = whole(flights).partition(|span| kept(span.flight));
+        Self { training, validation: Vec::new(), test, tested: Part::Test }
+    }
+}
+
 fn whole(flights: &[Flight]) -> impl Iterator<Item = Span> {
     flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() })
 }

@@ -144,6 +144,44 @@ pub enum Command {
         #[command(flatten)]
         division: Division,
     },
+    /// Which physical effect is missing, and how sure that is; exit code 3 on a convention fault
+    #[command(after_help = "Example:\n  phyture diagnose flights -m n9.toml --report report --json diagnosis.json")]
+    Diagnose {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file [default: the paper's baseline]; effects that are switched off in it are tried too
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+        /// Folder for the HTML page
+        #[arg(long, value_name = "DIR")]
+        report: Option<PathBuf>,
+        /// Most effects to name
+        #[arg(long, default_value_t = 6)]
+        max_effects: usize,
+        /// What is searched and what only confirms.
+        #[command(flatten)]
+        division: Division,
+    },
+    /// Diagnose, add, calibrate, until nothing worthwhile is left; appends to a ledger beside the model
+    #[command(after_help = "Example:\n  phyture loop flights -m n9.toml -o n9-amended.toml --report report")]
+    Loop {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Model file [default: the paper's baseline]
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+        /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Folder for the HTML page
+        #[arg(long, value_name = "DIR")]
+        report: Option<PathBuf>,
+        /// What is searched and what only confirms.
+        #[command(flatten)]
+        division: Division,
+    },
     /// Train the residual network; crash-safe checkpoints, Ctrl-C saves
     #[command(
         after_help = "Example:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume"

@@ -79,10 +79,9 @@ fn grid(definition: &Definition, effect: &Effect) -> Vec<Effect> {
 }
 
 fn inapplicable(model: &Model, effect: &Effect, flights: &[Flight]) -> Option<String> {
-    if let Some(within) =
-        effect.swaps.iter().flat_map(|swap| &swap.within).find(|name| model.effect(name).is_none_or(|e| !e.enabled))
-    {
-        return Some(format!("the model has no effect `{within}`, which it would change"));
+    let has = |name: &String| model.effect(name).is_some_and(|effect| effect.enabled);
+    if let Some(swap) = effect.swaps.iter().find(|swap| !swap.within.is_empty() && !swap.within.iter().any(has)) {
+        return Some(format!("the model has no effect `{}`, which it would change", swap.within.join("` or `")));
     }
     let mut enlarged = model.clone();
     enlarged.effects.retain(|other| other.name != effect.name);

@@ -41,9 +41,11 @@ const CARRIED_SHARE: f64 = 0.8;
 const DETECTION: f64 = 4.0;
 /// One effect shadows another if that one's gain beside it is less than this share of its gain alone.
 const SHADOW: f64 = 0.2;
-/// What an effect removes beside one that it is mistaken for has to be this share of what that one removed: less is a flaw in the
-/// form of the first, in other words.
-const SMALLEST_SHARE_OF_RIVAL: f64 = 0.1;
+/// What an effect removes beside an accepted one has to be this share of what that one removed in the same channel: less may be a
+/// flaw in the form of the first, in other words …
+const SMALLEST_SHARE_OF_ACCEPTED: f64 = 0.05;
+/// … and this share, if the two are known to be mistaken for each other.
+const SMALLEST_SHARE_OF_RIVAL: f64 = 0.2;
 
 /// How a search is done.
 #[derive(Clone, Debug)]
@@ -180,7 +182,14 @@ pub fn diagnose(
         return Ok(Outcome { diagnosis, model: base });
     }
     let search = Search { flips: Some(Flips::new(count, options.seed)), ..search };
-    let before = search.engine.pass(&base, &[])?.base.model;
+    let (before, held) = search.timing(&base)?;
+    if let Some(delay_s) = held {
+        diagnosis.notes.push(format!(
+            "the controls act {:.1} ms after their sample, half a step: they are held from one sample to the next. Taken as a property of \
+             the log (`control_delay_s = {delay_s}` under [data]), not as a missing effect",
+            1e3 * delay_s
+        ));
+    }
     let (found, left) = search.forward(&before, &candidates)?;
     let mut models = vec![before.clone()];
     models.extend(found.iter().map(|found| found.model.clone()));
@@ -235,19 +244,15 @@ impl Found {
         }
     }
 
-    /// Whether a candidate is mistaken for this effect and removes little beside what this one did, in every channel in which it is
-    /// worth while.
+    /// Whether a candidate removes so little beside what this effect did, in every channel in which it is worth while, that it may
+    /// only mend the form of this one.
     fn is_flawed_by(&self, other: &Scored<'_>, mse: &[f64; 6]) -> bool {
+        let notes = other.candidate.definition.and_then(|definition| definition.notes);
         let related = self.confusable.contains(&other.candidate.id.as_str())
-            || other
-                .candidate
-                .definition
-                .and_then(|definition| definition.notes)
-                .is_some_and(|notes| notes.confusable_with.contains(&self.step.effect.as_str()));
+            || notes.is_some_and(|notes| notes.confusable_with.contains(&self.step.effect.as_str()));
+        let share = if related { SMALLEST_SHARE_OF_RIVAL } else { SMALLEST_SHARE_OF_ACCEPTED };
         let mut worthy = other.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).peekable();
-        related
-            && worthy.peek().is_some()
-            && worthy.all(|(&channel, fall)| fall * mse[channel] < SMALLEST_SHARE_OF_RIVAL * self.removed[channel])
+        worthy.peek().is_some() && worthy.all(|(&channel, fall)| fall * mse[channel] < share * self.removed[channel])
     }
 }
 
@@ -268,6 +273,31 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
+    /// The fitted model; with half a step of control delay, if it states none and half a step is better than none and than a whole
+    /// one and more: then the controls are held between samples, which is how the log was made and no effect. A longer delay is one.
+    fn timing(&self, base: &Model) -> Result<(Model, Option<f64>)> {
+        let step_s = self.engine.flights.first().map_or(0.01, |flight| flight.step_s);
+        let delays: Vec<f64> = [0.5, 1.0, 1.5, 2.0].iter().map(|steps| steps * step_s).collect();
+        let delayed = |delay_s: &f64| {
+            let mut model = base.clone();
+            model.data.control_delay_s = *delay_s;
+            model
+        };
+        let stated = base.data.control_delay_s > 0.0;
+        let models: Vec<Model> = if stated { Vec::new() } else { delays.iter().map(delayed).collect() };
+        let pass = self.engine.pass(base, &models)?;
+        let gains: Vec<Vec<f64>> =
+            pass.trials.iter().map(|trial| trial.as_ref().map_or_else(Vec::new, |trial| gains(&pass.base, trial))).collect();
+        let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
+        if let (Some(half), Some(Some(trial))) = (gains.first(), pass.trials.first()) {
+            let (difference, error) = paired(half, &vec![0.0; half.len()]);
+            if difference > 2.0 * error && gains.iter().skip(1).all(|longer| total(longer) < total(half)) {
+                return Ok((trial.model.clone(), delays.first().copied()));
+            }
+        }
+        Ok((pass.base.model, None))
+    }
+
     fn forward(&self, before: &Model, candidates: &[Candidate]) -> Result<(Vec<Found>, Vec<CandidateReport>)> {
         let mut model = before.clone();
         let mut found: Vec<Found> = Vec::new();
@@ -690,7 +720,7 @@ impl Search<'_> {
                             })
                             .or_else(|| {
                                 let rival = scored.rival.as_ref().filter(|_| status == Status::SamePhysics)?;
-                                Some(format!("little beside what `{rival}` removed, and mistaken for it"))
+                                Some(format!("little beside what `{rival}` removed: it may only mend its form"))
                             }),
                     }
                 }

@@ -137,7 +137,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("k_z", "rad/s²", "tail").within(-100.0, 100.0).usually(-5.0, 5.0),
             coefficient("k_c", "m/s²", "collective").within(-30.0, 30.0).usually(-2.0, 2.0),
         ],
-        parameters: &[parameter("exponent", "1", "power of the travel").starting(3.0).tried(&[2.0, 3.0]).within(1.5, 4.0)],
+        parameters: &[parameter("exponent", "1", "power of the travel").starting(3.0).tried(&[2.0, 3.0]).within(2.0, 4.0)],
         terms: &[
             (3, Some("k_x"), "sign(u1) * abs(u1)^exponent"),
             (4, Some("k_y"), "sign(u2) * abs(u2)^exponent"),
@@ -148,7 +148,14 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "each stick over most of its travel",
-            confusable_with: &["cyclic_lag", "servo_rate_limit", "stall_saturation", "tail_rotor_inflow"],
+            confusable_with: &[
+                "cyclic_lag",
+                "servo_rate_limit",
+                "stall_saturation",
+                "tail_rotor_inflow",
+                "transl_lift",
+                "rotor_droop",
+            ],
             would_tell_apart: "slow ramps of each stick from end to end",
             source: "crank geometry of servo linkages; a transmitter's exponential curve",
             searched: true,

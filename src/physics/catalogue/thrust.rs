@@ -50,7 +50,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "speeds from hover to three times the induced velocity",
-            confusable_with: &["climb_inflow", "quad_drag"],
+            confusable_with: &["climb_inflow", "quad_drag", "ctrl_nonlin"],
             would_tell_apart: "level flight at constant height at 0, 3, 6 and 12 m/s, and climbs at each",
             source: "momentum theory: v_i = T / (2 rho A sqrt(V^2 + v_i^2)); Padfield ch. 3",
             searched: true,
@@ -78,7 +78,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "climbs and descents in hover and above 6 m/s",
-            confusable_with: &["transl_lift", "quad_drag", "vortex_ring"],
+            confusable_with: &["transl_lift", "quad_drag", "vortex_ring", "inflow_lag"],
             would_tell_apart: "collective doublets in hover and at 10 m/s, climbs and descents at 1 and 3 m/s",
             source: "blade element and momentum theory: Z_w from -1.6 1/s in hover to -3.9 1/s at 10 m/s; Heffley & Mnich",
             searched: true,
@@ -113,7 +113,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "steep descents faster than half the induced velocity",
-            confusable_with: &["climb_inflow", "quad_drag"],
+            confusable_with: &["climb_inflow", "quad_drag", "ctrl_nonlin"],
             would_tell_apart: "vertical descents at 1, 2, 3 and 4 m/s, and the same descents at 6 m/s forward",
             source: "Leishman, Principles of Helicopter Aerodynamics, sec. 2.13.6; Johnson, NASA TP 2005-213477",
             searched: true,
@@ -159,7 +159,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick collective inputs",
-            confusable_with: &["collective_lag", "rotor_droop"],
+            confusable_with: &["collective_lag", "rotor_droop", "climb_inflow"],
             would_tell_apart: "collective steps: the flow overshoots, a servo lag never does",
             source: "Carpenter & Fridovich, NACA TN 3044, 1953; apparent mass 8/3 rho R^3: Pitt & Peters 1981",
             searched: true,

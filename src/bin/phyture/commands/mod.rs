@@ -4,6 +4,7 @@ mod calibrate;
 mod check;
 mod compare;
 mod demo;
+mod diagnose;
 mod parity;
 mod predict;
 mod simulate;
@@ -54,6 +55,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Command::Predict { data, model, network, output, stride } => {
             predict::run(&context, data, &predict::Wanted { model: model.as_deref(), network, output, stride: *stride })
+        }
+        Command::Diagnose { data, model, report, max_effects, division } => {
+            diagnose::run(&context, data, model.as_deref(), report.as_deref(), *max_effects, division)
+        }
+        Command::Loop { data, model, output, report, division } => {
+            diagnose::run_loop(&context, data, model.as_deref(), output, report.as_deref(), division)
         }
         Command::Parity { file } => parity::run(&context, file),
     }
@@ -130,6 +137,15 @@ impl Context<'_> {
             });
         }
         Split::new(flights, &locked, &protocol, self.seed())
+    }
+
+    /// Divides the flights for a search. Where nothing is locked and no split is asked for, every fifth flight confirms and no search
+    /// sees it; of fewer than ten flights the last fifth of each.
+    pub fn search_split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
+        if model.data.locked.is_empty() && division.lock.is_empty() && division.split.is_none() {
+            return Ok(Split::for_search(flights, self.seed()));
+        }
+        self.split(flights, model, division)
     }
 }
 

@@ -1,0 +1,198 @@
+//! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
+
+use super::{CHECK_FAILED, Context, data_sha256};
+use crate::arguments::{Data, Division};
+use phyture::critique::check::check;
+use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose};
+use phyture::flight::DataSet;
+use phyture::flight::split::Split;
+use phyture::physics::{Entry, Model, calibrate};
+use phyture::{Error, Result};
+use serde::Serialize;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Rounds of `loop` before it stops by itself.
+const MOST_ROUNDS: usize = 4;
+
+/// Flights, and what may be searched of them.
+pub struct Task<'a> {
+    /// Flights.
+    pub set: &'a DataSet,
+    /// What is searched and what only confirms.
+    pub split: &'a Split,
+    /// Hash of the files.
+    pub data_sha256: String,
+    /// How to search.
+    pub options: Options,
+}
+
+impl Task<'_> {
+    /// Searches once.
+    pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
+        let searched: Vec<_> = self.split.training.iter().chain(&self.split.validation).copied().collect();
+        let mut outcome = diagnose(&self.set.flights, model, &searched, &self.split.test, self.split.tested.name(), &self.options)?;
+        outcome.diagnosis.data_sha256.clone_from(&self.data_sha256);
+        Ok(outcome)
+    }
+}
+
+/// The verdict where the log is not what the program takes it for.
+fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
+    Diagnosis {
+        verdict: Verdict::ConventionFault,
+        summary,
+        accepted: Vec::new(),
+        steps: Vec::new(),
+        candidates: Vec::new(),
+        unknown: None,
+        locked: None,
+        method: None,
+        notes: Vec::new(),
+        seconds: 0.0,
+        version: env!("CARGO_PKG_VERSION").into(),
+        data_sha256,
+    }
+}
+
+/// Reads and checks the flights and divides them. `None` after a convention fault, which is reported.
+fn prepare(context: &Context, data: &Data, model: &Model, division: &Division) -> Result<Option<(DataSet, Split, String)>> {
+    let set = context.flights(data, 1)?;
+    let sha = data_sha256(data)?;
+    let report = check(&set, Some(model));
+    if report.fault {
+        context.say(format!("\n{report}"));
+        context.json(&convention_fault(report.summary, sha))?;
+        return Ok(None);
+    }
+    context.say(format!("check: {}", report.summary));
+    let split = context.search_split(&set.flights, model, division)?;
+    Ok(Some((set, split, sha)))
+}
+
+/// `diagnose`.
+pub fn run(
+    context: &Context,
+    data: &Data,
+    model: Option<&Path>,
+    report: Option<&Path>,
+    max_effects: usize,
+    division: &Division,
+) -> Result<ExitCode> {
+    let model = context.model(model)?;
+    let Some((set, split, data_sha256)) = prepare(context, data, &model, division)? else {
+        return Ok(ExitCode::from(CHECK_FAILED));
+    };
+    let options = Options { max_effects, seed: context.seed(), ..Options::default() };
+    let task = Task { set: &set, split: &split, data_sha256, options };
+    let outcome = task.diagnose(&model)?;
+    context.say(format!("\n{}", outcome.diagnosis));
+    let _ = report;
+    context.json(&outcome.diagnosis)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// One line of the ledger.
+#[derive(Serialize)]
+struct LedgerLine<'a> {
+    round: usize,
+    effect: &'a str,
+    coefficients: &'a [phyture::critique::diagnose::Number],
+    parameters: &'a [phyture::critique::diagnose::ParameterValue],
+    selection_frequency: f64,
+    indistinguishable: &'a [String],
+    p_value: f64,
+    rmse_locked: Option<phyture::critique::PerChannel>,
+    data_sha256: &'a str,
+    version: &'a str,
+}
+
+/// What `loop --json` writes.
+#[derive(Serialize)]
+struct LoopOutput {
+    rounds: Vec<Diagnosis>,
+    model: PathBuf,
+}
+
+/// What `loop` did.
+pub struct Amended {
+    /// Diagnoses, one a round; the last found nothing more.
+    pub rounds: Vec<Diagnosis>,
+    /// The calibrated model with all that was added.
+    pub model: Model,
+}
+
+/// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger.
+pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
+    let (mut model, _) = calibrate(model, &task.set.flights, &task.split.training)?;
+    let mut rounds = Vec::new();
+    for round in 1..=MOST_ROUNDS {
+        let outcome = task.diagnose(&model)?;
+        context.say(format!("\nRound {round}\n{}", outcome.diagnosis));
+        let found = !outcome.diagnosis.accepted.is_empty();
+        append(ledger, round, &outcome.diagnosis)?;
+        rounds.push(outcome.diagnosis);
+        if !found {
+            break;
+        }
+        let disabled =
+            model.effects.iter().filter(|effect| !effect.enabled && outcome.model.effect(&effect.name).is_none()).cloned();
+        let disabled: Vec<_> = disabled.collect();
+        let mut amended = outcome.model;
+        amended.effects.extend(disabled);
+        model = calibrate(&amended, &task.set.flights, &task.split.training)?.0;
+    }
+    Ok(Amended { rounds, model })
+}
+
+/// Adds lines at the end of the ledger and never changes what is there.
+fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
+    let mut lines = String::new();
+    for (index, step) in diagnosis.steps.iter().enumerate() {
+        let line = LedgerLine {
+            round,
+            effect: &step.effect,
+            coefficients: &step.coefficients,
+            parameters: &step.parameters,
+            selection_frequency: step.selection_frequency,
+            indistinguishable: &step.indistinguishable,
+            p_value: step.p_value,
+            rmse_locked: diagnosis.locked.as_ref().and_then(|locked| locked.waterfall.get(index + 1).copied()),
+            data_sha256: &diagnosis.data_sha256,
+            version: &diagnosis.version,
+        };
+        lines.push_str(&serde_json::to_string(&line).map_err(|error| Error::Undetermined(error.to_string()))?);
+        lines.push('\n');
+    }
+    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(ledger).map_err(Error::io(ledger))?;
+    file.write_all(lines.as_bytes()).and_then(|()| file.sync_all()).map_err(Error::io(ledger))
+}
+
+/// `loop`.
+pub fn run_loop(
+    context: &Context,
+    data: &Data,
+    model: Option<&Path>,
+    output: &Path,
+    report: Option<&Path>,
+    division: &Division,
+) -> Result<ExitCode> {
+    let model = context.model(model)?;
+    let Some((set, split, data_sha256)) = prepare(context, data, &model, division)? else {
+        return Ok(ExitCode::from(CHECK_FAILED));
+    };
+    let options = Options { seed: context.seed(), ..Options::default() };
+    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options };
+    let ledger = output.with_extension("ledger.jsonl");
+    let Amended { rounds, mut model } = amend(context, &task, &model, &ledger)?;
+    model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
+    model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
+    model.provenance.insert("seed".into(), Entry::Text(context.seed().to_string()));
+    model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
+    model.write(output)?;
+    context.say(format!("\nmodel written to {}, ledger {}", output.display(), ledger.display()));
+    let _ = report;
+    context.json(&LoopOutput { rounds, model: output.into() })?;
+    Ok(ExitCode::SUCCESS)
+}
