@@ -5,6 +5,7 @@ pub mod compare;
 pub mod locate;
 pub mod regime;
 pub mod table;
+pub mod unknown;
 pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
