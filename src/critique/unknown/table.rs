@@ -165,14 +165,7 @@ impl ResidualTable {
 
     /// The rows of each block.
     pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
-        let mut ranges: Vec<std::ops::Range<usize>> = Vec::new();
-        for (row, block) in self.block.iter().enumerate() {
-            match ranges.last_mut().filter(|range| self.block.get(range.start) == Some(block)) {
-                Some(range) => range.end = row + 1,
-                None => ranges.push(row..row + 1),
-            }
-        }
-        ranges
+        super::runs(&self.block)
     }
 }
 

@@ -3,15 +3,14 @@
 use super::*;
 use crate::flight::{Accelerations, Flight, Span, Targets};
 use phyture_kernels::random::Stream;
-use proptest::prelude::*;
 
 const STEP_S: f64 = 0.02;
 const SAMPLES: usize = 1500;
 const BLOCK_S: f64 = 15.0;
 
-/// Unit normal from uniforms (sum of twelve).
+/// Near enough to a unit normal: the sum of four uniforms.
 fn normal(stream: Stream, index: u64) -> f64 {
-    (0..12).map(|part| stream.sub(part).uniform(index)).sum::<f64>() - 6.0
+    3_f64.sqrt() * ((0..4).map(|part| stream.uniform(4 * index + part)).sum::<f64>() - 2.0)
 }
 
 /// A stationary first-order process of unit variance with correlation time `tau_s`.
@@ -52,9 +51,8 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
     let mut made = Made { flights: Vec::new(), residual: Vec::new() };
     for flight in 0..count as u64 {
         let stream = |purpose: u64| Stream::new(seed, flight, purpose, 7);
-        let gust: Accelerations = std::array::from_fn(|channel| {
-            gusts(stream(50 + channel as u64), 0.5).into_iter().map(|value| 0.3 * value).collect()
-        });
+        let gust: Accelerations =
+            std::array::from_fn(|channel| gusts(stream(50 + channel as u64), 0.5).into_iter().map(|value| 0.3 * value).collect());
         let of = |purpose: u64, tau_s: f64, scale: f64, mean: f64| -> Vec<f64> {
             smooth(stream(purpose), tau_s).into_iter().map(|value| mean + scale * value).collect()
         };
@@ -72,8 +70,7 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
         let sum = |a: &[f64], b: &[f64], by: f64| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + by * b).collect() };
         let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; SAMPLES]);
         let mut set = |column: Column, values: Vec<f64>| columns[column as usize] = values;
-        let follow: [Vec<f64>; 6] =
-            std::array::from_fn(|channel| response(channel, if channel < 3 { 0.4 } else { 5.0 }));
+        let follow: [Vec<f64>; 6] = std::array::from_fn(|channel| response(channel, if channel < 3 { 0.4 } else { 5.0 }));
         // With feedback the commands are small, so that much of the motion is the response to gusts.
         let command = if feedback > 0.0 { 0.15 } else { 1.0 };
         set(Column::Z, of(1, 5.0, 3.0, 8.0).iter().map(|height| -height).collect());
@@ -136,6 +133,9 @@ fn hidden_dependences_are_named() -> Result<()> {
             let table = made(100 + seed, 40, 0.0)?.with(channel, formula, scale)?.table()?;
             let found = unknown(&table, &UnknownOptions::default())?;
             println!("{formula}: {:?}", found);
+            let search = Search::new(&table, &UnknownOptions::default());
+            let all = search.dependence(&search.features, &table.residual[channel]);
+            println!("   {:.3} {:.3} {:.2}", all.r2_with_feedback, all.r2, all.persists);
             runs += 1;
             let Some(top) = found.first() else { continue };
             assert_eq!(found.len(), 1, "{formula}: only one channel depends: {found:?}");
@@ -181,5 +181,19 @@ fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
     let found = unknown(&table, &UnknownOptions::default())?;
     println!("{found:?}");
     assert!(found.first().is_some_and(|top| top.channel == "vz_dot" && top.depends_on[0].variable == "height"), "{found:?}");
+    Ok(())
+}
+
+/// How long it takes on a full table; run by hand: `cargo test --release --lib critique::unknown -- --ignored --nocapture`.
+#[test]
+#[ignore = "a measurement, not a check"]
+fn time_of_a_full_table() -> Result<()> {
+    for (words, formula) in [("nothing", "0 * t"), ("one dependence", "sin(2 * height)")] {
+        let table = made(1, 80, 0.0)?.with(2, formula, 1.0)?.table()?;
+        let start = std::time::Instant::now();
+        let found = unknown(&table, &UnknownOptions::default())?;
+        let seconds = start.elapsed().as_secs_f64();
+        println!("{words}: {} rows, {} features, {} found, {seconds:.2} s", table.len(), table.names.len(), found.len());
+    }
     Ok(())
 }
