@@ -4,6 +4,7 @@ pub mod check;
 pub mod compare;
 pub mod locate;
 pub mod regime;
+pub mod residual_views;
 pub mod table;
 pub mod unknown;
 pub mod yardstick;

@@ -80,6 +80,21 @@ impl ResidualTable {
         block_s: f64,
         rows_max: usize,
     ) -> Result<Self> {
+        Self::with_rows(flights, spans, residuals, block_s, rows_max, ROW_S)
+    }
+
+    /// As [`ResidualTable::new`] with rows of `row_s` instead of [`ROW_S`]: short ones for spectra.
+    ///
+    /// # Errors
+    /// As [`ResidualTable::new`].
+    pub fn with_rows(
+        flights: &[Flight],
+        spans: &[Span],
+        residuals: &dyn Fn(usize) -> Result<Accelerations>,
+        block_s: f64,
+        rows_max: usize,
+        row_s: f64,
+    ) -> Result<Self> {
         let shape = |message: String| Error::Shape { operation: "residual table", message };
         let mut seconds = 0.0;
         for span in spans {
@@ -87,7 +102,7 @@ impl ResidualTable {
             let flight = flight.ok_or_else(|| shape(format!("span {span:?} lies outside the {} flights", flights.len())))?;
             seconds += (span.end - span.start) as f64 * flight.step_s;
         }
-        let row_s = ROW_S.max(seconds / rows_max.max(1) as f64);
+        let row_s = row_s.max(seconds / rows_max.max(1) as f64);
         let used = |flight: &usize| spans.iter().any(|span| span.flight == *flight);
         let of_spans: Vec<usize> = (0..flights.len()).filter(used).collect();
         let absent = |column: &Column| of_spans.iter().any(|flight| flights[*flight].absent.contains(column));
