@@ -5,7 +5,9 @@ pub mod compare;
 pub mod diagnose;
 pub mod locate;
 pub mod regime;
+pub mod residual_views;
 pub mod table;
+pub mod unknown;
 pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
