@@ -13,10 +13,13 @@ mod fit;
 mod gram;
 mod report;
 mod resample;
+mod rest;
 mod search;
 mod significance;
+mod textbook;
 
 pub use report::{
     CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
 };
 pub use search::{Options, Outcome, diagnose};
+pub use textbook::{Named, textbook};

@@ -197,10 +197,16 @@ pub struct UnknownChannel {
     pub channel: String,
     /// Share of the rest's variance that measured variables predict on blocks not learned from.
     pub r2: f64,
+    /// What R² reaches by chance in one of twenty data sets.
+    pub null_r2_95: f64,
     /// The most important variables first.
     pub depends_on: Vec<DependsOn>,
+    /// The shape in words.
+    pub shape: String,
     /// A formula to paste into the model file.
     pub suggested_formula: Option<String>,
+    /// Its coefficient, to start from.
+    pub suggested_coefficient: Option<f64>,
 }
 
 /// One variable of an unknown dependence.
@@ -289,8 +295,15 @@ impl fmt::Display for Diagnosis {
             let on: Vec<String> =
                 unknown.depends_on.iter().take(3).map(|on| format!("{} ({:.0} %)", on.variable, 100.0 * on.share)).collect();
             writeln!(f, "\nUnknown: {} depends on {} (R2 {:.2})", unknown.channel, on.join(", "), unknown.r2)?;
+            writeln!(f, "   {}", unknown.shape)?;
             if let Some(formula) = &unknown.suggested_formula {
-                writeln!(f, "   to try: {formula}")?;
+                writeln!(
+                    f,
+                    "   to try, in the model file:\n     [[effect]]\n     kind = \"formula\"\n     name = \"suggested_{0}\"\n     \
+                     channel = \"{0}\"\n     formula = \"{formula}\"\n     coefficient = {1:.4}",
+                    unknown.channel,
+                    unknown.suggested_coefficient.unwrap_or_default()
+                )?;
             }
         }
         if let Some(locked) = &self.locked {

@@ -6,6 +6,7 @@ use super::fit::{Reduced, components};
 use super::gram::{blocks, grams};
 use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, Verdict};
 use super::resample::{RESAMPLES, draw, intervals, quantile};
+use super::rest::{channel, dependences, stands_in};
 use super::significance::{Flips, Raw, block_weights, raw_scores};
 use crate::critique::compare::PerChannel;
 use crate::error::Result;
@@ -190,7 +191,40 @@ pub fn diagnose(
             1e3 * delay_s
         ));
     }
-    let (found, left) = search.forward(&before, &candidates)?;
+    let (mut found, mut left) = search.forward(&before, &candidates)?;
+    let fitted = |found: &[Found]| found.last().map_or(&before, |last| &last.model).clone();
+    let mut unknown = dependences(flights, &fitted(&found), searched, block_s, options.seed)?;
+    // Effects that only stand in for a dependence outside the catalogue are taken back, all at once.
+    let pass = search.engine.pass(&before, &[fitted(&found)])?;
+    let remaining = pass.trials.first().and_then(Option::as_ref).map_or([0.0; 6], |trial| search.engine.mse(trial));
+    let whole = search.engine.mse(&pass.base);
+    let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - remaining[channel]);
+    let stand_ins: Vec<String> = found
+        .iter()
+        .filter(|found| {
+            let effect = found.model.effect(&found.step.effect);
+            effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &remaining, &unknown))
+        })
+        .map(|found| found.step.effect.clone())
+        .collect();
+    if !stand_ins.is_empty() {
+        for found in found.iter().filter(|found| stand_ins.contains(&found.step.effect)) {
+            left.insert(
+                0,
+                CandidateReport {
+                    effect: found.step.effect.clone(),
+                    status: Status::SamePhysics,
+                    held_out_mse_fall: found.step.held_out_mse_fall.clone(),
+                    p_value: Some(found.step.p_value),
+                    detection_limit_mse_fall: None,
+                    note: Some("stands in for a stronger dependence that is in no effect of the catalogue".into()),
+                },
+            );
+        }
+        search.without(&mut found, &stand_ins, &before)?;
+        unknown = dependences(flights, &fitted(&found), searched, block_s, options.seed)?;
+    }
+    search.intervals(&mut found)?;
     let mut models = vec![before.clone()];
     models.extend(found.iter().map(|found| found.model.clone()));
     let after = models.last().cloned().unwrap_or(before);
@@ -212,7 +246,12 @@ pub fn diagnose(
         );
     }
     diagnosis.locked = confirm(flights, &models, locked, part, block_s, search.engine.correlation)?;
-    diagnosis.verdict = if diagnosis.accepted.is_empty() { Verdict::Explained } else { Verdict::EffectsMissing };
+    diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {
+        (false, _) => Verdict::EffectsMissing,
+        (true, false) => Verdict::NotInCatalogue,
+        (true, true) => Verdict::Explained,
+    };
+    diagnosis.unknown = (!unknown.is_empty()).then(|| unknown.iter().map(channel).collect());
     diagnosis.summary = summary(&diagnosis);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(Outcome { diagnosis, model: after })
@@ -223,6 +262,8 @@ struct Found {
     step: Step,
     gain: f64,
     model: Model,
+    /// Channels in which it is worth while.
+    channels: Vec<usize>,
     /// Effects that it is mistaken for.
     confusable: &'static [&'static str],
     /// Mean squared errors before it was accepted, and what it took from them.
@@ -319,7 +360,6 @@ impl Search<'_> {
             let Some(best) = best.filter(|_| found.len() < self.options.max_effects) else {
                 let reports = self.reports(&open, &scored);
                 self.backward(&mut found, before)?;
-                self.intervals(&mut found)?;
                 return Ok((found, reports));
             };
             // The simplest of those that are as good to within one standard error.
@@ -356,6 +396,7 @@ impl Search<'_> {
                 step,
                 gain: chosen.gain,
                 model: refined.model.clone(),
+                channels: chosen.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).map(|(&channel, _)| channel).collect(),
                 confusable,
                 mse_before: mse,
                 removed: [0.0; 6],
@@ -390,15 +431,20 @@ impl Search<'_> {
             if costs[needless] >= SMALLEST_FALL {
                 return Ok(());
             }
-            found.remove(needless);
-            // The models of the steps from there on are rebuilt without it.
-            let kept: Vec<crate::physics::Effect> =
-                found.iter().filter_map(|found| found.model.effect(&found.step.effect).cloned()).collect();
-            let mut model = before.clone();
-            for (found, effect) in found.iter_mut().zip(kept) {
-                model = self.engine.pass(&with(&model, &effect), &[])?.base.model;
-                found.model = model.clone();
-            }
+            let needless = found[needless].step.effect.clone();
+            self.without(found, &[needless], before)?;
+        }
+        Ok(())
+    }
+
+    /// Takes effects back and fits the models of all steps again.
+    fn without(&self, found: &mut Vec<Found>, names: &[String], before: &Model) -> Result<()> {
+        found.retain(|found| !names.contains(&found.step.effect));
+        let mut model = before.clone();
+        for found in found {
+            let Some(effect) = found.model.effect(&found.step.effect).cloned() else { continue };
+            model = self.engine.pass(&with(&model, &effect), &[])?.base.model;
+            found.model = model.clone();
         }
         Ok(())
     }
@@ -893,6 +939,18 @@ fn summary(diagnosis: &Diagnosis) -> String {
         Verdict::EffectsMissing => {
             let names: Vec<String> = diagnosis.steps.iter().map(falls).collect();
             format!("The model lacks {}.", names.join(", then "))
+        }
+        Verdict::NotInCatalogue => {
+            let parts: Vec<String> = diagnosis
+                .unknown
+                .iter()
+                .flatten()
+                .map(|unknown| {
+                    let on = unknown.depends_on.first().map_or("?", |first| first.variable.as_str());
+                    format!("{} depends on {on} ({:.0} % of what is left)", unknown.channel, 100.0 * unknown.r2)
+                })
+                .collect();
+            format!("Something is missing that is not in the catalogue: {}.", parts.join("; "))
         }
         Verdict::Explained => {
             "No effect of the catalogue is missing that these flights could show and that would be worth while.".into()

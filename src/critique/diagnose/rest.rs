@@ -1,0 +1,61 @@
+//! What is left when the search has ended: does it still depend on something measured, and does that cast doubt on what was named?
+//!
+//! An effect outside the catalogue is mimicked in part by one inside. The sign of it: in the channel in which the named effect was
+//! worth while, the rest depends on a variable that the effect reads, and more of the error depends so than the effect removed.
+
+use super::report::{DependsOn, UnknownChannel};
+use crate::critique::unknown::{ROWS_MAX, ResidualTable, Unknown, UnknownOptions, unknown};
+use crate::error::Result;
+use crate::flight::{Accelerations, Column, Flight, Span};
+use crate::physics::{Effect, Model};
+
+/// Looks for a dependence of measured minus predicted acceleration. Nothing found is an empty list; too little data too.
+pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], block_s: f64, seed: u64) -> Result<Vec<Unknown>> {
+    let residual = |flight: usize| -> Result<Accelerations> {
+        let Some(flight) = flights.get(flight) else { return Ok(Accelerations::default()) };
+        let mut residual = model.predict(flight)?;
+        for (values, target) in residual.iter_mut().zip(Column::TARGETS) {
+            values.iter_mut().zip(flight.column(target)).for_each(|(value, measured)| *value = measured - *value);
+        }
+        Ok(residual)
+    };
+    let table = ResidualTable::new(flights, spans, &residual, block_s, ROWS_MAX)?;
+    match unknown(&table, &UnknownOptions { seed, ..UnknownOptions::default() }) {
+        Err(crate::Error::Undetermined(_)) => Ok(Vec::new()),
+        found => found,
+    }
+}
+
+/// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the
+/// effects accepted there took away and that remain.
+pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6], left: &[f64; 6], unknown: &[Unknown]) -> bool {
+    channels.iter().any(|&channel| {
+        let name = Column::TARGETS.get(channel).map_or("", |column| column.name());
+        unknown.iter().filter(|unknown| unknown.channel == name).any(|unknown| {
+            let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
+            let mut formulas = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
+            let reads = formulas.any(|formula| formula.names().iter().any(|name| related(name, variable)));
+            reads && unknown.r2 * left[channel] > removed[channel]
+        })
+    })
+}
+
+/// Whether two names speak of the same motion: a speed is made of velocities.
+fn related(name: &str, variable: &str) -> bool {
+    let speeds = |name: &str| ["airspeed", "hypot(vx, vy)"].contains(&name);
+    let velocities = |name: &str| ["vx", "vy", "vz"].contains(&name);
+    name == variable || speeds(name) && (velocities(variable) || speeds(variable)) || velocities(name) && speeds(variable)
+}
+
+/// For the report.
+pub(super) fn channel(unknown: &Unknown) -> UnknownChannel {
+    UnknownChannel {
+        channel: unknown.channel.into(),
+        r2: unknown.r2,
+        null_r2_95: unknown.null_r2_95,
+        depends_on: unknown.depends_on.iter().map(|on| DependsOn { variable: on.variable.clone(), share: on.share }).collect(),
+        shape: unknown.skeleton.clone(),
+        suggested_formula: unknown.suggested_formula.as_ref().map(|suggested| suggested.formula.clone()),
+        suggested_coefficient: unknown.suggested_formula.as_ref().map(|suggested| suggested.coefficient),
+    }
+}
