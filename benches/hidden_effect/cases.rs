@@ -1,0 +1,124 @@
+//! What is hidden: effects and sizes, pairs, effects outside the catalogue, and the truth in the catalogue's terms. No running here.
+//!
+//! Development seeds, on which gates and grids were chosen: 1 to 99. Reported seeds: 20000 and above.
+
+/// An effect of the simulator that the catalogue knows, with its truth at scale 1.
+pub struct Single {
+    /// Identifier, the simulator's and the catalogue's.
+    pub id: &'static str,
+    /// Odds of the removable share at scale 1: s/(1 − s) of the best channel, on development seeds, at level one.
+    pub odds: f64,
+    /// Main number in the catalogue's terms at scale 1, if it is comparable; scales linearly …
+    pub truth: Option<(&'static str, f64)>,
+    /// … or inversely (a rate limit).
+    pub inverse: bool,
+    /// Removed by a change of signals, with hidden state.
+    pub dynamic: bool,
+}
+
+const fn fixed(id: &'static str, odds: f64, name: &'static str, value: f64) -> Single {
+    Single { id, odds, truth: Some((name, value)), inverse: false, dynamic: false }
+}
+
+const fn dynamic(id: &'static str, odds: f64, name: &'static str, value: f64) -> Single {
+    Single { id, odds, truth: Some((name, value)), inverse: false, dynamic: true }
+}
+
+/// Single effects. Numbers of the simulator (`src/sim/`) written in the catalogue's terms.
+pub const SINGLES: &[Single] = &[
+    fixed("quad_drag", 0.16, "k_z", -0.5 * 1.2 * 0.10 / 4.58),
+    fixed("vel_cross", 1.3, "x_vz", 0.10),
+    fixed("inertia_cross", 1.6, "i_xz", 0.025),
+    fixed("ctrl_cross", 16.0, "x_u2", 0.105 * 70.0),
+    fixed("flap_tilt", 0.036, "tilt", 0.08),
+    fixed("tail_side_force", 1.4, "k_u", -50.0 * 0.28 / (4.58 * 0.91)),
+    fixed("collective_torque", 33.0, "k", -1.2 / 0.28),
+    fixed("heave_torque", 3.0, "n_w", 4.58 * 9.80665 / (188.5 * 0.28)),
+    Single { id: "transl_lift", odds: 9.0, truth: None, inverse: false, dynamic: false },
+    Single { id: "climb_inflow", odds: 6.0, truth: None, inverse: false, dynamic: false },
+    Single { id: "inflow_lag", odds: 1.6, truth: None, inverse: false, dynamic: true },
+    fixed("vortex_ring", 0.8, "k", -0.25),
+    fixed("ground_effect", 0.036, "k", 1.0),
+    fixed("rate_cross", 26.0, "x_q", 2.2),
+    dynamic("cyclic_lag", 16.0, "tau_x_s", 16.0 / (1.7 * 188.5)),
+    dynamic("ctrl_delay", 14.0, "delay_s", 0.040),
+    Single { id: "servo_rate_limit", odds: 8.0, truth: Some(("rate_per_s", 4.0)), inverse: true, dynamic: true },
+    dynamic("tail_lag", 9.0, "tau_s", 0.060),
+    dynamic("collective_lag", 7.0, "tau_s", 0.060),
+    Single { id: "rotor_droop", odds: 2.3, truth: None, inverse: false, dynamic: true },
+    Single { id: "stall_saturation", odds: 0.35, truth: None, inverse: true, dynamic: false },
+    fixed("ctrl_nonlin", 2.3, "k_x", 0.2 * 70.0),
+    fixed("weathercock", 9.0, "k_fin", 0.5 * 1.2 * 0.012 * 2.0 * 0.91 / 0.28),
+    fixed("dihedral_speedstab", 18.0, "l_v", -0.5),
+    fixed("speed_damping", 2.7, "k_x", -0.225),
+    fixed("tail_rotor_inflow", 2.0, "k_speed", 1.0),
+    Single { id: "wind", odds: 10.0, truth: None, inverse: false, dynamic: false },
+    fixed("imu_lever", 1.6, "r_x", 0.08),
+    fixed("cg_offset", 6.5, "x_m", 0.008),
+    fixed("tilt_misalign", 0.55, "d_x", -0.026),
+    Single { id: "sensor_bias", odds: 1.8, truth: None, inverse: false, dynamic: false },
+    fixed("mass_drift", 1.0, "k", 0.1 / 30.0),
+    fixed("sync", 0.25, "attitude_s", 0.020),
+];
+
+/// Removable shares aimed at: large, medium, small.
+pub const SIZES: [(&str, f64); 3] = [("large", 0.5), ("medium", 0.11), ("small", 0.035)];
+
+/// Pairs hidden together, each at a share of 30 % of its own.
+pub const PAIRS: &[(&str, &str)] = &[
+    ("quad_drag", "collective_torque"),
+    ("ground_effect", "weathercock"),
+    ("dihedral_speedstab", "rate_cross"),
+    ("cyclic_lag", "tail_side_force"),
+    ("ctrl_cross", "heave_torque"),
+    ("transl_lift", "speed_damping"),
+    ("imu_lever", "cg_offset"),
+    ("tilt_misalign", "collective_lag"),
+    ("wind", "tail_rotor_inflow"),
+    ("rotor_droop", "inertia_cross"),
+    ("ctrl_delay", "weathercock"),
+    ("vortex_ring", "tail_lag"),
+    ("vel_cross", "dihedral_speedstab"),
+    ("sensor_bias", "ctrl_cross"),
+    ("climb_inflow", "rate_cross"),
+];
+
+/// Truth and the rival it is mistaken for; found if the truth is in the set that is reported.
+pub const CONFUSABLE: &[(&str, &str)] = &[
+    ("cyclic_lag", "ctrl_delay"),
+    ("ctrl_delay", "cyclic_lag"),
+    ("rotor_droop", "collective_lag"),
+    ("collective_lag", "inflow_lag"),
+    ("wind", "tilt_misalign"),
+    ("tilt_misalign", "wind"),
+    ("quad_drag", "speed_damping"),
+    ("ctrl_cross", "rate_cross"),
+    ("rate_cross", "ctrl_cross"),
+    ("sensor_bias", "wind"),
+];
+
+/// Outside the catalogue: channel, formula that is added to the recorded acceleration, and the variable that is to be named.
+pub const ALIENS: &[(&str, &str, &str)] = &[
+    ("vx_dot", "0.6 * sin(2 * height)", "height"),
+    ("vy_dot", "0.6 * sin(1.5 * vx)", "vx"),
+    ("vz_dot", "0.6 * sin(3 * yaw)", "yaw"),
+    ("wx_dot", "0.8 * cos(2 * yaw)", "yaw"),
+    ("wy_dot", "1.2 * exp(-((vx - 4) / 1.5)^2)", "vx"),
+    ("wz_dot", "0.8 * tanh(2 * (height - 6))", "height"),
+    ("vx_dot", "0.6 * sin(2.5 * vz)", "vz"),
+    ("wz_dot", "0.8 * cos(1.2 * vy)", "vy"),
+    ("vy_dot", "0.7 * cos(4 * pitch)", "pitch"),
+    ("wx_dot", "0.8 * sin(2.5 * height)", "height"),
+    ("wy_dot", "0.8 * sin(2 * wz)", "wz"),
+    ("vz_dot", "0.6 * cos(1.5 * vy)", "vy"),
+    ("vx_dot", "0.7 * cos(6 * u4)", "u4"),
+    ("wz_dot", "0.8 * (height < 4)", "height"),
+    ("vy_dot", "0.6 * sin(2 * height)", "height"),
+    ("wx_dot", "0.9 * cos(1.2 * vx)", "vx"),
+    ("vz_dot", "0.6 * sin(2 * height)", "height"),
+    ("wy_dot", "0.9 * sin(2 * yaw)", "yaw"),
+];
+
+/// Mechanisms of the simulator that no entry of the catalogue describes, and the variables either of which is right.
+pub const FOREIGN: &[(&str, &[&str])] =
+    &[("tail_wake", &["vx", "airspeed", "hypot(vx, vy)"]), ("fuselage_wake", &["u4", "vx", "vy", "vz", "airspeed"])];
