@@ -4,6 +4,8 @@ mod calibrate;
 mod check;
 mod compare;
 mod demo;
+mod effect;
+mod implant;
 mod parity;
 mod predict;
 mod simulate;
@@ -54,6 +56,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Command::Predict { data, model, network, output, stride } => {
             predict::run(&context, data, &predict::Wanted { model: model.as_deref(), network, output, stride: *stride })
+        }
+        Command::Effect { command } => effect::run(&context, command),
+        Command::Implant { data, dir, effect, formula, scale, size, model } => {
+            let (effect, formula, model) = (effect.as_deref(), formula.as_deref(), model.as_deref());
+            implant::run(&context, data, dir, &implant::Wanted { effect, formula, scale: *scale, size, model })
         }
         Command::Parity { file } => parity::run(&context, file),
     }
