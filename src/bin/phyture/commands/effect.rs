@@ -3,6 +3,7 @@
 use super::Context;
 use crate::arguments::EffectCommand;
 use phyture::flight::Column;
+use phyture::formula::Formula;
 use phyture::physics::catalogue::{definition, definitions};
 use phyture::physics::{Definition, Effect, Model, Origin, standard_names};
 use phyture::suggest::did_you_mean;
@@ -86,10 +87,10 @@ fn text(definition: &Definition) -> String {
     line(0, String::new());
     for (channel, coefficient, regressor) in definition.terms {
         let column = Column::TARGETS[*channel];
-        let factor = coefficient.map(|name| format!("{name} * ")).unwrap_or_default();
-        let product = factor.is_empty() || !regressor.contains([' ']) || regressor.starts_with('(') && !regressor.contains(") ");
-        let regressor = if product { (*regressor).to_owned() } else { format!("({regressor})") };
-        line(2, format!("{:<6} += {factor}{regressor}   [{}]", column.name(), column.unit()));
+        let product = coefficient.map_or_else(|| (*regressor).to_owned(), |name| format!("{name} * ({regressor})"));
+        // Printed with no more brackets than it needs.
+        let product = Formula::parse(&product).map_or(product, |formula| formula.to_string());
+        line(2, format!("{:<6} += {product}   [{}]", column.name(), column.unit()));
     }
     for swap in definition.swaps {
         let within = if swap.within.is_empty() { "everywhere".into() } else { format!("in {}", swap.within.join(", ")) };
