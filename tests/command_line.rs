@@ -24,6 +24,10 @@ fn bad_usage_and_bad_input_exit_with_2_and_say_what_is_wrong() -> Result<()> {
         (&["simulate", "data", "--hide", "ground_efect"], "ground_effect"),
         (&["simulate", "data", "--hide", "ground_effect=much"], "EFFECT=SCALE"),
         (&["parity", "nothing.safetensors"], "nothing.safetensors"),
+        (&["effect", "show", "grund_effect"], "did you mean `ground_effect`?"),
+        (&["effect", "show", "linear_drag"], "an effect of the catalogue"),
+        (&["effect", "add", "wind", "-m", "none.toml", "-o", "out.toml"], "none.toml"),
+        (&["implant", "data", "out"], "--effect"),
     ];
     for (arguments, message) in wrong {
         let output = phyture(place.path(), arguments)?;
@@ -48,6 +52,67 @@ fn results_go_to_standard_output_as_json_alone_when_asked() -> Result<()> {
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
         let parsed: std::result::Result<serde_json::Value, _> = serde_json::from_slice(&output.stdout);
         assert!(parsed.is_ok_and(|value| value.get(key).is_some()), "{arguments:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn an_effect_is_listed_shown_and_added_once() -> Result<()> {
+    let place = folder()?;
+    let list = phyture(place.path(), &["effect", "list"])?;
+    let text = String::from_utf8_lossy(&list.stdout).into_owned();
+    assert!(list.status.success() && text.lines().count() > 34, "{text}");
+    assert!(text.lines().any(|line| line.starts_with("cyclic_lag") && line.contains("wx_dot wy_dot ")), "{text}");
+    let show = phyture(place.path(), &["effect", "show", "ground_effect"])?;
+    let text = String::from_utf8_lossy(&show.stdout).into_owned();
+    for part in ["vz_dot += k * ", "usually 0.6 to 1.3", "tried: 0, 0.2, 0.4", "Mistaken for      rotor_droop", "Cheeseman"] {
+        assert!(text.contains(part), "{part} in\n{text}");
+    }
+    let json = phyture(place.path(), &["effect", "show", "wind", "--json", "-"])?;
+    let value: serde_json::Value = serde_json::from_slice(&json.stdout).map_err(|error| Error::Undetermined(error.to_string()))?;
+    assert_eq!(value["coefficients"][0]["by_flight"].as_f64(), Some(3.0));
+
+    let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).map_err(Error::io("model"));
+    write("n9.toml", "[model]\nbaseline = \"paper\"\n")?;
+    let added = phyture(place.path(), &["effect", "add", "wind", "-m", "n9.toml", "-o", "with.toml"])?;
+    assert!(added.status.success(), "{}", String::from_utf8_lossy(&added.stderr));
+    let model = phyture::physics::Model::read(place.path().join("with.toml"))?;
+    assert_eq!(model.effect("wind").and_then(|effect| effect.added_by.as_deref()), Some("effect add"));
+    write("quad.toml", "[model]\nbaseline = \"paper\"\nvehicle = \"multirotor\"\n")?;
+    write("bare.toml", "[model]\n")?;
+    for (arguments, part) in [
+        (["wind", "with.toml"], "already there"),
+        (["wind", "bare.toml"], "nothing that gives `linear_drag_a_x`, which `wind` reads"),
+        (["flap_tilt", "quad.toml"], "one for which `flap_tilt` makes sense: helicopter"),
+    ] {
+        let refused = phyture(place.path(), &["effect", "add", arguments[0], "-m", arguments[1], "-o", "no.toml"])?;
+        let text = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(refused.status.code() == Some(2) && text.contains(part), "{arguments:?}: {text}");
+    }
+    assert!(!place.path().join("no.toml").exists());
+    Ok(())
+}
+
+#[test]
+fn implanted_flights_are_read_like_any_and_carry_their_truth() -> Result<()> {
+    let place = folder()?;
+    assert!(phyture(place.path(), &["simulate", "data", "--minutes", "2", "--baseline", "--seed", "7302"])?.status.success());
+    for (name, wanted) in [
+        ("drag", &["--effect", "quad_drag", "--scale", "2"][..]),
+        ("droop", &["--effect", "rotor_droop", "--size", "k=-0.2", "--size", "tau_s=0.5"]),
+        ("odd", &["--formula", "wx_dot = 1.5*sin(3*height)"]),
+    ] {
+        let output = phyture(place.path(), &[&["implant", "data", name][..], wanted].concat())?;
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+        let truth = std::fs::read(place.path().join(name).join("truth.json")).map_err(Error::io("truth.json"))?;
+        let truth: serde_json::Value = serde_json::from_slice(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
+        let (vx, wx) = (truth["rms"]["vx_dot"].as_f64().unwrap_or(f64::NAN), truth["rms"]["wx_dot"].as_f64().unwrap_or(f64::NAN));
+        match name {
+            "drag" => assert!(vx > 0.05 && wx == 0.0, "{truth}"),
+            "droop" => assert!(truth["coefficients"][0]["value"].as_f64() == Some(-0.2) && wx > 0.0, "{truth}"),
+            _ => assert!((0.5..1.5).contains(&wx) && truth["effect"] == "implanted", "{truth}"),
+        }
+        assert!(phyture(place.path(), &["calibrate", name, "-o", "model.toml"])?.status.success(), "{name}");
     }
     Ok(())
 }

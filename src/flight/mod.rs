@@ -164,6 +164,24 @@ impl Flight {
         self.step_s * self.len() as f64
     }
 
+    /// The six acceleration targets.
+    pub fn accelerations(&self) -> Accelerations {
+        Column::TARGETS.map(|target| self.column(target).to_vec())
+    }
+
+    /// The same flight with other accelerations.
+    ///
+    /// # Errors
+    /// [`Error::Log`] as [`Flight::new`].
+    pub fn with_accelerations(&self, accelerations: &Accelerations) -> Result<Self> {
+        let columns = Column::ALL.map(|column| match Column::TARGETS.iter().position(|target| *target == column) {
+            Some(channel) => accelerations[channel].clone(),
+            None => self.column(column).to_vec(),
+        });
+        let made = Self::new(self.name.clone(), self.manoeuvre.clone(), self.start_s, self.step_s, columns, self.targets)?;
+        Ok(Self { absent: self.absent.clone(), extra: self.extra.clone(), ..made })
+    }
+
     /// The samples `range` as a flight of its own, with a new name. Panics never: the range is cut to what is there.
     pub fn slice(&self, range: std::ops::Range<usize>, name: impl Into<String>) -> Option<Self> {
         let range = range.start.min(self.len())..range.end.min(self.len());

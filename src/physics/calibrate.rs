@@ -1,17 +1,35 @@
 //! Calibration: the coefficients of a model's enabled effects by least squares on recorded flights (paper eq. 33), with units,
 //! 95 % intervals and a condition number; and a refusal that names the reason where the data do not determine them.
+//!
+//! What stands in which column is in `layout`, the algebra in `least_squares`, and coefficients that belong to a flight in `by_flight`.
 
-use super::evaluate::{Place, Program, not_finite};
-use super::least_squares::{Cluster, Factor, Failure, Problem, solve};
+use super::by_flight;
+use super::catalogue;
+use super::layout::Layout;
+use super::least_squares::{Cluster, solve};
 use super::model::Model;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Flight, Span};
+use std::collections::BTreeMap;
 
 /// Clusters that the whole of the data is cut into for the intervals, unless it is cut into more by flights.
 const CLUSTERS: usize = 40;
 
 /// Clusters are not made shorter than this, s.
 const SHORTEST_CLUSTER_S: f64 = 1.0;
+
+/// Formulas may read the values of other coefficients, so a calibration is repeated until those have settled; at most so often.
+const MOST_ROUNDS: usize = 8;
+
+/// Coefficients that formulas read have settled when none moves by more than this share of itself.
+const SETTLED: f64 = 1e-9;
+
+/// Share from which a person should know that they have not.
+const WORTH_SAYING: f64 = 1e-6;
+
+/// How far a round may go, in steps of the plain iteration.
+const SHORTEST_STRIDE: f64 = 0.2;
+const LONGEST_STRIDE: f64 = 4.0;
 
 /// One calibrated coefficient.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -20,12 +38,24 @@ pub struct Estimate {
     pub effect: String,
     /// Name of the coefficient.
     pub name: String,
-    /// Value, in [`Estimate::unit`].
+    /// Value, in [`Estimate::unit`]; for a property of each flight, the mean over the flights.
     pub value: f64,
-    /// 95 % confidence interval, valid for residuals that are correlated in time.
-    pub ci95: [f64; 2],
+    /// 95 % confidence interval, valid for residuals that are correlated in time. `None` for a property of each flight; the intervals
+    /// of the others hold given those properties, whose own uncertainty they leave out.
+    pub ci95: Option<[f64; 2]>,
     /// Unit.
     pub unit: String,
+    /// Values that physics allows, where the catalogue knows them. Calibration does not enforce them.
+    pub bounds: Option<[f64; 2]>,
+    /// For a property of each flight: its value by name of the flight.
+    pub by_flight: Option<BTreeMap<String, f64>>,
+}
+
+impl Estimate {
+    /// Whether the value lies where physics does not allow it.
+    pub fn is_implausible(&self) -> bool {
+        self.bounds.is_some_and(|[low, high]| !(low..=high).contains(&self.value))
+    }
 }
 
 /// What a calibration found.
@@ -39,13 +69,36 @@ pub struct Calibration {
     pub rows: usize,
     /// Stretches of consecutive rows that the intervals rest on.
     pub clusters: usize,
+    /// Rounds it took; more than one if formulas read the values of coefficients.
+    pub rounds: usize,
+    /// Largest relative change, in the last round, of a coefficient that formulas read.
+    pub last_change: f64,
 }
 
 impl std::fmt::Display for Calibration {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         writeln!(f, "{:<20} {:<8} {:>12}   {:<27} unit", "effect", "name", "value", "95 % interval")?;
-        for Estimate { effect, name, value, ci95: [low, high], unit } in &self.coefficients {
-            writeln!(f, "{effect:<20} {name:<8} {value:>12.5}   [{low:>11.5}, {high:>11.5}]    {unit}")?;
+        for estimate in &self.coefficients {
+            let Estimate { effect, name, value, ci95, unit, bounds, by_flight } = estimate;
+            let interval = match (ci95, by_flight) {
+                (Some([low, high]), _) => format!("[{low:>11.5}, {high:>11.5}]"),
+                (None, Some(flights)) => {
+                    let (low, high) = flights
+                        .values()
+                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
+                    format!("{low:.3} to {high:.3} in {} flights", flights.len())
+                }
+                (None, None) => String::new(),
+            };
+            write!(f, "{effect:<20} {name:<8} {value:>12.5}   {interval:<27} {unit}")?;
+            match bounds {
+                Some([low, high]) if estimate.is_implausible() => writeln!(f, "   outside its physical bounds {low} to {high}")?,
+                _ => writeln!(f)?,
+            }
+        }
+        if self.last_change > WORTH_SAYING {
+            let change = self.last_change;
+            writeln!(f, "coefficients that formulas read still moved by {change:.1e} of themselves after {} rounds", self.rounds)?;
         }
         write!(
             f,
@@ -55,15 +108,17 @@ impl std::fmt::Display for Calibration {
     }
 }
 
-/// One free coefficient: indices of its effect and of itself in the effect.
-type Free = (usize, usize);
-
 /// Fits the free coefficients of the enabled effects to the measured accelerations in `spans` and returns the model with the
 /// values and intervals set.
 ///
 /// The regressand is the measured acceleration minus the terms without a coefficient. Every channel is fitted by itself in
 /// physical units, unweighted; channels that share a coefficient are fitted together, weighted by residual variance.
 /// Overlapping spans count once. Hidden state (lags, delays) runs from the start of each flight.
+///
+/// Where formulas read the values of coefficients (a thrust, a predicted acceleration), the fit is repeated with the values found until
+/// those that are read have settled, at most eight times; if one that is read is still zero, the first fit leaves out the effects
+/// that read. Coefficients of a flight (wind, bias) are estimated with the others at once, with a prior from the
+/// catalogue; a flight outside the spans gets their mean, and the intervals of the others hold given them.
 ///
 /// # Errors
 /// [`Error::Undetermined`] naming the coefficients and why the data do not determine them; otherwise as [`Model::predict`].
@@ -73,6 +128,65 @@ pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(M
         let (found, expected) = (span.flight.to_string(), format!("an index of the {} flights", flights.len()));
         return Err(Error::Config { place: "calibrate".into(), field: "span.flight".into(), found, expected });
     }
+    let mut read: Vec<(usize, usize)> = Vec::new();
+    let mut bare = model.clone();
+    for (effect, left_out) in model.effects.iter().zip(&mut bare.effects).filter(|(effect, _)| effect.enabled) {
+        let reads = model.coefficients_read(effect)?;
+        left_out.enabled = reads.is_empty();
+        read.extend(reads);
+    }
+    // Each once, or it would be moved more than once a round.
+    read.sort_unstable();
+    read.dedup();
+    let values = |model: &Model| -> Vec<f64> {
+        let value = |&(effect, index): &(usize, usize)| Some(model.effects.get(effect)?.coefficients.get(index)?.value);
+        read.iter().map(|place| value(place).unwrap_or_default()).collect()
+    };
+    let mut current = model.clone();
+    if values(model).contains(&0.0) {
+        // A thrust of zero makes the regressors that scale with it vanish.
+        let (found, _) = fit(&bare, flights, spans)?;
+        for (effect, found) in current.effects.iter_mut().zip(found.effects).filter(|(_, found)| found.enabled) {
+            effect.coefficients = found.coefficients;
+        }
+    }
+    // The rounds are a fixed-point iteration of the values read; its steps are lengthened or shortened by what the step before did (Irons &
+    // Tuck 1969, Int. J. Numerical Methods in Engineering 1:275), without which alike regressors settle slowly.
+    let mut round = 1;
+    let (mut stride, mut residual_before): (f64, Option<Vec<f64>>) = (1.0, None);
+    loop {
+        let before = values(&current);
+        let (found, mut calibration) = fit(&current, flights, spans)?;
+        let residual: Vec<f64> = values(&found)
+            .into_iter()
+            .zip(&before)
+            .map(|(now, before)| (now - before) / now.abs().max(before.abs()).max(f64::MIN_POSITIVE))
+            .collect();
+        let last_change = residual.iter().fold(0.0_f64, |largest, change| largest.max(change.abs()));
+        (calibration.rounds, calibration.last_change) = (round, last_change);
+        if last_change <= SETTLED || round == MOST_ROUNDS {
+            return Ok((found, calibration));
+        }
+        if let Some(earlier) = &residual_before {
+            let change: Vec<f64> = residual.iter().zip(earlier).map(|(now, earlier)| now - earlier).collect();
+            let along: f64 = change.iter().zip(earlier).map(|(change, earlier)| change * earlier).sum();
+            let square: f64 = change.iter().map(|change| change * change).sum();
+            stride = if square > 0.0 { (-stride * along / square).max(SHORTEST_STRIDE).min(LONGEST_STRIDE) } else { 1.0 };
+        }
+        current = found;
+        for (&(effect, index), before) in read.iter().zip(before) {
+            let coefficient = current.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
+            if let Some(coefficient) = coefficient {
+                coefficient.value = before + stride * (coefficient.value - before);
+            }
+        }
+        residual_before = Some(residual);
+        round += 1;
+    }
+}
+
+/// One round: every formula reads the values that the model has.
+fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
     let layout = Layout::of(model);
     let ranges: Vec<Vec<(usize, usize)>> = (0..flights.len()).map(|flight| union(flight, spans, flights)).collect();
     let rows: Vec<usize> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum()).collect();
@@ -101,6 +215,22 @@ pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(M
     let mut clusters: Vec<Cluster> = reduced?.into_iter().flatten().collect();
 
     let mut calibrated = model.clone();
+    if !layout.own.is_empty() {
+        let shape = by_flight::Shape { free: layout.free.len(), channels: &layout.channels, own: &layout.own_columns(model) };
+        let settled = by_flight::settle(&shape, &mut clusters).map_err(|failure| layout.explain(model, &layout.free, &failure))?;
+        clusters = settled.clusters;
+        for (place, &(effect, index)) in layout.own.iter().enumerate() {
+            let coefficient = calibrated.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
+            let Some(coefficient) = coefficient else { continue };
+            let values: BTreeMap<String, f64> = settled
+                .values
+                .iter()
+                .filter_map(|(&flight, values)| Some((flights.get(flight)?.name.clone(), *values.get(place)?)))
+                .collect();
+            coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
+            (coefficient.ci95, coefficient.by_flight) = (None, Some(values));
+        }
+    }
     let mut condition_number = 1.0_f64;
     for (members, problem) in layout.problems() {
         let solution = solve(&problem, &mut clusters).map_err(|failure| layout.explain(model, &members, &failure))?;
@@ -112,8 +242,9 @@ pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(M
             }
         }
     }
-    let coefficients = layout.free.iter().filter_map(|&(effect, index)| estimate(&calibrated, effect, index)).collect();
-    let calibration = Calibration { coefficients, condition_number, rows: total, clusters: clusters.len() };
+    let coefficients = layout.all().into_iter().filter_map(|(effect, index)| estimate(&calibrated, effect, index)).collect();
+    let calibration =
+        Calibration { coefficients, condition_number, rows: total, clusters: clusters.len(), rounds: 1, last_change: 0.0 };
     Ok((calibrated, calibration))
 }
 
@@ -124,8 +255,13 @@ fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {
         effect: effect.name.clone(),
         name: coefficient.name.clone(),
         value: coefficient.value,
-        ci95: coefficient.ci95?,
+        ci95: coefficient.ci95,
         unit: coefficient.unit.clone(),
+        bounds: catalogue::definition(&effect.kind)
+            .and_then(|definition| definition.coefficient(&coefficient.name))
+            .map(|definition| definition.bounds)
+            .filter(|bounds| bounds.iter().all(|bound| bound.is_finite())),
+        by_flight: coefficient.by_flight.clone(),
     })
 }
 
@@ -144,190 +280,4 @@ fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize
         }
     }
     merged
-}
-
-/// Which coefficient stands behind which column of which channel.
-struct Layout {
-    free: Vec<Free>,
-    /// For each channel, its columns as indices into `free`.
-    channels: Vec<Vec<usize>>,
-}
-
-impl Layout {
-    fn of(model: &Model) -> Self {
-        let mut layout = Self { free: Vec::new(), channels: vec![Vec::new(); Column::TARGETS.len()] };
-        for (effect_index, effect) in model.effects.iter().enumerate().filter(|(_, effect)| effect.enabled) {
-            for (index, coefficient) in effect.coefficients.iter().enumerate() {
-                layout.free.push((effect_index, index));
-                for term in effect.terms.iter().filter(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
-                    if let Some(columns) =
-                        layout.channels.get_mut(term.channel).filter(|columns| columns.last() != Some(&(layout.free.len() - 1)))
-                    {
-                        columns.push(layout.free.len() - 1);
-                    }
-                }
-            }
-        }
-        layout
-    }
-
-    /// Column of a term in its channel; `None` for fixed terms.
-    fn column(&self, place: Place) -> Option<usize> {
-        let free = self.free.iter().position(|&free| Some(free) == place.coefficient.map(|index| (place.effect, index)))?;
-        self.channels.get(place.channel)?.iter().position(|&column| column == free)
-    }
-
-    /// Reduces the chosen rows of one flight to clusters of about equal length.
-    fn reduce(
-        &self,
-        model: &Model,
-        index: usize,
-        flight: &Flight,
-        ranges: &[(usize, usize)],
-        clusters: usize,
-    ) -> Result<Vec<Cluster>> {
-        let mut program = Program::for_flight(model, flight)?;
-        let places: Vec<Place> = program.places().collect();
-        let targets: Vec<Option<usize>> = places.iter().map(|&place| self.column(place)).collect();
-        let empty =
-            Cluster { flight: index, factors: self.channels.iter().map(|columns| Factor::new(columns.len() + 1)).collect() };
-        let mut reduced = vec![empty; clusters];
-        let rows: usize = ranges.iter().map(|range| range.1 - range.0).sum();
-        let mut seen = 0;
-        let mut pieces: Vec<(usize, usize)> = ranges.to_vec();
-        pieces.reverse();
-        program.run(flight, ranges.last().map_or(0, |range| range.1), &mut |block, values| {
-            // One matrix a channel: its regressors, then the measured acceleration minus the fixed terms.
-            let mut matrices: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.channels.len());
-            for (columns, target) in self.channels.iter().zip(Column::TARGETS) {
-                let mut matrix = vec![vec![0.0; block.len()]; columns.len()];
-                matrix.push(flight.column(target).get(block.clone()).unwrap_or_default().to_vec());
-                matrices.push(matrix);
-            }
-            for ((place, target), values) in places.iter().zip(&targets).zip(values) {
-                let Some(matrix) = matrices.get_mut(place.channel) else { continue };
-                let (column, sign) = match target {
-                    Some(column) => (matrix.get_mut(*column), 1.0),
-                    None => (matrix.last_mut(), -1.0),
-                };
-                for (sum, value) in column.into_iter().flatten().zip(values) {
-                    *sum += sign * value;
-                }
-            }
-            while let Some((start, end)) = pieces.pop() {
-                if start >= block.end {
-                    pieces.push((start, end));
-                    break;
-                }
-                // As far as this block and this row's cluster reach: row i belongs to cluster floor(i clusters / rows).
-                let cluster = seen * clusters / rows;
-                let cluster_end = ((cluster + 1) * rows).div_ceil(clusters);
-                let stop = end.min(block.end).min(start + cluster_end - seen);
-                let part = start - block.start..stop - block.start;
-                for ((place, _), values) in places.iter().zip(&targets).zip(values) {
-                    if let Some(at) = values.iter().skip(part.start).take(part.len()).position(|value| !value.is_finite()) {
-                        return Err(not_finite(model, flight, *place, start + at));
-                    }
-                }
-                if let Some(cluster) = reduced.get_mut(cluster) {
-                    for (factor, matrix) in cluster.factors.iter_mut().zip(&matrices) {
-                        let columns: Vec<&[f64]> =
-                            matrix.iter().map(|column| column.get(part.clone()).unwrap_or_default()).collect();
-                        factor.add(&columns);
-                    }
-                }
-                seen += stop - start;
-                if stop < end {
-                    pieces.push((stop, end));
-                }
-            }
-            Ok(())
-        })?;
-        Ok(reduced)
-    }
-
-    /// Groups of channels that share coefficients, each with its coefficients.
-    fn problems(&self) -> Vec<(Vec<Free>, Problem)> {
-        let mut group: Vec<usize> = (0..self.channels.len()).collect();
-        for (left, left_columns) in self.channels.iter().enumerate() {
-            for (right, right_columns) in self.channels.iter().enumerate().skip(left + 1) {
-                if left_columns.iter().any(|column| right_columns.contains(column)) {
-                    let (from, to) = (group[right], group[left]);
-                    group.iter_mut().filter(|group| **group == from).for_each(|group| *group = to);
-                }
-            }
-        }
-        let mut problems = Vec::new();
-        for root in 0..self.channels.len() {
-            let channels: Vec<usize> =
-                (0..self.channels.len()).filter(|&channel| group[channel] == root && !self.channels[channel].is_empty()).collect();
-            let mut members: Vec<usize> = channels.iter().flat_map(|&channel| self.channels[channel].iter().copied()).collect();
-            members.sort_unstable();
-            members.dedup();
-            if members.is_empty() {
-                continue;
-            }
-            let place = |column: &usize| members.binary_search(column).unwrap_or_default();
-            let channels =
-                channels.into_iter().map(|channel| (channel, self.channels[channel].iter().map(place).collect())).collect();
-            problems.push((
-                members.iter().map(|&member| self.free[member]).collect(),
-                Problem { coefficients: members.len(), channels },
-            ));
-        }
-        problems
-    }
-
-    /// A failure in words.
-    fn explain(&self, model: &Model, members: &[Free], failure: &Failure) -> Error {
-        let describe = |index: usize| -> (String, String) {
-            let effect = members.get(index).and_then(|free| model.effects.get(free.0));
-            let coefficient = effect.zip(members.get(index)).and_then(|(effect, free)| effect.coefficients.get(free.1));
-            let (Some(effect), Some(coefficient)) = (effect, coefficient) else { return Default::default() };
-            let regressors: Vec<String> = effect
-                .terms
-                .iter()
-                .filter(|term| term.coefficient.as_ref() == Some(&coefficient.name))
-                .map(|term| term.regressor.to_string())
-                .collect();
-            (format!("`{}` of effect `{}`", coefficient.name, effect.name), format!("`{}`", regressors.join("`, `")))
-        };
-        let advice = "give flights that move it, or set `enabled = false` on the effect";
-        Error::Undetermined(match failure {
-            Failure::Zero(index) => {
-                let (name, regressor) = describe(*index);
-                format!("the flights do not determine {name}: its regressor {regressor} is zero in every row; {advice}")
-            }
-            Failure::Overflow(index) => {
-                let (name, regressor) = describe(*index);
-                format!("the regressor {regressor} behind {name} reaches numbers too large to square; scale the formula down")
-            }
-            Failure::TooFewRows(rows) => {
-                format!("{rows} rows cannot determine {} coefficients; give longer flights", members.len())
-            }
-            Failure::Dependent(involved, condition) => {
-                let described: Vec<(String, String)> = involved.iter().map(|&index| describe(index)).collect();
-                let constant = described.iter().position(|(_, regressor)| regressor == "`1`");
-                match (described.as_slice(), constant) {
-                    ([_, _], Some(constant)) => {
-                        let (name, regressor) = &described[1 - constant];
-                        let bias = &described[constant].0;
-                        format!(
-                            "the flights do not determine {name}: its regressor {regressor} never varies, so {bias} does the same; {advice}"
-                        )
-                    }
-                    _ => {
-                        let names: Vec<&str> = described.iter().map(|(name, _)| name.as_str()).collect();
-                        let regressors: Vec<&str> = described.iter().map(|(_, regressor)| regressor.as_str()).collect();
-                        format!(
-                            "the flights do not determine {}: their regressors {} are linearly dependent in these rows (condition number {condition:.1e}); \
-                             give flights that move them apart, or set `enabled = false` on one of the effects",
-                            names.join(" and "),
-                            regressors.join(" and ")
-                        )
-                    }
-                }
-            }
-        })
-    }
 }

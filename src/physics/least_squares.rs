@@ -49,7 +49,7 @@ impl Factor {
     }
 
     /// Adds the rows behind another factor, scaled.
-    fn add_factor(&mut self, other: &DMatrix<f64>, rows: usize, scale: f64) {
+    pub(super) fn add_factor(&mut self, other: &DMatrix<f64>, rows: usize, scale: f64) {
         for row in other.row_iter() {
             self.pending.extend(row.iter().map(|value| value * scale));
         }
@@ -71,7 +71,7 @@ impl Factor {
         self.pending.clear();
     }
 
-    fn finish(&mut self) -> (&DMatrix<f64>, usize) {
+    pub(super) fn finish(&mut self) -> (&DMatrix<f64>, usize) {
         self.reduce();
         (&self.triangle, self.rows)
     }
@@ -192,15 +192,15 @@ fn residual(wide: &DMatrix<f64>, values: &DVector<f64>) -> DVector<f64> {
 }
 
 /// An estimate and the triangle it came from.
-struct Fit {
-    values: DVector<f64>,
+pub(super) struct Fit {
+    pub values: DVector<f64>,
     /// Inverse of the triangle of X: `θ = inverse Qᵀ y`.
     inverse: DMatrix<f64>,
     condition_number: f64,
 }
 
 impl Fit {
-    fn new(totals: &[(DMatrix<f64>, usize)], weights: &[f64], wanted: usize) -> Result<Self, Failure> {
+    pub(super) fn new(totals: &[(DMatrix<f64>, usize)], weights: &[f64], wanted: usize) -> Result<Self, Failure> {
         let mut stacked = Factor::new(wanted + 1);
         for ((wide, rows), weight) in totals.iter().zip(weights) {
             stacked.add_factor(wide, *rows, *weight);

@@ -4,12 +4,15 @@
 //! a user's own formulas are therefore one type: they evaluate on whole flights or one sample at a time, and print as formulas.
 
 mod baseline;
+mod by_flight;
 mod calibrate;
 pub mod catalogue;
 mod columns;
 mod definition;
 mod effect;
 mod evaluate;
+mod implant;
+mod layout;
 mod least_squares;
 mod model;
 #[cfg(feature = "files")]
@@ -26,4 +29,5 @@ pub use definition::{
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};
+pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};

@@ -180,15 +180,37 @@ impl Model {
         let [ix, iy, iz] = self.inertia;
         let values = [self.mass_kg, ix, iy, iz, self.rotor_radius_m, self.data.control_delay_s];
         let own = Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1);
-        own.or_else(|| self.coefficient_named(name).map(|coefficient| coefficient.value))
+        own.or_else(|| {
+            let (effect, coefficient) = self.coefficient_named(name)?;
+            Some(self.effects.get(effect)?.coefficients.get(coefficient)?.value)
+        })
     }
 
-    /// The coefficient that formulas call `<effect>_<coefficient>`.
-    fn coefficient_named(&self, name: &str) -> Option<&super::effect::Coefficient> {
-        self.effects.iter().filter(|effect| effect.enabled).find_map(|effect| {
+    /// Whether formulas of an effect may read this name as a constant: one of its parameters, of the model's own numbers, or the
+    /// coefficient of an enabled effect.
+    pub fn gives(&self, effect: &Effect, name: &str) -> bool {
+        self.constant(effect, name).is_some()
+    }
+
+    /// The coefficient that formulas call `<effect>_<coefficient>`: indices of the effect and of the coefficient in it.
+    fn coefficient_named(&self, name: &str) -> Option<(usize, usize)> {
+        self.effects.iter().enumerate().filter(|(_, effect)| effect.enabled).find_map(|(index, effect)| {
             let coefficient = name.strip_prefix(effect.name.as_str())?.strip_prefix('_')?;
-            effect.coefficient(coefficient)
+            Some((index, effect.coefficients.iter().position(|known| known.name == coefficient)?))
         })
+    }
+
+    /// The coefficients whose values the formulas of an effect read, as indices of effects and of coefficients in them.
+    pub(super) fn coefficients_read(&self, effect: &Effect) -> Result<Vec<(usize, usize)>> {
+        let mut read = Vec::new();
+        for term in &effect.terms {
+            let regressor = self.effective_regressor(effect, &term.regressor)?;
+            for name in regressor.names() {
+                let known = Self::CONSTANTS.contains(&name) || effect.parameters.iter().any(|parameter| parameter.name == name);
+                read.extend(if known { None } else { self.coefficient_named(name) });
+            }
+        }
+        Ok(read)
     }
 
     /// A regressor of `effect` as it is evaluated: the swaps of the enabled effects applied in order, then the control delay.

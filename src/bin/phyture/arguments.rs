@@ -225,10 +225,68 @@ pub enum Command {
         #[arg(long, default_value_t = 1)]
         stride: usize,
     },
+    /// The catalogue of physical effects; add one to a model
+    #[command(
+        after_help = "Examples:\n  phyture effect list\n  phyture effect show ground_effect\n  phyture effect add ground_effect -m n9.toml -o n9-ground.toml"
+    )]
+    Effect {
+        /// What to do with it.
+        #[command(subcommand)]
+        command: EffectCommand,
+    },
+    /// Add a known effect to recorded flights, so that the truth is known under real noise
+    #[command(
+        after_help = "Examples:\n  phyture implant flights implanted --effect ground_effect --scale 2 -m n9-calibrated.toml\n  phyture implant flights implanted --effect rotor_droop --size k=-0.2 --size tau_s=0.5\n  phyture implant flights implanted --formula \"wx_dot = 1.5*sin(3*height)\""
+    )]
+    Implant {
+        /// Flights.
+        #[command(flatten)]
+        data: Data,
+        /// Folder to write
+        dir: PathBuf,
+        /// Effect of the catalogue
+        #[arg(long, required_unless_present = "formula", conflicts_with = "formula")]
+        effect: Option<String>,
+        /// Something else: `channel = formula`
+        #[arg(long, value_name = "FORMULA")]
+        formula: Option<String>,
+        /// Times its usual size
+        #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+        scale: f64,
+        /// A coefficient or parameter in place of the usual one; repeatable
+        #[arg(long, value_name = "NAME=VALUE", conflicts_with = "formula")]
+        size: Vec<String>,
+        /// Calibrated model file [default: the paper's baseline, calibrated on the flights]
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+    },
     /// Forward, backward and an Adam step against the figures a file brings from PyTorch
     #[command(after_help = "Example:\n  phyture parity small_f32.safetensors --json -")]
     Parity {
         /// Safetensors file with weights, inputs, outputs and gradients
         file: PathBuf,
+    },
+}
+
+/// What to do with the catalogue.
+#[derive(Subcommand)]
+pub enum EffectCommand {
+    /// Every effect in a line
+    List,
+    /// All that is known about one effect
+    Show {
+        /// Effect
+        effect: String,
+    },
+    /// Put an effect with coefficients 0 into a model file, to be calibrated
+    Add {
+        /// Effect
+        effect: String,
+        /// Model file
+        #[arg(short, long)]
+        model: PathBuf,
+        /// Model file to write
+        #[arg(short, long)]
+        output: PathBuf,
     },
 }

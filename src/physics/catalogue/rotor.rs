@@ -1,12 +1,13 @@
 //! The main rotor as a whole: its torque, its speed, and the tilt of its disc.
 
-use super::super::definition::{Definition, Notes, coefficient, parameter};
+use super::super::definition::{Definition, Notes, Origin, coefficient, parameter};
 use super::HELICOPTER;
 
-/// Power beyond hover, in hover powers, behind the rotor's and governor's lag; momentum theory: power goes as thrust to the 3/2.
+/// Power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum theory: T (v_i + v_c), the induced part as
+/// thrust to the 3/2, the climbing part with the speed along the thrust.
 macro_rules! slow_power {
     () => {
-        concat!("lag(abs(", thrust!(), " / 9.80665)^1.5 - 1, tau_s)")
+        concat!("lag(abs(", thrust!(), " / 9.80665)^1.5 + ", thrust!(), " / 9.80665 * vz / induced_m_s - 1, tau_s)")
     };
 }
 
@@ -30,9 +31,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "heave_torque",
         meaning: "climbing takes torque and descending gives it back, which turns the nose",
-        coefficients: &[coefficient("n_w", "rad/(m s)", "yaw by descent at 1 g").within(-20.0, 20.0).usually(-6.0, 6.0)],
+        coefficients: &[coefficient("n_w", "rad/(m s)", "yaw by descent at 1 g of thrust").within(-20.0, 20.0).usually(-6.0, 6.0)],
         parameters: &[],
-        terms: &[(5, Some("n_w"), concat!("vz * -", thrust!(), " / 9.80665"))],
+        // Power is thrust times climb: inverted, the sign turns over.
+        terms: &[(5, Some("n_w"), concat!("-", thrust!(), " / 9.80665 * vz"))],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -46,13 +48,16 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "rotor_droop",
         meaning: "under load the rotor slows down before the governor catches it, and thrust and control power fall with its speed squared",
-        coefficients: &[coefficient("k", "1", "change of speed squared at twice the hover power")
+        coefficients: &[coefficient("k", "1", "change of speed squared by one more induced power of hover")
             .within(-0.6, 0.0)
             .usually(-0.25, -0.03)],
-        parameters: &[parameter("tau_s", "s", "time constant of rotor and governor")
-            .starting(0.3)
-            .tried(&[0.15, 0.3, 0.6, 1.2])
-            .within(0.03, 4.0)],
+        parameters: &[
+            parameter("tau_s", "s", "time constant of rotor and governor")
+                .starting(0.3)
+                .tried(&[0.15, 0.3, 0.6, 1.2])
+                .within(0.03, 4.0),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        ],
         terms: &[
             (2, Some("k"), concat!(thrust!(), " * ", slow_power!())),
             (3, Some("k"), concat!("control_moment_c_x * u1 * ", slow_power!())),

@@ -3,6 +3,13 @@
 use super::super::definition::{Definition, Notes, Origin, SwapDefinition, coefficient, parameter};
 use super::{ANY, HELICOPTER};
 
+/// Square of the induced velocity that the thrust of the moment has in hover, m²/s².
+macro_rules! hover_flow {
+    () => {
+        concat!("(induced_m_s^2 * abs(", thrust!(), " / 9.80665))")
+    };
+}
+
 pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "ground_effect",
@@ -37,22 +44,40 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "transl_lift",
         meaning: "in forward flight the rotor meets undisturbed air, the induced velocity falls and the same collective lifts more",
-        coefficients: &[coefficient("k", "1", "share of the thrust gained at high speed").within(0.0, 2.0).usually(0.15, 0.5)],
-        parameters: &[
-            parameter("ratio", "1", "speed of half the gain over the induced velocity in hover")
-                .starting(1.5)
-                .tried(&[0.7, 1.5, 3.0])
-                .within(0.3, 8.0),
-            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
+        coefficients: &[
+            coefficient("k", "1/s", "thrust gained by induced velocity lost").within(0.0, 10.0).usually(1.5, 4.0),
+            coefficient("k_mu", "1", "thrust gained by the advancing blade").within(-0.05, 0.1).usually(0.0, 0.01),
         ],
-        terms: &[(2, Some("k"), concat!(thrust!(), " * hypot(vx, vy) / (hypot(vx, vy) + ratio * induced_m_s)"))],
+        parameters: &[parameter("induced_m_s", "m/s", "induced velocity in hover")
+            .known_by(Origin::HoverInduced)
+            .within(0.1, 30.0)],
+        // Glauert's flow in level flight, solved for the induced velocity: v_i = v_h^2 / sqrt(sqrt(V^4/4 + v_h^4) + V^2/2), with
+        // v_h the induced velocity that this thrust has in hover. The guard is for no thrust and no speed.
+        terms: &[
+            (
+                2,
+                Some("k"),
+                concat!(
+                    "sign",
+                    thrust!(),
+                    " * (sqrt",
+                    hover_flow!(),
+                    " - ",
+                    hover_flow!(),
+                    " / sqrt(max(hypot(0.5 * (vx^2 + vy^2), ",
+                    hover_flow!(),
+                    ") + 0.5 * (vx^2 + vy^2), 1e-6)))"
+                ),
+            ),
+            (2, Some("k_mu"), concat!(thrust!(), " * (hypot(vx, vy) / induced_m_s)^2")),
+        ],
         swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "speeds from hover to three times the induced velocity",
             confusable_with: &["climb_inflow", "quad_drag", "ctrl_nonlin"],
             would_tell_apart: "level flight at constant height at 0, 3, 6 and 12 m/s, and climbs at each",
-            source: "momentum theory: v_i = T / (2 rho A sqrt(V^2 + v_i^2)); Padfield ch. 3",
+            source: "Glauert: v_i = T / (2 rho A sqrt(V^2 + v_i^2)); thrust as 1/3 + mu^2/2: Gavrilets eq. 15.12, Padfield ch. 3",
             searched: true,
         }),
     },

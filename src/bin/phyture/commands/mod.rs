@@ -5,6 +5,8 @@ mod check;
 mod compare;
 mod demo;
 mod diagnose;
+mod effect;
+mod implant;
 mod parity;
 mod predict;
 mod simulate;
@@ -61,6 +63,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Command::Loop { data, model, output, report, division } => {
             diagnose::run_loop(&context, data, model.as_deref(), output, report.as_deref(), division)
+        }
+        Command::Effect { command } => effect::run(&context, command),
+        Command::Implant { data, dir, effect, formula, scale, size, model } => {
+            let (effect, formula, model) = (effect.as_deref(), formula.as_deref(), model.as_deref());
+            implant::run(&context, data, dir, &implant::Wanted { effect, formula, scale: *scale, size, model })
         }
         Command::Parity { file } => parity::run(&context, file),
     }

@@ -1,0 +1,214 @@
+//! `effect list`, `effect show` and `effect add`: the catalogue for a person, and the way of an effect into a model file.
+
+use super::Context;
+use crate::arguments::EffectCommand;
+use phyture::flight::Column;
+use phyture::formula::Formula;
+use phyture::physics::catalogue::{definition, definitions};
+use phyture::physics::{Definition, Effect, Model, Origin, standard_names};
+use phyture::suggest::did_you_mean;
+use phyture::{Error, Result};
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// What puts an effect into a model file here.
+const ADDED_BY: &str = "effect add";
+
+/// Does what was asked for.
+pub fn run(context: &Context, command: &EffectCommand) -> Result<ExitCode> {
+    match command {
+        EffectCommand::List => list(context),
+        EffectCommand::Show { effect } => show(context, effect),
+        EffectCommand::Add { effect, model, output } => add(context, effect, model, output),
+    }
+}
+
+/// An effect of the catalogue, or an error with the nearest name.
+pub fn find(id: &str) -> Result<&'static Definition> {
+    definition(id).filter(|definition| definition.notes.is_some()).ok_or_else(|| {
+        let known = definitions().map(|definition| definition.kind);
+        Error::Config {
+            place: "command line".into(),
+            field: "effect".into(),
+            found: format!("`{id}`{}", did_you_mean(id, known)),
+            expected: "an effect of the catalogue; `phyture effect list` shows them".into(),
+        }
+    })
+}
+
+/// Names of the accelerations that an effect adds to or, by what it swaps in the baseline, changes.
+fn channels(definition: &Definition) -> Vec<&'static str> {
+    let mut touched = [false; 6];
+    for &(channel, _, _) in definition.terms {
+        touched[channel] = true;
+    }
+    // A swap changes those terms of the paper's baseline that read the name.
+    for effect in Model::paper("", 1.0, [1.0; 3], 1.0).effects {
+        for term in &effect.terms {
+            let read = |swap: &&phyture::physics::SwapDefinition| {
+                (swap.within.is_empty() || swap.within.contains(&effect.name.as_str()))
+                    && term.regressor.names().contains(&swap.name)
+            };
+            touched[term.channel] |= definition.swaps.iter().find(read).is_some();
+        }
+    }
+    Column::TARGETS.into_iter().zip(touched).filter(|(_, touched)| *touched).map(|(column, _)| column.name()).collect()
+}
+
+fn list(context: &Context) -> Result<ExitCode> {
+    let width = definitions().map(|definition| definition.kind.len()).max().unwrap_or_default();
+    context.say(format!("{:<width$}  {:<42}  what it is", "effect", "changes"));
+    for definition in definitions() {
+        let aside = if definition.notes.is_some_and(|notes| !notes.searched) { " (listed only)" } else { "" };
+        let channels = channels(definition).join(" ");
+        context.say(format!("{:<width$}  {channels:<42}  {}{aside}", definition.kind, definition.meaning));
+    }
+    context.say("\n`phyture effect show EFFECT` prints formulas, sizes and what it is mistaken for");
+    context.json(&json!({ "effects": definitions().map(described).collect::<Vec<_>>() }))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(context: &Context, id: &str) -> Result<ExitCode> {
+    let definition = find(id)?;
+    context.say(text(definition));
+    context.json(&described(definition))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Everything about an effect, for a person.
+fn text(definition: &Definition) -> String {
+    let mut text = format!("{}: {}\n", definition.kind, definition.meaning);
+    let mut line = |indent: usize, content: String| {
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "{:indent$}{content}", "");
+    };
+    line(0, String::new());
+    for (channel, coefficient, regressor) in definition.terms {
+        let column = Column::TARGETS[*channel];
+        let product = coefficient.map_or_else(|| (*regressor).to_owned(), |name| format!("{name} * ({regressor})"));
+        // Printed with no more brackets than it needs.
+        let product = Formula::parse(&product).map_or(product, |formula| formula.to_string());
+        line(2, format!("{:<6} += {product}   [{}]", column.name(), column.unit()));
+    }
+    for swap in definition.swaps {
+        let within = if swap.within.is_empty() { "everywhere".into() } else { format!("in {}", swap.within.join(", ")) };
+        line(2, format!("{:<6} := {}   {within}", swap.name, swap.with));
+    }
+    if !definition.coefficients.is_empty() {
+        line(0, "\nCoefficients".into());
+    }
+    for coefficient in definition.coefficients {
+        let [low, high] = coefficient.bounds;
+        let usual = coefficient.expected.map(|[low, high]| format!(", usually {low} to {high} at 5 kg")).unwrap_or_default();
+        let flights = coefficient.by_flight.map(|s| format!("; one for each flight, s.d. {s}")).unwrap_or_default();
+        line(2, format!("{:<10} {}, {low} to {high}{usual}{flights}: {}", coefficient.name, coefficient.unit, coefficient.meaning));
+    }
+    if !definition.parameters.is_empty() {
+        line(0, "\nParameters".into());
+    }
+    for parameter in definition.parameters {
+        let [low, high] = parameter.bounds;
+        let origin = match parameter.origin {
+            Origin::Number(number) => number.to_string(),
+            Origin::RotorRadius => "the model's rotor radius".into(),
+            Origin::HoverInduced => "from mass and rotor radius by momentum theory".into(),
+        };
+        let grid: Vec<String> = parameter.grid.iter().map(f64::to_string).collect();
+        let tried = match (grid.is_empty(), parameter.tied_to) {
+            (true, _) => String::new(),
+            (false, None) => format!("; tried: {}", grid.join(", ")),
+            (false, Some(other)) => format!("; tried together with {other}"),
+        };
+        line(2, format!("{:<10} {}, {origin}, {low} to {high}{tried}: {}", parameter.name, parameter.unit, parameter.meaning));
+    }
+    if let Some(notes) = definition.notes {
+        let vehicles: Vec<&str> = notes.vehicles.iter().map(|vehicle| vehicle.name()).collect();
+        let alike = if notes.confusable_with.is_empty() { "nothing".into() } else { notes.confusable_with.join(", ") };
+        line(0, String::new());
+        line(0, format!("Shows in          {}", notes.excitation));
+        line(0, format!("Mistaken for      {alike}"));
+        line(0, format!("Would tell apart  {}", notes.would_tell_apart));
+        line(0, format!("Source            {}", notes.source));
+        line(0, format!("Vehicles          {}", vehicles.join(", ")));
+        if !notes.searched {
+            line(0, "Listed only: a search leaves it out".into());
+        }
+    }
+    text.trim_end().to_owned()
+}
+
+/// Everything about an effect, for a program.
+fn described(definition: &Definition) -> Value {
+    let terms = definition.terms.iter().map(|(channel, coefficient, formula)| {
+        let column = Column::TARGETS[*channel];
+        json!({ "channel": column.name(), "unit": column.unit(), "coefficient": coefficient, "formula": formula })
+    });
+    let swaps = definition.swaps.iter().map(|swap| json!({ "name": swap.name, "with": swap.with, "within": swap.within }));
+    let coefficients = definition.coefficients.iter().map(|coefficient| {
+        json!({ "name": coefficient.name, "unit": coefficient.unit, "meaning": coefficient.meaning, "bounds": coefficient.bounds,
+            "expected": coefficient.expected, "by_flight": coefficient.by_flight })
+    });
+    let parameters = definition.parameters.iter().map(|parameter| {
+        let origin = match parameter.origin {
+            Origin::Number(number) => json!(number),
+            Origin::RotorRadius => json!("rotor_radius"),
+            Origin::HoverInduced => json!("hover_induced"),
+        };
+        json!({ "name": parameter.name, "unit": parameter.unit, "meaning": parameter.meaning, "origin": origin,
+            "grid": parameter.grid, "bounds": parameter.bounds, "tied_to": parameter.tied_to })
+    });
+    json!({
+        "effect": definition.kind,
+        "meaning": definition.meaning,
+        "channels": channels(definition),
+        "terms": terms.collect::<Vec<_>>(),
+        "swaps": swaps.collect::<Vec<_>>(),
+        "coefficients": coefficients.collect::<Vec<_>>(),
+        "parameters": parameters.collect::<Vec<_>>(),
+        "excitation": definition.notes.map(|notes| notes.excitation),
+        "confusable_with": definition.notes.map(|notes| notes.confusable_with),
+        "would_tell_apart": definition.notes.map(|notes| notes.would_tell_apart),
+        "source": definition.notes.map(|notes| notes.source),
+        "vehicles": definition.notes.map(|notes| notes.vehicles),
+        "searched": definition.notes.is_some_and(|notes| notes.searched),
+    })
+}
+
+fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<ExitCode> {
+    let definition = find(id)?;
+    let mut model = Model::read(path)?;
+    let fault = |found: String, expected: &str| {
+        Err(Error::Config { place: path.display().to_string(), field: "effect".into(), found, expected: expected.into() })
+    };
+    if let Some(present) = model.effects.iter().find(|effect| effect.kind == id || effect.name == id) {
+        let how = if present.enabled { "" } else { ", disabled" };
+        return fault(format!("`{id}`{how}, already there"), "a model without it; edit its entry in the file instead");
+    }
+    if let Some(notes) = definition.notes.filter(|notes| !notes.vehicles.contains(&model.vehicle)) {
+        let vehicles: Vec<&str> = notes.vehicles.iter().map(|vehicle| vehicle.name()).collect();
+        return fault(
+            format!("vehicle `{}`", model.vehicle.name()),
+            &format!("one for which `{id}` makes sense: {}", vehicles.join(", ")),
+        );
+    }
+    let effect = Effect { added_by: Some(ADDED_BY.into()), ..definition.effect(model.mass_kg, model.rotor_radius_m) };
+    model.effects.push(effect.clone());
+    if let Some(name) = unknown_name(&model, &effect) {
+        return fault(
+            format!("nothing that gives `{name}`, which `{id}` reads"),
+            "the enabled effect and coefficient of that name, as the paper's baseline has it",
+        );
+    }
+    model.write(output)?;
+    context.say(format!("{id} added to {}; its coefficients are 0 until `phyture calibrate`", output.display()));
+    context.json(&json!({ "effect": id, "model": output }))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// A name in the effect's formulas that neither a column nor the model gives.
+fn unknown_name(model: &Model, effect: &Effect) -> Option<String> {
+    let known = |name: &str| standard_names().contains(&name) || model.gives(effect, name);
+    effect.terms.iter().flat_map(|term| term.regressor.names()).find(|name| !known(name)).map(str::to_owned)
+}

@@ -1,0 +1,132 @@
+//! `implant`: a known effect in recorded flights, with the truth written beside them.
+
+use super::effect::find;
+use super::{Context, data_sha256};
+use crate::arguments::Data;
+use phyture::flight::atomic::write_atomically;
+use phyture::flight::{Column, DataSet, Span, write};
+use phyture::physics::{Effect, Model, calibrate, implant, spread_over_flights, typical};
+use phyture::suggest::did_you_mean;
+use phyture::{Error, Result};
+use serde_json::{Map, Value, json};
+use std::path::Path;
+use std::process::ExitCode;
+
+/// Name of an effect that was given as a formula.
+const IMPLANTED: &str = "implanted";
+
+/// What was asked for.
+pub struct Wanted<'a> {
+    /// An effect of the catalogue.
+    pub effect: Option<&'a str>,
+    /// Or a formula, `channel = formula`.
+    pub formula: Option<&'a str>,
+    /// Times its usual size.
+    pub scale: f64,
+    /// Values in place of the usual ones, `name=value`.
+    pub size: &'a [String],
+    /// Calibrated model.
+    pub model: Option<&'a Path>,
+}
+
+/// Implants, writes the flights and `truth.json`.
+pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Result<ExitCode> {
+    let set = context.flights(data, 1)?;
+    let model = match wanted.model {
+        Some(path) => Model::read(path)?,
+        None => {
+            let whole = |(flight, log): (usize, &phyture::flight::Flight)| Span { flight, start: 0, end: log.len() };
+            let spans: Vec<Span> = set.flights.iter().enumerate().map(whole).collect();
+            context.say("no model given: the paper's baseline is calibrated on these flights first");
+            calibrate(&context.model(None)?, &set.flights, &spans)?.0
+        }
+    };
+    let effect = match (wanted.effect, wanted.formula) {
+        (Some(id), _) => sized(typical(find(id)?, wanted.scale, &model), wanted.size)?,
+        (None, Some(formula)) => of_formula(formula, wanted.scale)?,
+        (None, None) => return Err(fault("--effect", "nothing".into(), "--effect EFFECT or --formula \"channel = formula\"")),
+    };
+    let effect = spread_over_flights(effect, &set.flights);
+    let changed = implant(&set, &model, &effect)?;
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    write::data_set_csv(folder, &changed.flights)?;
+    let rms = rms(&set, &changed);
+    let truth = json!({
+        "effect": wanted.effect.unwrap_or(IMPLANTED),
+        "scale": wanted.scale,
+        "formulas": effect.to_string().lines().collect::<Vec<_>>(),
+        "coefficients": effect.coefficients,
+        "parameters": effect.parameters,
+        "rms": rms,
+        "data_sha256": data_sha256(data)?,
+        "version": env!("CARGO_PKG_VERSION"),
+    });
+    let text = serde_json::to_string_pretty(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
+    write_atomically(folder.join("truth.json"), |file| writeln!(file, "{text}"))?;
+    context.say(format!("\n{effect}\n"));
+    for (channel, value) in rms.iter().filter(|(_, value)| value.as_f64() != Some(0.0)) {
+        context.say(format!("{channel:<7} changed by {:.4} rms", value.as_f64().unwrap_or_default()));
+    }
+    context.say(format!("{} flights written to {} with truth.json", changed.flights.len(), folder.display()));
+    context.json(&truth)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn fault(field: &str, found: String, expected: &str) -> Error {
+    Error::Config { place: "command line".into(), field: field.into(), found, expected: expected.into() }
+}
+
+/// Sets coefficients and parameters by `name=value`.
+fn sized(mut effect: Effect, sizes: &[String]) -> Result<Effect> {
+    for size in sizes {
+        let (name, value) = size.split_once('=').unwrap_or((size, ""));
+        let value: f64 = value
+            .trim()
+            .parse()
+            .ok()
+            .filter(|value: &f64| value.is_finite())
+            .ok_or_else(|| fault("--size", format!("`{size}`"), "NAME=VALUE with a number, as in k=-0.2"))?;
+        let coefficients = effect.coefficients.iter_mut().map(|coefficient| (&coefficient.name, &mut coefficient.value));
+        let parameters = effect.parameters.iter_mut().map(|parameter| (&parameter.name, &mut parameter.value));
+        let mut known: Vec<(&String, &mut f64)> = coefficients.chain(parameters).collect();
+        match known.iter_mut().find(|(known, _)| *known == name.trim()) {
+            Some((_, place)) => **place = value,
+            None => {
+                let hint = did_you_mean(name, known.iter().map(|(name, _)| name.as_str()));
+                return Err(fault("--size", format!("`{name}`{hint}"), "a coefficient or parameter of the effect"));
+            }
+        }
+    }
+    Ok(effect)
+}
+
+/// `wx_dot = 1.5 * sin(3 * height)` as an effect.
+fn of_formula(text: &str, scale: f64) -> Result<Effect> {
+    let names = Column::TARGETS.map(Column::name);
+    let (channel, formula) = text.split_once('=').map_or((text, ""), |(channel, formula)| (channel.trim(), formula.trim()));
+    let index = names.iter().position(|name| *name == channel).ok_or_else(|| {
+        let hint = did_you_mean(channel, names);
+        fault(
+            "--formula",
+            format!("channel `{channel}`{hint}"),
+            &format!("`channel = formula`, the channel one of {}", names.join(", ")),
+        )
+    })?;
+    Effect::formula(IMPLANTED, index, formula, scale)
+}
+
+/// Root mean square of what was added, by channel.
+fn rms(before: &DataSet, after: &DataSet) -> Map<String, Value> {
+    let rows: usize = before.flights.iter().map(phyture::flight::Flight::len).sum();
+    let pairs = || before.flights.iter().zip(&after.flights);
+    let squares = |column: Column| -> f64 {
+        let of_flight = |(before, after): (&phyture::flight::Flight, &phyture::flight::Flight)| -> f64 {
+            before.column(column).iter().zip(after.column(column)).map(|(before, after)| (after - before).powi(2)).sum()
+        };
+        pairs().map(of_flight).sum()
+    };
+    Column::TARGETS
+        .into_iter()
+        .map(|column| (column.name().to_owned(), json!((squares(column) / rows.max(1) as f64).sqrt())))
+        .collect()
+}
