@@ -76,19 +76,25 @@ impl BlockMean {
     /// B/(B−1) · Σ (sᵦ − m nᵦ)² / (Σ nᵦ)² (Cochran, *Sampling Techniques*, 3rd ed., eq. 6.13 without the finite-population
     /// factor). Blocks without samples are left out. `None` if there is no sample at all.
     pub fn new(sums: impl Iterator<Item = BlockSum> + Clone) -> Option<Self> {
+        Self::ratio(sums.filter(|block| block.samples > 0.0))
+    }
+
+    /// The same estimate for the ratio of any two sums over the same blocks, paired block by block: [`BlockSum::samples`] is then
+    /// the part of the denominator that lies in the block and may be zero. `None` if the denominators do not add up to a
+    /// positive number.
+    pub fn ratio(sums: impl Iterator<Item = BlockSum> + Clone) -> Option<Self> {
         let (mut blocks, mut samples, mut sum) = (0_usize, 0.0, 0.0);
-        for block in sums.clone().filter(|block| block.samples > 0.0) {
+        for block in sums.clone() {
             blocks += 1;
             samples += block.samples;
             sum += block.sum;
         }
-        if blocks == 0 {
+        if !(samples > 0.0 && samples.is_finite()) {
             return None;
         }
         let mean = sum / samples;
         let standard_error = (blocks > 1).then(|| {
-            let scatter: f64 =
-                sums.filter(|block| block.samples > 0.0).map(|block| (block.sum - mean * block.samples).powi(2)).sum();
+            let scatter: f64 = sums.map(|block| (block.sum - mean * block.samples).powi(2)).sum();
             let count = blocks as f64;
             (count / (count - 1.0) * scatter).sqrt() / samples
         });

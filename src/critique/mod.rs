@@ -4,9 +4,11 @@ pub mod check;
 pub mod compare;
 pub mod locate;
 pub mod regime;
+pub mod shares;
 pub mod table;
 pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
 pub use regime::Regime;
+pub use shares::{Shares, shares};
 pub use yardstick::{centred_difference, finite_difference, ridge};

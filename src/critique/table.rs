@@ -136,6 +136,7 @@ impl fmt::Display for Comparison {
         if self.models.len() > 1 {
             writeln!(f, "\n* best of the column (of the row, by manoeuvre and regime)")?;
         }
+        self.shares.iter().try_for_each(|shares| writeln!(f, "\n{shares}"))?;
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::predict::read_network;
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
+use phyture::critique::shares::{self, shares};
 use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::{TEST_STRIDE, windows};
@@ -123,10 +124,20 @@ impl Contest<'_> {
             let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
             rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
         }
+        let reference = rows.len() - self.models.len();
+        let mut judged = Vec::new();
         for (name, hybrid) in self.networks {
-            rows.push(Row { name: name.clone(), predicted: hybrid.predict(&set.flights, &windows, context.threads())? });
+            let stages = hybrid.stages(&set.flights, &windows, context.threads())?;
+            let own = &hybrid.description().model;
+            // The first model is what the shares are of, unless the network was trained on that very model.
+            let other = self.models.first().is_some_and(|(_, model)| model.effects != own.effects);
+            let model = self.models.iter().find(|(_, model)| model.effects == own.effects).map_or(&own.name, |(name, _)| name);
+            let row = other.then(|| rows.get(reference)).flatten();
+            judged.push(shares(&set.flights, &windows, row, &shares::Judged { name, model, stages: &stages })?);
+            rows.push(Row { name: name.clone(), predicted: stages.hybrid });
         }
-        let comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        comparison.shares = judged;
         Ok(Judged { comparison, windows, focus: rows.len() - 1, rows })
     }
 }
