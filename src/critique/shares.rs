@@ -10,7 +10,7 @@
 
 use super::Row;
 use super::compare::{check_row, measured, variation};
-use super::table::significant;
+use super::table::{aligned, significant};
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;
 use crate::flight::{Column, Flight, Window};
@@ -234,39 +234,18 @@ impl Share {
 /// Per channel in percent, the 95 % interval below each line.
 impl fmt::Display for Shares {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let lines = self.lines();
-        let rows: Vec<(&str, Vec<String>, Vec<String>)> = lines
-            .iter()
-            .map(|(name, of)| {
-                let text = |one: Option<Share>| one.map_or_else(|| "–".to_owned(), |share| share.text());
-                let interval = |one: Option<Share>| one.map_or_else(String::new, |share| share.interval_text());
-                (*name, of.all().map(text).into(), of.all().map(interval).into())
-            })
-            .collect();
-        let heads: Vec<&str> = Column::TARGETS.iter().map(|column| column.name()).chain(["mean"]).collect();
-        let wide = |text: &str| text.chars().count();
-        let width = |column: usize| {
-            let cells = rows.iter().flat_map(|(_, values, intervals)| [&values[column], &intervals[column]]);
-            cells.map(|cell| wide(cell)).chain([wide(heads[column])]).max().unwrap_or(0)
-        };
-        let widths: Vec<usize> = (0..heads.len()).map(width).collect();
-        let first = rows.iter().map(|row| wide(row.0)).max().unwrap_or(0);
-        let line = |f: &mut fmt::Formatter<'_>, name: &str, cells: &[&str]| {
-            let mut text = format!("  {name:<first$}");
-            cells.iter().zip(&widths).for_each(|(cell, width)| text.push_str(&format!("  {cell:>width$}")));
-            writeln!(f, "{}", text.trim_end())
-        };
+        let heads: Vec<(&str, &str)> = Column::TARGETS.iter().map(|column| (column.name(), "")).chain([("mean", "")]).collect();
+        let rows = self.lines().into_iter().flat_map(|(name, of)| {
+            let text = |one: Option<Share>| one.map_or_else(|| "–".to_owned(), |share| share.text());
+            let interval = |one: Option<Share>| one.map_or_else(String::new, |share| share.interval_text());
+            [(name.to_owned(), of.all().map(text).to_vec()), (String::new(), of.all().map(interval).to_vec())]
+        });
+        let rows: Vec<_> = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect();
         if let Some(sentence) = self.sentence() {
             writeln!(f, "{sentence}")?;
         }
         writeln!(f, "Who explains what, %: {}", self.basis())?;
-        line(f, "", &heads)?;
-        for (name, values, intervals) in &rows {
-            line(f, name, &values.iter().map(String::as_str).collect::<Vec<_>>())?;
-            if intervals.iter().any(|text| !text.is_empty()) {
-                line(f, "", &intervals.iter().map(String::as_str).collect::<Vec<_>>())?;
-            }
-        }
+        aligned(f, &heads, &rows)?;
         write!(f, "  95 % intervals from {} blocks of ten seconds; mean: channels over their variance", self.blocks)
     }
 }

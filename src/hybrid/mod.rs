@@ -5,14 +5,17 @@
 
 pub mod linear;
 pub mod scaling;
+pub mod sensitivity;
 pub mod sequence;
 mod stages;
 mod stream;
+mod target;
 
 use linear::Linear;
 pub use scaling::{Scale, Scaling};
 pub use stages::Stages;
 pub use stream::StreamingHybrid;
+pub use target::{NetworkTarget, network_target};
 
 use crate::blocks::Blocks;
 use crate::error::{Error, Result};
@@ -58,11 +61,15 @@ impl Description {
     /// # Errors
     /// [`Error::Config`] if the configuration is impossible.
     pub fn network(&self, standardise_loss: bool) -> Result<Network<f32>> {
-        let output = OutputScale {
+        Network::new(&self.config, &self.output_scale(), standardise_loss)
+    }
+
+    /// From the network's unit scale to physical units.
+    fn output_scale(&self) -> OutputScale {
+        OutputScale {
             scale: self.scaling.output.iter().map(|scale| scale.deviation).collect(),
             offset: self.scaling.output.iter().map(|scale| scale.mean).collect(),
-        };
-        Network::new(&self.config, &output, standardise_loss)
+        }
     }
 
     /// Refuses sizes that do not fit each other and numbers that are not finite: a description may come from any file.

@@ -8,7 +8,7 @@ use crate::critique::compare::deviation;
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
 use crate::critique::shares::bars;
 use crate::critique::table::{Kind, MEASURES, significant};
-use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares};
+use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};
 
@@ -45,6 +45,10 @@ pub fn compare_page(report: &CompareReport<'_>) -> Result<Page> {
     if !report.comparison.shares.is_empty() {
         let parts = report.comparison.shares.iter().flat_map(share_parts).collect();
         sections.push(Section { title: "Who explains what".into(), parts });
+    }
+    if !report.comparison.uncertainty.is_empty() {
+        let parts = report.comparison.uncertainty.iter().flat_map(uncertainty_parts).collect();
+        sections.push(Section { title: "What the uncertain coefficients do".into(), parts });
     }
     sections.push(maps(model, &deviation));
     let mut traces = Vec::new();
@@ -199,6 +203,39 @@ fn share_parts(shares: &Shares) -> Vec<Part> {
     };
     let figure = figures::shares("Who explains what", &caption, &rows, &of_parts);
     vec![Part::Figure(figure), Part::Table(table), Part::Text(note.into())]
+}
+
+/// Coefficient × channel, shaded by the share of the error, and the totals.
+fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
+    let (sd, share) = (uncertainty.sd.channels(), uncertainty.share_of_rmse.channels());
+    let cell = |channel: usize, value: Option<f64>| MapCell {
+        text: Kind::Error.text(value),
+        detail: String::new(),
+        // sd / share is the RMSE of the channel.
+        value: value
+            .zip(share[channel])
+            .zip(sd[channel])
+            .filter(|(_, sd)| *sd > 0.0)
+            .map(|((value, share), sd)| value * share / sd),
+    };
+    let rows = uncertainty.coefficients.iter().map(|one| {
+        let [low, high] = one.ci95;
+        let interval = format!("{} … {} {}", significant(low, 3), significant(high, 3), one.unit);
+        let cells = one.movement.channels().into_iter().enumerate().map(|(channel, value)| cell(channel, value)).collect();
+        (format!("{} {}", one.effect, one.name), interval, cells)
+    });
+    let map = Map {
+        caption: format!("Movement of {} when a coefficient moves by half its 95 % interval, root mean square", uncertainty.name),
+        shade: "movement over the RMSE of the channel".into(),
+        columns: channel_columns("coefficient", false, false),
+        rows: rows.collect(),
+    };
+    let totals = uncertainty.totals().into_iter().map(|(name, of, kind)| {
+        [Cell::from(name)].into_iter().chain(of.channels().map(|value| Cell::from(kind.text(value)))).collect()
+    });
+    let table =
+        Table { caption: "All coefficients together".into(), columns: channel_columns("", false, false), rows: totals.collect() };
+    vec![Part::Map(map), Part::Table(table), Part::Text(uncertainty.note())]
 }
 
 fn with_mean(values: &PerChannel) -> Vec<Option<f64>> {

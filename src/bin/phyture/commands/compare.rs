@@ -4,6 +4,7 @@ use super::predict::read_network;
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::shares::{self, shares};
+use phyture::critique::uncertainty::{Effort, uncertainty};
 use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::{TEST_STRIDE, windows};
@@ -30,6 +31,8 @@ pub struct Wanted<'a> {
     pub all: bool,
     /// Lags of a ridge regression beside the models.
     pub ridge: Option<usize>,
+    /// How far the networks' predictions move with the intervals of their models' coefficients.
+    pub uncertainty: bool,
 }
 
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
@@ -61,7 +64,14 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let split = split?;
     let stride = wanted.stride.unwrap_or(if networks.is_empty() { 1 } else { TEST_STRIDE });
     let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
-    let contest = Contest { models: &models, networks: &networks, ridge: wanted.ridge, history: rows_needed, stride };
+    let contest = Contest {
+        models: &models,
+        networks: &networks,
+        ridge: wanted.ridge,
+        history: rows_needed,
+        stride,
+        uncertainty: wanted.uncertainty,
+    };
     let result = contest.run(context, &set, &split)?;
     context.say(format!("\n{}", result.comparison));
     if let Some(folder) = wanted.report {
@@ -93,6 +103,8 @@ pub struct Contest<'a> {
     pub history: usize,
     /// Samples between windows.
     pub stride: usize,
+    /// Whether the uncertainty of the physical coefficients is carried through the networks.
+    pub uncertainty: bool,
 }
 
 /// A comparison and what it was made from.
@@ -138,6 +150,10 @@ impl Contest<'_> {
         }
         let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
         comparison.shares = judged;
+        for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
+            let effort = Effort { seed: context.seed(), ..Effort::default() };
+            comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, context.threads())?);
+        }
         Ok(Judged { comparison, windows, focus: rows.len() - 1, rows })
     }
 }
