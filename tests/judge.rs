@@ -36,6 +36,8 @@ impl Case {
             levels: 2,
             stacks: 1,
             moving_average: 5,
+            // A rectifier without its kink: differences then converge to the derivative.
+            leak: 1.0,
             variant,
             ..PhyTureConfig::default()
         };
@@ -84,10 +86,9 @@ fn stages_end_in_the_prediction_and_a_shut_gate_leaves_the_linear_history() -> R
         let stages = hybrid.stages(&case.set.flights, &case.windows, Threads(2))?;
         assert!(stages.hybrid == case.predict(&case.description.model)?, "{variant:?}: another prediction");
         assert_eq!(stages.with_linear.is_some(), variant.predicts_residual());
-        for (window, physics) in case.windows.iter().zip(&stages.physics) {
+        if let (Some(window), Some(physics)) = (case.windows.last(), stages.physics.last()) {
             let expected = case.description.model.predict(&case.set.flights[window.flight])?;
             assert!((0..6).all(|channel| physics[channel].to_bits() == expected[channel][window.last].to_bits()));
-            break;
         }
         for (linear, hybrid) in stages.with_linear.iter().flatten().zip(&stages.hybrid) {
             assert!(linear[3].to_bits() == hybrid[3].to_bits() && linear[0].to_bits() != hybrid[0].to_bits());
@@ -106,8 +107,8 @@ fn reverse_mode_is_the_central_difference_of_the_prediction() -> Result<()> {
         let found = hybrid.movements(&case.set.flights, &case.windows, &estimates, Threads(2))?;
         let mut through_network = 0.0_f64;
         for (estimate, found) in estimates.iter().zip(&found) {
-            // A quarter of the half-width: the network bends little over it, and the step is far above the rounding of f32.
-            let step = 0.25;
+            // A tenth of the half-width: there truncation (as its square) and rounding of f32 (as its inverse) are about equal.
+            let step = 0.1;
             let at = |sign: f64| case.predict(&case.moved(estimate, sign * step * half_width(estimate)));
             let (up, down) = (at(1.0)?, at(-1.0)?);
             let differences: Vec<[f64; 6]> =
@@ -116,7 +117,6 @@ fn reverse_mode_is_the_central_difference_of_the_prediction() -> Result<()> {
                 differences.iter().zip(found).flat_map(|(expected, found)| (0..6).map(move |c| expected[c] - found.hybrid[c])),
             );
             let scale = largest(differences.iter().flatten().copied());
-            println!("{variant:?} {}.{}: {error:.1e} of {scale:.1e}", estimate.effect, estimate.name);
             assert!(
                 error <= Tolerance::Approximate.relative_f32() * scale.max(1.0),
                 "{variant:?}, {}.{}: {error:e} of {scale:e}",
@@ -147,7 +147,6 @@ fn drawing_coefficients_anew_agrees_with_reverse_mode_where_the_network_is_nearl
         let by_reverse = movements.iter().flatten().map(|movement| movement.hybrid[channel].powi(2)).sum::<f64>();
         let by_reverse = (by_reverse / count).sqrt() / HALF_WIDTH;
         let by_draws = (resampled.iter().map(|sd| sd[channel].powi(2)).sum::<f64>() / count).sqrt();
-        println!("channel {channel}: reverse {by_reverse:.4}, draws {by_draws:.4}");
         // Four standard errors of a standard deviation from so many draws.
         let chance = 4.0 / (2.0 * (DRAWS - 1) as f64).sqrt();
         assert!((by_draws / by_reverse - 1.0).abs() <= chance, "channel {channel}: {by_draws} and {by_reverse}");
