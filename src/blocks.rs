@@ -107,6 +107,17 @@ impl BlockMean {
         Some([self.mean - half, self.mean + half])
     }
 
+    /// 95 % interval of a mean that cannot be negative, made on the logarithm so that it stays so: m · exp(± t · se / m) (delta
+    /// method).
+    pub fn positive_interval(&self) -> Option<[f64; 2]> {
+        let standard_error = self.standard_error?;
+        if self.mean <= 0.0 {
+            return Some([0.0, 0.0]);
+        }
+        let half = quantile_975(self.blocks.saturating_sub(1) as f64) * standard_error / self.mean;
+        Some([self.mean * (-half).exp(), self.mean * half.exp()])
+    }
+
     /// 95 % interval of the square root of a mean of squares, made on the logarithm so that it stays positive:
     /// √m · exp(± t · se / (2 m)) (delta method).
     pub fn root_interval(&self) -> Option<[f64; 2]> {
@@ -156,6 +167,10 @@ mod tests {
             prop_assert!(scaled);
             let positive = one.and_then(|mean| mean.root_interval()).is_some_and(|[low, high]| 0.0 <= low && low <= high);
             prop_assert!(positive);
+            // Its square root is the interval of the square root.
+            let squared = one.and_then(|mean| Some((mean.positive_interval()?, mean.root_interval()?)));
+            let same = |(of, root): ([f64; 2], [f64; 2])| (0..2).all(|end| (of[end].sqrt() - root[end]).abs() <= CLOSE * root[end].max(1.0));
+            prop_assert!(squared.is_some_and(same));
         }
     }
 }

@@ -11,7 +11,7 @@
 use super::Row;
 use super::compare::{check_row, measured, variation};
 use super::table::{aligned, significant};
-use crate::blocks::{BlockMean, BlockSum, Blocks};
+use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;
 use crate::flight::{Column, Flight, Window};
 use crate::hybrid::Stages;
@@ -55,6 +55,12 @@ impl ShareOf {
     /// The six shares in the order of [`Column::TARGETS`], then the one of all channels.
     pub const fn all(&self) -> [Option<Share>; 7] {
         [self.vx_dot, self.vy_dot, self.vz_dot, self.wx_dot, self.wy_dot, self.wz_dot, self.mean]
+    }
+
+    /// What is not in it: one minus each share.
+    fn rest(self) -> Self {
+        let rest = |of: Share| Share { share: 1.0 - of.share, ci95: of.ci95.map(|[low, high]| [1.0 - high, 1.0 - low]) };
+        Self::new(self.all().map(|share| share.map(rest)))
     }
 
     const fn new(all: [Option<Share>; 7]) -> Self {
@@ -109,7 +115,9 @@ pub struct Judged<'a> {
 ///
 /// Each share is a ratio of two sums over windows. Its interval treats blocks of ten seconds as independent and pairs numerator
 /// and denominator block by block, so that a hard block does not count as scatter twice; mean and variance of the measurements
-/// count as known.
+/// count as known. What is left over is never negative, so the intervals of "neither" and of physics (one minus what the model
+/// leaves) are made on its logarithm; that of the network, a difference, is symmetric. With few blocks of very unequal error they
+/// are a little short: on made-up blocks with exponential error they covered 88 % with 8 blocks and 91 to 92 % with 30.
 ///
 /// # Errors
 /// [`Error::Shape`](crate::Error::Shape) if a prediction is missing for a window, or a window lies outside its flight.
@@ -134,16 +142,16 @@ pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, j
     let linear = judged.stages.with_linear.as_ref().map(|predicted| sums(row(predicted))).transpose()?;
     let weights: [Option<f64>; 6] =
         std::array::from_fn(|channel| variation(&measured, channel).map(|total| measured.len() as f64 / total));
-    let zero = vec![[0.0; 6]; blocks.len()];
     let of = |from: &[[f64; 6]], to: &[[f64; 6]]| share_of(from, to, &of_reference, &weights);
+    let left = |by: &[[f64; 6]]| share_left(by, &of_reference, &weights);
     Ok(Shares {
         name: judged.name.to_owned(),
         model: judged.model.to_owned(),
         reference: reference.map_or(MEAN, |row| row.name.as_str()).to_owned(),
         blocks: blocks.len(),
-        physics: of(&of_reference, &model),
+        physics: left(&model).rest(),
         network: of(&model, &hybrid),
-        neither: of(&hybrid, &zero),
+        neither: left(&hybrid),
         of_network: linear.map(|linear| OfNetwork { linear_history: of(&model, &linear), network_itself: of(&linear, &hybrid) }),
     })
 }
@@ -161,12 +169,28 @@ fn block_sums(measured: &[[f64; 6]], predicted: &[[f64; 6]], blocks: &Blocks) ->
 
 /// Σ (from − to) / Σ reference of each channel, and of all with `weights`.
 fn share_of(from: &[[f64; 6]], to: &[[f64; 6]], reference: &[[f64; 6]], weights: &[Option<f64>; 6]) -> ShareOf {
+    let changes: Vec<[f64; 6]> = from.iter().zip(to).map(|(from, to)| std::array::from_fn(|c| from[c] - to[c])).collect();
+    ratios(&changes, reference, weights, BlockMean::interval)
+}
+
+/// Σ left / Σ reference of each channel, and of all with `weights`: never negative, nor is its interval.
+fn share_left(left: &[[f64; 6]], reference: &[[f64; 6]], weights: &[Option<f64>; 6]) -> ShareOf {
+    ratios(left, reference, weights, BlockMean::positive_interval)
+}
+
+/// Sums over sums, block by block.
+fn ratios(
+    parts: &[[f64; 6]],
+    reference: &[[f64; 6]],
+    weights: &[Option<f64>; 6],
+    interval: fn(&BlockMean) -> Option<[f64; 2]>,
+) -> ShareOf {
     let ratio = |value: &dyn Fn(&[f64; 6]) -> f64| {
-        let sums: Vec<BlockSum> = (from.iter().zip(to).zip(reference))
-            .map(|((from, to), reference)| BlockSum { samples: value(reference), sum: value(from) - value(to) })
+        let sums: Vec<BlockSum> = (parts.iter().zip(reference))
+            .map(|(part, reference)| BlockSum { samples: value(reference), sum: value(part) })
             .collect();
         let mean = BlockMean::ratio(sums.into_iter()).filter(|mean| mean.mean.is_finite())?;
-        Some(Share { share: mean.mean, ci95: mean.interval().filter(|bounds| bounds.iter().all(|bound| bound.is_finite())) })
+        Some(Share { share: mean.mean, ci95: interval(&mean).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())) })
     };
     let known: Option<Vec<f64>> = weights.iter().copied().collect();
     ShareOf::new(std::array::from_fn(|index| match (index, &known) {
@@ -246,7 +270,8 @@ impl fmt::Display for Shares {
         }
         writeln!(f, "Who explains what, %: {}", self.basis())?;
         aligned(f, &heads, &rows)?;
-        write!(f, "  95 % intervals from {} blocks of ten seconds; mean: channels over their variance", self.blocks)
+        let few = if self.blocks < FEW_BLOCKS { " (few: a rough guide)" } else { "" };
+        write!(f, "  95 % intervals from {} blocks of ten seconds{few}; mean: channels over their variance", self.blocks)
     }
 }
 
@@ -370,24 +395,37 @@ mod tests {
         }
     }
 
-    /// Blocks whose reference error is exponential and of which the model takes a random part: the true share is E[n]/E[d].
+    /// Blocks whose reference error is exponential and of which model and hybrid leave random parts: the true share is E[n]/E[d].
     #[test]
     fn intervals_cover_the_share_of_the_population() {
         const TRIALS: u64 = 1000;
-        const BLOCKS: u64 = 30;
-        let covered = (0..TRIALS).filter(|&trial| {
-            let stream = Stream::new(17, trial, 0, 0);
-            let block = |index: u64| {
-                let reference = -(1.0 - stream.uniform(2 * index)).ln();
-                // The part taken is uniform on 0.2 … 1 and independent of the error: 0.6 on average.
-                [reference, reference * (1.0 - (0.2 + 0.8 * stream.uniform(2 * index + 1)))].map(|value| [value; 6])
-            };
-            let (reference, model): (Vec<_>, Vec<_>) = (0..BLOCKS).map(|index| block(index).into()).unzip();
-            let share = share_of(&reference, &model, &reference, &[Some(1.0); 6]).vx_dot;
-            share.and_then(|share| share.ci95).is_some_and(|[low, high]| low <= 0.6 && 0.6 <= high)
-        });
-        // The linearised interval is a little short with skewed blocks (92 to 93 %); three standard deviations of the count are 2.4 %.
-        let covered = covered.count() as f64 / TRIALS as f64;
-        assert!((0.90..=0.98).contains(&covered), "{covered}");
+        for blocks in [8, 30] {
+            let mut covered = [0_u32; 3];
+            for trial in 0..TRIALS {
+                let stream = Stream::new(17, trial, blocks, 0);
+                let block = |index: u64| {
+                    let reference = -(1.0 - stream.uniform(3 * index)).ln();
+                    // Parts left: uniform on 0 … 0.8 and, for the hybrid, on a quarter to three quarters of that; 0.4 and 0.2.
+                    let model = reference * 0.8 * stream.uniform(3 * index + 1);
+                    let hybrid = model * (0.25 + 0.5 * stream.uniform(3 * index + 2));
+                    [reference, model, hybrid].map(|value| [value; 6])
+                };
+                let all: Vec<[[f64; 6]; 3]> = (0..blocks).map(block).collect();
+                let [reference, model, hybrid] =
+                    std::array::from_fn(|which| all.iter().map(|block| block[which]).collect::<Vec<_>>());
+                let weights = [Some(1.0); 6];
+                let physics = share_left(&model, &reference, &weights).rest();
+                let found = [physics, share_of(&model, &hybrid, &reference, &weights), share_left(&hybrid, &reference, &weights)];
+                for ((count, found), truth) in covered.iter_mut().zip(found).zip([0.6, 0.2, 0.2]) {
+                    let holds = |[low, high]: [f64; 2]| low <= truth && truth <= high;
+                    *count += u32::from(found.vx_dot.and_then(|share| share.ci95).is_some_and(holds));
+                }
+            }
+            let shares = covered.map(|count| f64::from(count) / TRIALS as f64);
+            println!("{blocks} blocks: {shares:?}");
+            // Short of 95 %, as linearised intervals of ratios are with few blocks of very unequal error.
+            let least = if blocks == 8 { 0.86 } else { 0.90 };
+            assert!(shares.iter().all(|share| (least..=0.98).contains(share)), "{blocks} blocks: {shares:?}");
+        }
     }
 }

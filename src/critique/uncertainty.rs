@@ -26,9 +26,12 @@ pub struct Effort {
     pub seed: u64,
 }
 
-impl Default for Effort {
-    fn default() -> Self {
-        Self { windows: 256, draws: 30, seed: 0 }
+impl Effort {
+    /// For a network with this history: 30 draws, and 256 windows up to a history of 128 samples, fewer beyond, 32 at least, so that
+    /// the work stays about the same.
+    pub fn for_history(history: usize, seed: u64) -> Self {
+        const ROWS: usize = 256 * 128;
+        Self { windows: (ROWS / history.max(1)).clamp(32, 256), draws: 30, seed }
     }
 }
 

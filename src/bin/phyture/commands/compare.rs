@@ -151,7 +151,7 @@ impl Contest<'_> {
         let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
         comparison.shares = judged;
         for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
-            let effort = Effort { seed: context.seed(), ..Effort::default() };
+            let effort = Effort::for_history(hybrid.description().config.history, context.seed());
             comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, context.threads())?);
         }
         Ok(Judged { comparison, windows, focus: rows.len() - 1, rows })
