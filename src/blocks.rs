@@ -76,19 +76,25 @@ impl BlockMean {
     /// B/(B−1) · Σ (sᵦ − m nᵦ)² / (Σ nᵦ)² (Cochran, *Sampling Techniques*, 3rd ed., eq. 6.13 without the finite-population
     /// factor). Blocks without samples are left out. `None` if there is no sample at all.
     pub fn new(sums: impl Iterator<Item = BlockSum> + Clone) -> Option<Self> {
+        Self::ratio(sums.filter(|block| block.samples > 0.0))
+    }
+
+    /// The same estimate for the ratio of any two sums over the same blocks, paired block by block: [`BlockSum::samples`] is then
+    /// the part of the denominator that lies in the block and may be zero. `None` if the denominators do not add up to a
+    /// positive number.
+    pub fn ratio(sums: impl Iterator<Item = BlockSum> + Clone) -> Option<Self> {
         let (mut blocks, mut samples, mut sum) = (0_usize, 0.0, 0.0);
-        for block in sums.clone().filter(|block| block.samples > 0.0) {
+        for block in sums.clone() {
             blocks += 1;
             samples += block.samples;
             sum += block.sum;
         }
-        if blocks == 0 {
+        if !(samples > 0.0 && samples.is_finite()) {
             return None;
         }
         let mean = sum / samples;
         let standard_error = (blocks > 1).then(|| {
-            let scatter: f64 =
-                sums.filter(|block| block.samples > 0.0).map(|block| (block.sum - mean * block.samples).powi(2)).sum();
+            let scatter: f64 = sums.map(|block| (block.sum - mean * block.samples).powi(2)).sum();
             let count = blocks as f64;
             (count / (count - 1.0) * scatter).sqrt() / samples
         });
@@ -99,6 +105,17 @@ impl BlockMean {
     pub fn interval(&self) -> Option<[f64; 2]> {
         let half = quantile_975(self.blocks.saturating_sub(1) as f64) * self.standard_error?;
         Some([self.mean - half, self.mean + half])
+    }
+
+    /// 95 % interval of a mean that cannot be negative, made on the logarithm so that it stays so: m · exp(± t · se / m) (delta
+    /// method).
+    pub fn positive_interval(&self) -> Option<[f64; 2]> {
+        let standard_error = self.standard_error?;
+        if self.mean <= 0.0 {
+            return Some([0.0, 0.0]);
+        }
+        let half = quantile_975(self.blocks.saturating_sub(1) as f64) * standard_error / self.mean;
+        Some([self.mean * (-half).exp(), self.mean * half.exp()])
     }
 
     /// 95 % interval of the square root of a mean of squares, made on the logarithm so that it stays positive:
@@ -150,6 +167,10 @@ mod tests {
             prop_assert!(scaled);
             let positive = one.and_then(|mean| mean.root_interval()).is_some_and(|[low, high]| 0.0 <= low && low <= high);
             prop_assert!(positive);
+            // Its square root is the interval of the square root.
+            let squared = one.and_then(|mean| Some((mean.positive_interval()?, mean.root_interval()?)));
+            let same = |(of, root): ([f64; 2], [f64; 2])| (0..2).all(|end| (of[end].sqrt() - root[end]).abs() <= CLOSE * root[end].max(1.0));
+            prop_assert!(squared.is_some_and(same));
         }
     }
 }

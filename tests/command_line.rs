@@ -118,6 +118,49 @@ fn implanted_flights_are_read_like_any_and_carry_their_truth() -> Result<()> {
 }
 
 #[test]
+fn a_comparison_with_a_network_says_who_explains_what() -> Result<()> {
+    let place = folder()?;
+    let run = |arguments: &[&str]| -> Result<Output> {
+        let output = phyture(place.path(), arguments)?;
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        Ok(output)
+    };
+    run(&["simulate", "data", "--minutes", "2", "--seed", "7303"])?;
+    run(&["calibrate", "data", "-o", "model.toml"])?;
+    let own = "[[effect]]\nkind = \"formula\"\nname = \"side_force\"\nchannel = \"vy_dot\"\nformula = \"vy * abs(vy)\"\ncoefficient = 0.0\n";
+    std::fs::write(place.path().join("more.toml"), format!("[model]\nbaseline = \"paper\"\n{own}"))
+        .map_err(Error::io("more.toml"))?;
+    run(&["calibrate", "data", "-m", "more.toml", "-o", "amended.toml"])?;
+    let config = "epochs = 2\nstride = 20\n[linear]\nlags = 3\n[network]\nhistory = 16\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\nmoving_average = 5\n";
+    std::fs::write(place.path().join("train.toml"), config).map_err(Error::io("train.toml"))?;
+    run(&["train", "data", "-m", "amended.toml", "-o", "run", "--config", "train.toml"])?;
+    // The first model is the reference, unless it is the network's own: the variance takes its place.
+    for (models, reference) in
+        [(&["-m", "model.toml", "-m", "amended.toml"][..], "model"), (&["-m", "amended.toml"], "mean of the measurements")]
+    {
+        let asked = ["-n", "run", "--stride", "20", "--uncertainty", "--report", "report", "--json", "-"];
+        let output = run(&[&["compare", "data"], models, &asked].concat())?;
+        let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        let shares = &found["shares"][0];
+        assert_eq!(
+            (&shares["name"], &shares["model"], &shares["reference"]),
+            (&"run".into(), &"amended".into(), &reference.into())
+        );
+        let share = |part: &str| shares[part]["mean"]["share"].as_f64().unwrap_or(f64::NAN);
+        assert!(
+            (share("physics") + share("network") + share("neither") - 1.0).abs() < phyture_kernels::Tolerance::Close.relative_f64()
+        );
+        assert!(shares["of_network"]["linear_history"]["vx_dot"]["ci95"].is_array(), "{shares}");
+        assert_eq!(found["uncertainty"][0]["coefficients"].as_array().map(Vec::len), Some(15));
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(text.contains("Who explains what") && text.contains("side_force.coefficient"), "{text}");
+        let page = std::fs::read_to_string(place.path().join("report/report.html")).map_err(Error::io("report.html"))?;
+        assert!(page.contains(">Who explains what</h2>") && page.contains(">What the uncertain coefficients do</h2>"));
+    }
+    Ok(())
+}
+
+#[test]
 fn a_convention_fault_exits_with_3_after_its_report_is_written() -> Result<()> {
     let place = folder()?;
     assert!(phyture(place.path(), &["simulate", "data", "--minutes", "3", "--seed", "7301"])?.status.success());

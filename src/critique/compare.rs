@@ -4,6 +4,8 @@
 //! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
 
 use super::regime::Regime;
+use super::shares::Shares;
+use super::uncertainty::Uncertainty;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::{Error, Result};
 use crate::flight::split::Part;
@@ -135,6 +137,12 @@ pub struct Comparison {
     pub target: Targets,
     /// Where the windows come from.
     pub split: Part,
+    /// Who explains what, one entry a trained network; added by whoever has the network (see [`super::shares`]).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shares: Vec<Shares>,
+    /// What the uncertainty of the physical coefficients does, one entry a trained network, if it was asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub uncertainty: Vec<Uncertainty>,
 }
 
 /// Lays the predictions of each row beside the measured targets at the last row of each window.
@@ -150,7 +158,13 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
         Ok(model_error(row, &measured, &groups))
     });
     let models = models.collect::<Result<_>>()?;
-    Ok(Comparison { models, target: if derived { Targets::Derived } else { Targets::Recorded }, split })
+    Ok(Comparison {
+        models,
+        target: if derived { Targets::Derived } else { Targets::Recorded },
+        split,
+        shares: Vec::new(),
+        uncertainty: Vec::new(),
+    })
 }
 
 /// The measured accelerations at the last row of each window, in the order of [`Column::TARGETS`].

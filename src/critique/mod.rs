@@ -6,10 +6,14 @@ pub mod diagnose;
 pub mod locate;
 pub mod regime;
 pub mod residual_views;
+pub mod shares;
 pub mod table;
+pub mod uncertainty;
 pub mod unknown;
 pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
 pub use regime::Regime;
+pub use shares::{Shares, shares};
+pub use uncertainty::{Uncertainty, uncertainty};
 pub use yardstick::{centred_difference, finite_difference, ridge};

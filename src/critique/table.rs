@@ -136,8 +136,31 @@ impl fmt::Display for Comparison {
         if self.models.len() > 1 {
             writeln!(f, "\n* best of the column (of the row, by manoeuvre and regime)")?;
         }
+        self.shares.iter().try_for_each(|shares| writeln!(f, "\n{shares}"))?;
+        self.uncertainty.iter().try_for_each(|uncertainty| writeln!(f, "\n{uncertainty}"))?;
         Ok(())
     }
+}
+
+/// Writes rows of texts under headings with units, right-aligned, indented by two.
+pub(super) fn aligned(f: &mut fmt::Formatter<'_>, heads: &[(&str, &str)], rows: &[(String, Vec<String>)]) -> fmt::Result {
+    let wide = |text: &str| text.chars().count();
+    let first = rows.iter().map(|(name, _)| wide(name)).max().unwrap_or(0);
+    let width = |(column, head): (usize, &(&str, &str))| {
+        let cells = rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|cell| wide(cell));
+        cells.chain([wide(head.0), wide(head.1)]).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = heads.iter().enumerate().map(width).collect();
+    let mut line = |name: &str, cells: &mut dyn Iterator<Item = &str>| {
+        let mut text = format!("  {name:<first$}");
+        cells.zip(&widths).for_each(|(cell, width)| text.push_str(&format!("  {cell:>width$}")));
+        writeln!(f, "{}", text.trim_end())
+    };
+    line("", &mut heads.iter().map(|head| head.0))?;
+    if heads.iter().any(|head| !head.1.is_empty()) {
+        line("", &mut heads.iter().map(|head| head.1))?;
+    }
+    rows.iter().try_for_each(|(name, cells)| line(name, &mut cells.iter().map(String::as_str)))
 }
 
 /// Writes one table. With a `kind`, the best of each column is marked; without, the first column is a count and the best

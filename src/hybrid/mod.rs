@@ -5,12 +5,17 @@
 
 pub mod linear;
 pub mod scaling;
+pub mod sensitivity;
 pub mod sequence;
+mod stages;
 mod stream;
+mod target;
 
 use linear::Linear;
 pub use scaling::{Scale, Scaling};
+pub use stages::Stages;
 pub use stream::StreamingHybrid;
+pub use target::{NetworkTarget, network_target};
 
 use crate::blocks::Blocks;
 use crate::error::{Error, Result};
@@ -56,11 +61,15 @@ impl Description {
     /// # Errors
     /// [`Error::Config`] if the configuration is impossible.
     pub fn network(&self, standardise_loss: bool) -> Result<Network<f32>> {
-        let output = OutputScale {
+        Network::new(&self.config, &self.output_scale(), standardise_loss)
+    }
+
+    /// From the network's unit scale to physical units.
+    fn output_scale(&self) -> OutputScale {
+        OutputScale {
             scale: self.scaling.output.iter().map(|scale| scale.deviation).collect(),
             offset: self.scaling.output.iter().map(|scale| scale.mean).collect(),
-        };
-        Network::new(&self.config, &output, standardise_loss)
+        }
     }
 
     /// Refuses sizes that do not fit each other and numbers that are not finite: a description may come from any file.
@@ -216,20 +225,29 @@ impl Hybrid {
     /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; what evaluating the
     /// model gives.
     pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
+        self.check_windows(flights, windows)?;
+        self.complete_windows(&sequence::sequences(flights, &self.description)?, windows, threads)
+    }
+
+    /// Refuses a flight sampled at another step than the training data, and a window without a full history.
+    fn check_windows(&self, flights: &[Flight], windows: &[Window]) -> Result<()> {
         let config = &self.description.config;
         flights.iter().try_for_each(|flight| self.description.check_step(flight))?;
         let whole = |window: &Window| {
             window.last + 1 >= config.history && flights.get(window.flight).is_some_and(|flight| window.last < flight.len())
         };
-        if let Some(window) = windows.iter().find(|window| !whole(window)) {
-            return Err(Error::Config {
+        windows.iter().find(|window| !whole(window)).map_or(Ok(()), |window| {
+            Err(Error::Config {
                 place: "prediction".into(),
                 field: "window".into(),
                 found: format!("flight {}, row {}", window.flight, window.last),
                 expected: format!("a row with a full history of {} samples", config.history),
-            });
-        }
-        let sequences = sequence::sequences(flights, &self.description)?;
+            })
+        })
+    }
+
+    /// The network on windows that have been checked, on top of the sequences' baselines.
+    fn complete_windows(&self, sequences: &[sequence::Sequence], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
         let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
         let mut predicted = Vec::with_capacity(windows.len());
         for chunk in windows.chunks(CHUNK) {

@@ -11,4 +11,5 @@ pub mod safetensors;
 
 pub use config::{PhyTureConfig, Variant};
 pub use layers::{Init, Recorder};
+pub(crate) use phyture::LossRule;
 pub use phyture::{Network, OutputScale};

@@ -6,8 +6,9 @@ use super::figures::{self, BinnedPanel, LineData, PANELS};
 use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
 use crate::critique::compare::deviation;
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
+use crate::critique::shares::bars;
 use crate::critique::table::{Kind, MEASURES, significant};
-use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row};
+use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};
 
@@ -41,6 +42,14 @@ pub fn compare_page(report: &CompareReport<'_>) -> Result<Page> {
     let deviation = deviation(report.flights, report.windows)?;
     let located = stretches(report.flights, report.windows, row)?;
     let mut sections = vec![Section { title: "Error per channel".into(), parts: error_tables(report.comparison) }];
+    if !report.comparison.shares.is_empty() {
+        let parts = report.comparison.shares.iter().flat_map(share_parts).collect();
+        sections.push(Section { title: "Who explains what".into(), parts });
+    }
+    if !report.comparison.uncertainty.is_empty() {
+        let parts = report.comparison.uncertainty.iter().flat_map(uncertainty_parts).collect();
+        sections.push(Section { title: "What the uncertain coefficients do".into(), parts });
+    }
     sections.push(maps(model, &deviation));
     let mut traces = Vec::new();
     if let Some(found) = located {
@@ -104,6 +113,7 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
             }
         });
     }
+    out.extend(report.comparison.shares.iter().find(|shares| shares.name == model.name).and_then(Shares::sentence));
     let worst_part = |parts: &std::collections::BTreeMap<String, PartError>| {
         let score = |part: &PartError| normalised(part, deviation).into_iter().flatten().reduce(f64::max);
         let scored = parts.iter().filter_map(|(name, part)| Some((name.clone(), score(part)?)));
@@ -156,6 +166,76 @@ fn error_tables(comparison: &Comparison) -> Vec<Part> {
     let note =
         "* best of the column. The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.";
     MEASURES.into_iter().map(table).chain([Part::Text(note.into())]).collect()
+}
+
+/// A bar and a table with intervals for one network.
+fn share_parts(shares: &Shares) -> Vec<Part> {
+    let (physics, neither) = (("named physics", shares.physics), ("neither", shares.neither));
+    let learned = match shares.of_network {
+        None => vec![("network", shares.network)],
+        Some(parts) => vec![("linear history", parts.linear_history), ("network itself", parts.network_itself)],
+    };
+    let stacked: Vec<_> = [physics].into_iter().chain(learned).chain([neither]).collect();
+    let bars = bars(&stacked.iter().map(|(_, share)| *share).collect::<Vec<_>>());
+    let rows: Vec<String> = bars.iter().map(|(name, _)| name.clone()).collect();
+    let values = |part: usize| bars.iter().filter_map(|(_, values)| values.get(part).copied()).collect();
+    let of_parts: Vec<(String, Vec<f64>)> =
+        stacked.iter().enumerate().map(|(part, (name, _))| ((*name).to_owned(), values(part))).collect();
+    let mut basis = shares.basis();
+    basis.replace_range(..1, "S");
+    let caption = format!("{basis}. A part left of zero makes the error larger.");
+    let lines = shares.lines().into_iter().map(|(name, of)| {
+        let cell = |share: &Option<crate::critique::shares::Share>| {
+            let Some(share) = share else { return Cell::from("–") };
+            let interval = share.interval_text();
+            Cell::from(if interval.is_empty() { share.text() } else { format!("{} ({interval})", share.text()) })
+        };
+        // Without the blanks that set off a part in plain text.
+        let name = if name.starts_with(' ') { format!("of it: {}", name.trim()) } else { name.to_owned() };
+        [Cell::from(name)].into_iter().chain(of.all().iter().map(cell)).collect()
+    });
+    let note = "Neither holds sensor noise, gusts, and physics that the network did not learn: it bounds the noise from above. The \
+                intervals say how far a share would move on other flights of this kind, not with another training of the network.";
+    let table = Table {
+        caption: format!("Shares in percent, 95 % interval from {} blocks of ten seconds in brackets", shares.blocks),
+        columns: channel_columns("part", true, true),
+        rows: lines.collect(),
+    };
+    let figure = figures::shares("Who explains what", &caption, &rows, &of_parts);
+    vec![Part::Figure(figure), Part::Table(table), Part::Text(note.into())]
+}
+
+/// Coefficient × channel, shaded by the share of the error, and the totals.
+fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
+    let (sd, share) = (uncertainty.sd.channels(), uncertainty.share_of_rmse.channels());
+    let cell = |channel: usize, value: Option<f64>| MapCell {
+        text: Kind::Error.text(value),
+        detail: String::new(),
+        // sd / share is the RMSE of the channel.
+        value: value
+            .zip(share[channel])
+            .zip(sd[channel])
+            .filter(|(_, sd)| *sd > 0.0)
+            .map(|((value, share), sd)| value * share / sd),
+    };
+    let rows = uncertainty.coefficients.iter().map(|one| {
+        let [low, high] = one.ci95;
+        let interval = format!("{} … {} {}", significant(low, 3), significant(high, 3), one.unit);
+        let cells = one.movement.channels().into_iter().enumerate().map(|(channel, value)| cell(channel, value)).collect();
+        (format!("{} {}", one.effect, one.name), interval, cells)
+    });
+    let map = Map {
+        caption: format!("Movement of {} when a coefficient moves by half its 95 % interval, root mean square", uncertainty.name),
+        shade: "movement over the RMSE of the channel".into(),
+        columns: channel_columns("coefficient", false, false),
+        rows: rows.collect(),
+    };
+    let totals = uncertainty.totals().into_iter().map(|(name, of, kind)| {
+        [Cell::from(name)].into_iter().chain(of.channels().map(|value| Cell::from(kind.text(value)))).collect()
+    });
+    let table =
+        Table { caption: "All coefficients together".into(), columns: channel_columns("", false, false), rows: totals.collect() };
+    vec![Part::Map(map), Part::Table(table), Part::Text(uncertainty.note())]
 }
 
 fn with_mean(values: &PerChannel) -> Vec<Option<f64>> {

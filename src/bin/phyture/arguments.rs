@@ -140,6 +140,9 @@ pub enum Command {
         /// Add a ridge regression on so many lags, fitted on the training part, as a further row
         #[arg(long, value_name = "LAGS")]
         ridge: Option<usize>,
+        /// Show how far each network's prediction moves with the intervals of its model's coefficients
+        #[arg(long, requires = "network")]
+        uncertainty: bool,
         /// What trains and what tests.
         #[command(flatten)]
         division: Division,

@@ -3,6 +3,8 @@
 use super::predict::read_network;
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
+use phyture::critique::shares::{self, shares};
+use phyture::critique::uncertainty::{Effort, uncertainty};
 use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::{TEST_STRIDE, windows};
@@ -29,6 +31,8 @@ pub struct Wanted<'a> {
     pub all: bool,
     /// Lags of a ridge regression beside the models.
     pub ridge: Option<usize>,
+    /// How far the networks' predictions move with the intervals of their models' coefficients.
+    pub uncertainty: bool,
 }
 
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
@@ -60,7 +64,14 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let split = split?;
     let stride = wanted.stride.unwrap_or(if networks.is_empty() { 1 } else { TEST_STRIDE });
     let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
-    let contest = Contest { models: &models, networks: &networks, ridge: wanted.ridge, history: rows_needed, stride };
+    let contest = Contest {
+        models: &models,
+        networks: &networks,
+        ridge: wanted.ridge,
+        history: rows_needed,
+        stride,
+        uncertainty: wanted.uncertainty,
+    };
     let result = contest.run(context, &set, &split)?;
     context.say(format!("\n{}", result.comparison));
     if let Some(folder) = wanted.report {
@@ -92,6 +103,8 @@ pub struct Contest<'a> {
     pub history: usize,
     /// Samples between windows.
     pub stride: usize,
+    /// Whether the uncertainty of the physical coefficients is carried through the networks.
+    pub uncertainty: bool,
 }
 
 /// A comparison and what it was made from.
@@ -123,10 +136,24 @@ impl Contest<'_> {
             let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
             rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
         }
+        let reference = rows.len() - self.models.len();
+        let mut judged = Vec::new();
         for (name, hybrid) in self.networks {
-            rows.push(Row { name: name.clone(), predicted: hybrid.predict(&set.flights, &windows, context.threads())? });
+            let stages = hybrid.stages(&set.flights, &windows, context.threads())?;
+            let own = &hybrid.description().model;
+            // The first model is what the shares are of, unless the network was trained on that very model.
+            let other = self.models.first().is_some_and(|(_, model)| model.effects != own.effects);
+            let model = self.models.iter().find(|(_, model)| model.effects == own.effects).map_or(&own.name, |(name, _)| name);
+            let row = other.then(|| rows.get(reference)).flatten();
+            judged.push(shares(&set.flights, &windows, row, &shares::Judged { name, model, stages: &stages })?);
+            rows.push(Row { name: name.clone(), predicted: stages.hybrid });
         }
-        let comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        comparison.shares = judged;
+        for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
+            let effort = Effort::for_history(hybrid.description().config.history, context.seed());
+            comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, context.threads())?);
+        }
         Ok(Judged { comparison, windows, focus: rows.len() - 1, rows })
     }
 }

@@ -89,8 +89,14 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
 
     context.say("\n5. Measured against predicted on the locked flights, which neither saw");
     let history = config.network.history;
-    let contest =
-        Contest { models: &[("baseline".into(), model)], networks: &[("hybrid".into(), hybrid)], ridge: None, history, stride: 5 };
+    let contest = Contest {
+        models: &[("baseline".into(), model)],
+        networks: &[("hybrid".into(), hybrid)],
+        ridge: None,
+        history,
+        stride: 5,
+        uncertainty: false,
+    };
     let judged = contest.run(context, &set, &split)?;
     context.say(format!("\n{}", judged.comparison));
     let provenance = [

@@ -41,7 +41,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Command::Check { data, model } => check::run(&context, data, model.as_deref()),
         Command::Calibrate { data, model, output, division } => calibrate::run(&context, data, model.as_deref(), output, division),
-        Command::Compare { data, model, network, report, stride, all, ridge, division } => {
+        Command::Compare { data, model, network, report, stride, all, ridge, uncertainty, division } => {
             let wanted = compare::Wanted {
                 models: model,
                 networks: network,
@@ -49,6 +49,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 stride: *stride,
                 all: *all,
                 ridge: *ridge,
+                uncertainty: *uncertainty,
             };
             compare::run(&context, data, &wanted, division)
         }
