@@ -126,7 +126,7 @@ pub fn uncertainty(
         name: estimate.name.clone(),
         unit: estimate.unit.clone(),
         value: estimate.value,
-        ci95: estimate.ci95,
+        ci95: estimate.ci95.unwrap_or([estimate.value; 2]),
         movement: per_channel(*whole),
         movement_of_physics: per_channel(*physics),
     });

@@ -39,8 +39,10 @@ impl Hybrid {
                 effect: effect.name.clone(),
                 name: coefficient.name.clone(),
                 value: coefficient.value,
-                ci95: coefficient.ci95.filter(|bounds| bounds.iter().all(|bound| bound.is_finite()))?,
+                ci95: Some(coefficient.ci95.filter(|bounds| bounds.iter().all(|bound| bound.is_finite()))?),
                 unit: coefficient.unit.clone(),
+                bounds: None,
+                by_flight: None,
             })
         })
         .collect()
@@ -158,10 +160,9 @@ impl Hybrid {
     }
 }
 
-/// Half the width of the 95 % interval.
+/// Half the width of the 95 % interval; zero without one.
 pub fn half_width(estimate: &Estimate) -> f64 {
-    let [low, high] = estimate.ci95;
-    0.5 * (high - low)
+    estimate.ci95.map_or(0.0, |[low, high]| 0.5 * (high - low))
 }
 
 /// Standard normal (Box & Muller 1958), number `index` of draw `draw`.
