@@ -156,6 +156,9 @@ pub enum Command {
         /// Model file [default: the paper's baseline]; effects that are switched off in it are tried too
         #[arg(short, long)]
         model: Option<PathBuf>,
+        /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
+        #[arg(long, value_name = "RUN")]
+        of_network: Option<PathBuf>,
         /// Folder for the HTML page
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,

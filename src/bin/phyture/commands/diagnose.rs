@@ -1,10 +1,12 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
+use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose};
-use phyture::flight::DataSet;
+use phyture::flight::{DataSet, Flight, Span};
+use phyture::hybrid::network_target;
 use phyture::flight::split::Split;
 use phyture::physics::{Entry, Model, calibrate};
 use phyture::{Error, Result};
@@ -13,6 +15,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Most windows of a network with a short history that are evaluated when its output is searched; a long one costs ten times as much.
+const MOST_WINDOWS: usize = 100_000;
+/// A history of at most this many rows is short.
+const SHORT_HISTORY: usize = 256;
 /// Rounds of `loop` before it stops by itself.
 const MOST_ROUNDS: usize = 4;
 
@@ -71,24 +77,52 @@ fn prepare(context: &Context, data: &Data, model: &Model, division: &Division) -
     Ok(Some((set, split, sha)))
 }
 
+/// What `diagnose` was asked for.
+pub struct Wanted<'a> {
+    /// Model file.
+    pub model: Option<&'a Path>,
+    /// Run folder: search what its network learned.
+    pub of_network: Option<&'a Path>,
+    /// Folder for the page.
+    pub report: Option<&'a Path>,
+    /// Most effects to name.
+    pub max_effects: usize,
+}
+
 /// `diagnose`.
-pub fn run(
-    context: &Context,
-    data: &Data,
-    model: Option<&Path>,
-    report: Option<&Path>,
-    max_effects: usize,
-    division: &Division,
-) -> Result<ExitCode> {
-    let model = context.model(model)?;
-    let Some((set, split, data_sha256)) = prepare(context, data, &model, division)? else {
+pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Division) -> Result<ExitCode> {
+    let hybrid = wanted.of_network.map(read_network).transpose()?;
+    let model = match (&hybrid, wanted.model) {
+        (Some(hybrid), None) => hybrid.description().model.clone(),
+        (_, model) => context.model(model)?,
+    };
+    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
-    let options = Options { max_effects, seed: context.seed(), ..Options::default() };
+    if let Some(hybrid) = hybrid {
+        let samples: usize = set.flights.iter().map(Flight::len).sum();
+        let affordable = if hybrid.description().config.history <= SHORT_HISTORY { MOST_WINDOWS } else { MOST_WINDOWS / 10 };
+        let stride = samples.div_ceil(affordable).max(1);
+        context.say(format!(
+            "searching what the network learned, in place of the measured accelerations: every {stride}{} sample",
+            if stride == 1 { "st" } else { "th" }
+        ));
+        let whole: Vec<Span> =
+            set.flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() }).collect();
+        let target = network_target(&hybrid, &set.flights, &whole, stride, context.threads())?;
+        split = Split {
+            training: target.spans(&split.training),
+            validation: target.spans(&split.validation),
+            test: target.spans(&split.test),
+            tested: split.tested,
+        };
+        set = target.set;
+    }
+    let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
     let task = Task { set: &set, split: &split, data_sha256, options };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", outcome.diagnosis));
-    let _ = report;
+    let _ = wanted.report;
     context.json(&outcome.diagnosis)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -59,8 +59,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Predict { data, model, network, output, stride } => {
             predict::run(&context, data, &predict::Wanted { model: model.as_deref(), network, output, stride: *stride })
         }
-        Command::Diagnose { data, model, report, max_effects, division } => {
-            diagnose::run(&context, data, model.as_deref(), report.as_deref(), *max_effects, division)
+        Command::Diagnose { data, model, of_network, report, max_effects, division } => {
+            let (model, of_network, report) = (model.as_deref(), of_network.as_deref(), report.as_deref());
+            diagnose::run(&context, data, &diagnose::Wanted { model, of_network, report, max_effects: *max_effects }, division)
         }
         Command::Loop { data, model, output, report, division } => {
             diagnose::run_loop(&context, data, model.as_deref(), output, report.as_deref(), division)
