@@ -7,19 +7,25 @@
 //! Nothing here reads a file or draws a picture, and nothing knows of the built-in simulator.
 
 mod candidate;
+mod confirm;
+mod describe;
 mod design;
 mod engine;
 mod fit;
+mod gates;
 mod gram;
+mod refine;
 mod report;
 mod resample;
 mod rest;
+mod score;
 mod search;
 mod significance;
 mod textbook;
+mod verdict;
 
 pub use report::{
     CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
 };
-pub use search::{Options, Outcome, diagnose};
 pub use textbook::{Named, textbook};
+pub use verdict::{Options, Outcome, diagnose, nothing};

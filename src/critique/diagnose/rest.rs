@@ -22,8 +22,18 @@ pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], blo
     let table = ResidualTable::new(flights, spans, &residual, block_s, ROWS_MAX)?;
     match unknown(&table, &UnknownOptions { seed, ..UnknownOptions::default() }) {
         Err(crate::Error::Undetermined(_)) => Ok(Vec::new()),
-        found => found,
+        found => Ok(found?.into_iter().filter(|unknown| unknown.r2 >= least(unknown)).collect()),
     }
+}
+
+/// R² from which a dependence on a stick or a rate is believed: a pilot who answers gusts makes the sticks and rates tell of gusts that
+/// still blow, which no effect of the aircraft is (seen without a hidden effect: up to 0.05).
+const LEAST_OF_LOOP: f64 = 0.1;
+
+fn least(unknown: &Unknown) -> f64 {
+    let of_loop = ["u1", "u2", "u3", "u4", "wx", "wy", "wz"];
+    let first = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
+    if of_loop.contains(&first) { LEAST_OF_LOOP } else { 0.0 }
 }
 
 /// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the

@@ -4,10 +4,10 @@ use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check::check;
-use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose};
+use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose, nothing};
+use phyture::flight::split::Split;
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
-use phyture::flight::split::Split;
 use phyture::physics::{Entry, Model, calibrate};
 use phyture::{Error, Result};
 use serde::Serialize;
@@ -46,20 +46,7 @@ impl Task<'_> {
 
 /// The verdict where the log is not what the program takes it for.
 fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
-    Diagnosis {
-        verdict: Verdict::ConventionFault,
-        summary,
-        accepted: Vec::new(),
-        steps: Vec::new(),
-        candidates: Vec::new(),
-        unknown: None,
-        locked: None,
-        method: None,
-        notes: Vec::new(),
-        seconds: 0.0,
-        version: env!("CARGO_PKG_VERSION").into(),
-        data_sha256,
-    }
+    Diagnosis { data_sha256, ..nothing(Verdict::ConventionFault, summary) }
 }
 
 /// Reads and checks the flights and divides them. `None` after a convention fault, which is reported.

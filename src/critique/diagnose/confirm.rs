@@ -1,0 +1,98 @@
+//! The confirmation: errors on flights that no search has seen, with none, one, two … of the accepted effects.
+
+use super::design::Design;
+use super::engine::{Engine, FOLDS, priors};
+use super::fit::{Reduced, Solution, components};
+use super::gram::{blocks, grams};
+use super::report::Locked;
+use super::resample::{RESAMPLES, draw, quantile};
+use crate::critique::compare::PerChannel;
+use crate::error::Result;
+use crate::flight::{Column, Flight, Span};
+use crate::physics::Model;
+
+/// Errors on flights that no search has seen, of each of the models.
+pub(super) fn confirm(
+    flights: &[Flight],
+    models: &[Model],
+    locked: &[Span],
+    part: &str,
+    block_s: f64,
+    correlation: f64,
+) -> Result<Option<Locked>> {
+    let cut = blocks(flights, locked, block_s);
+    if cut.is_empty() {
+        return Ok(None);
+    }
+    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
+    let engine = Engine { flights, blocks: cut, fold, correlation };
+    let mut errors = Vec::new();
+    for model in models {
+        errors.push(errors_under(&engine, model)?);
+    }
+    let rows = engine.rows() as f64;
+    let rmse = |errors: &[Vec<f64>; 6]| {
+        PerChannel::new(std::array::from_fn(|channel| Some((errors[channel].iter().sum::<f64>() / rows).sqrt())))
+    };
+    let (Some(first), Some(last)) = (errors.first(), errors.last()) else { return Ok(None) };
+    let mse_fall = (0..6)
+        .filter(|&channel| first[channel] != last[channel])
+        .map(|channel| {
+            let (before, after) = (&first[channel], &last[channel]);
+            let fall = |drawn: &mut dyn Iterator<Item = usize>| {
+                let (mut b, mut a) = (0.0, 0.0);
+                drawn.for_each(|block| (b, a) = (b + before[block], a + after[block]));
+                1.0 - a / b
+            };
+            let whole = fall(&mut (0..before.len()));
+            let mut worlds: Vec<f64> = (0..RESAMPLES).map(|world| fall(&mut draw(before.len(), 0, world).into_iter())).collect();
+            worlds.sort_by(f64::total_cmp);
+            let name = Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
+            (name, [whole, quantile(&worlds, 0.025), quantile(&worlds, 0.975)])
+        })
+        .collect();
+    let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
+    Ok(Some(Locked {
+        part: part.into(),
+        duration_s: rows * step_s,
+        rmse_before: rmse(first),
+        rmse_after: rmse(last),
+        mse_fall,
+        waterfall: errors.iter().map(rmse).collect(),
+    }))
+}
+
+/// Squared error of each block of each channel under a model's own numbers; properties of a flight are found from its other blocks.
+pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
+    let mut design = Design::default();
+    let layout = design.add(&model.regressors(|_| true)?);
+    let grams = grams(engine.flights, &engine.blocks, &design)?;
+    let priors = priors(model, &layout);
+    let mut errors: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::new());
+    for (channels, members) in components(&layout) {
+        let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &grams)).collect();
+        let value = |free: usize| {
+            let free = layout.free[free];
+            let effect = model.effects.get(free.effect);
+            effect.and_then(|effect| effect.coefficients.get(free.coefficient)).map_or(0.0, |coefficient| coefficient.value)
+        };
+        // Weights of channels that share a property of a flight: their inverse error without it.
+        let weights: [f64; 6] = std::array::from_fn(|channel| {
+            let position = channels.iter().position(|&other| other == channel);
+            let global = |free: usize| if priors[free].by_flight.is_some() { 0.0 } else { value(free) };
+            let error =
+                position.map(|position| (0..engine.blocks.len()).map(|block| reduced[position].error(block, &global)).sum::<f64>());
+            error.map_or(1.0, |error| engine.rows() as f64 / error.max(f64::MIN_POSITIVE))
+        });
+        let component = engine.component(&channels, &members, &reduced, &weights, &priors);
+        let solution = Solution {
+            values: members.iter().map(|&member| if priors[member].by_flight.is_some() { 0.0 } else { value(member) }).collect(),
+            bound: vec![false; members.len()],
+            by_flight: Vec::new(),
+        };
+        for (channel, found) in component.errors_under(&solution, FOLDS, &|block| engine.fold[block]).unwrap_or_default() {
+            errors[channel] = found;
+        }
+    }
+    Ok(errors)
+}

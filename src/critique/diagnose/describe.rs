@@ -1,0 +1,150 @@
+//! From what a search found to what is said of it. No measuring here.
+
+use super::candidate::Candidate;
+use super::engine::Trial;
+use super::gates::SMALLEST_FALL;
+use super::report::{CandidateReport, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
+use super::score::Scored;
+use super::search::Search;
+use crate::flight::Column;
+use crate::physics::{Coefficient, Parameter};
+use std::collections::BTreeMap;
+
+impl Search<'_> {
+    pub(super) fn step(&self, chosen: &Scored<'_>, refined: &Trial, indistinguishable: Vec<String>) -> Step {
+        let definition = chosen.candidate.definition;
+        let empty = Vec::new();
+        let effect = refined.model.effects.last();
+        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
+        let worthy = chosen.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
+        let number = |coefficient: &Coefficient| {
+            let known = definition.and_then(|definition| definition.coefficient(&coefficient.name));
+            let rms = coefficient
+                .by_flight
+                .as_ref()
+                .map(|values| (values.values().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt());
+            Number {
+                name: coefficient.name.clone(),
+                value: coefficient.value,
+                ci95: None,
+                unit: coefficient.unit.clone(),
+                expected: known.and_then(|known| known.expected),
+                rms_over_flights: rms,
+            }
+        };
+        Step {
+            effect: chosen.candidate.id.clone(),
+            meaning: chosen.candidate.effect.meaning.clone(),
+            channels: worthy.map(|(&channel, _)| name(channel)).collect(),
+            held_out_mse_fall: chosen.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
+            p_value: chosen.p_value,
+            selection_frequency: 0.0,
+            stability: String::new(),
+            indistinguishable,
+            coefficients: effect.map_or(&empty, |effect| &effect.coefficients).iter().map(number).collect(),
+            parameters: effect.map_or_else(Vec::new, |effect| {
+                let value = |parameter: &Parameter| ParameterValue {
+                    name: parameter.name.clone(),
+                    value: parameter.value,
+                    fixed: parameter.fixed,
+                    unit: parameter.unit.clone(),
+                    profile: None,
+                };
+                effect.parameters.iter().map(value).collect()
+            }),
+            would_tell_apart: definition
+                .and_then(|definition| definition.notes)
+                .map_or_else(String::new, |notes| notes.would_tell_apart.into()),
+            formula: effect.map_or_else(String::new, ToString::to_string),
+            rests_on_flight: self.decisive_flight(&chosen.gains),
+        }
+    }
+
+    /// A flight without which the gain would be gone.
+    pub(super) fn decisive_flight(&self, gains: &[f64]) -> Option<String> {
+        let total: f64 = gains.iter().sum();
+        let mut flights: Vec<usize> = self.engine.blocks.iter().map(|block| block.flight).collect();
+        flights.dedup();
+        let flight = flights.iter().zip(self.by_flight(gains)).find(|(_, gain)| total - gain <= 0.0)?.0;
+        self.engine.flights.get(*flight).map(|flight| flight.name.clone()).filter(|_| flights.len() > 1)
+    }
+
+    pub(super) fn reports(&self, open: &[&Candidate], scored: &[Scored<'_>]) -> Vec<CandidateReport> {
+        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
+        let mut reports: Vec<CandidateReport> = open
+            .iter()
+            .map(|candidate| match scored.iter().find(|scored| scored.candidate.id == candidate.id) {
+                Some(scored) => {
+                    let status = scored.status(self.largest_p);
+                    let notes = candidate.definition.and_then(|definition| definition.notes);
+                    CandidateReport {
+                        effect: candidate.id.clone(),
+                        status,
+                        held_out_mse_fall: scored.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
+                        p_value: Some(scored.p_value),
+                        detection_limit_mse_fall: scored.detection.filter(|_| scored.excited),
+                        note: (status == Status::NotExcited)
+                            .then(|| {
+                                let wanted = notes.map(|notes| format!("; wanted: {}", notes.excitation)).unwrap_or_default();
+                                format!("{} blocks carry it{wanted}", scored.carrying)
+                            })
+                            .or_else(|| {
+                                let rival = scored.rival.as_ref().filter(|_| status == Status::SamePhysics)?;
+                                Some(format!("little beside what `{rival}` removed: it may only mend its form"))
+                            }),
+                    }
+                }
+                None => CandidateReport {
+                    effect: candidate.id.clone(),
+                    status: Status::NotExcited,
+                    held_out_mse_fall: BTreeMap::new(),
+                    p_value: None,
+                    detection_limit_mse_fall: None,
+                    note: candidate.inapplicable.clone().or_else(|| Some("its regressors are those of the model".into())),
+                },
+            })
+            .collect();
+        let largest = |report: &CandidateReport| report.held_out_mse_fall.values().copied().fold(f64::NEG_INFINITY, f64::max);
+        reports.sort_by(|left, right| largest(right).total_cmp(&largest(left)));
+        reports
+    }
+}
+
+/// A selection frequency in a word.
+pub(super) fn stability(frequency: f64) -> &'static str {
+    match frequency {
+        frequency if frequency >= 0.9 => "stable",
+        frequency if frequency >= 0.6 => "likely",
+        _ => "tentative",
+    }
+}
+
+pub(super) fn summary(diagnosis: &Diagnosis) -> String {
+    let falls = |effect: &Step| {
+        let best = effect.held_out_mse_fall.iter().max_by(|left, right| left.1.total_cmp(right.1));
+        best.map(|(channel, fall)| format!("`{}` ({:.0} % of the error of {channel})", effect.effect, 100.0 * fall))
+            .unwrap_or_default()
+    };
+    match diagnosis.verdict {
+        Verdict::EffectsMissing => {
+            let names: Vec<String> = diagnosis.steps.iter().map(falls).collect();
+            format!("The model lacks {}.", names.join(", then "))
+        }
+        Verdict::NotInCatalogue => {
+            let parts: Vec<String> = diagnosis
+                .unknown
+                .iter()
+                .flatten()
+                .map(|unknown| {
+                    let on = unknown.depends_on.first().map_or("?", |first| first.variable.as_str());
+                    format!("{} depends on {on} ({:.0} % of what is left)", unknown.channel, 100.0 * unknown.r2)
+                })
+                .collect();
+            format!("Something is missing that is not in the catalogue: {}.", parts.join("; "))
+        }
+        Verdict::Explained => {
+            "No effect of the catalogue is missing that these flights could show and that would be worth while.".into()
+        }
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,239 @@
+//! One step of the search: every candidate tried beside a model, with its gain, its share of the error and its p-value.
+
+use super::candidate::{Candidate, with};
+use super::engine::{Pass, Trial};
+use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, LARGEST_GAIN, SMALLEST_FALL, SMALLEST_MOVEMENT};
+use super::report::Status;
+use super::search::Search;
+use super::significance::{Raw, block_weights, raw_scores};
+use crate::error::Result;
+use crate::physics::Model;
+use std::collections::BTreeMap;
+
+/// One candidate on one step.
+pub(super) struct Scored<'a> {
+    pub candidate: &'a Candidate,
+    /// The variant with the largest gain.
+    pub best: Trial,
+    pub gains: Vec<f64>,
+    pub gain: f64,
+    pub falls: BTreeMap<usize, f64>,
+    pub p_value: f64,
+    pub detection: Option<f64>,
+    pub excited: bool,
+    pub plausible: bool,
+    pub carrying: usize,
+    /// An accepted effect whose flaw it describes.
+    pub rival: Option<String>,
+}
+
+impl Scored<'_> {
+    pub(super) fn largest_fall(&self) -> f64 {
+        self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    pub(super) fn passes(&self, largest_p: f64) -> bool {
+        self.rival.is_none()
+            && self.excited
+            && self.plausible
+            && self.gain > 0.0
+            && self.p_value <= largest_p
+            && self.largest_fall() >= SMALLEST_FALL
+    }
+
+    pub(super) fn status(&self, largest_p: f64) -> Status {
+        match () {
+            () if !self.excited => Status::NotExcited,
+            () if self.p_value > largest_p || self.gain <= 0.0 => Status::NotSignificant,
+            () if !self.plausible => Status::Implausible,
+            () if self.rival.is_some() && self.largest_fall() >= SMALLEST_FALL => Status::SamePhysics,
+            () => Status::Negligible,
+        }
+    }
+}
+
+pub(super) struct Movement {
+    pub share: f64,
+    pub detection: f64,
+    pub carrying: usize,
+    pub excited: bool,
+}
+
+impl Search<'_> {
+    /// Tries every candidate beside a model.
+    pub(super) fn score<'c>(&self, model: &Model, open: &[&'c Candidate]) -> Result<(Trial, Vec<Scored<'c>>)> {
+        let mut models = Vec::new();
+        let mut owner = Vec::new();
+        for (index, candidate) in open.iter().enumerate().filter(|(_, candidate)| candidate.inapplicable.is_none()) {
+            for variant in &candidate.variants {
+                models.push(with(model, variant));
+                owner.push(index);
+            }
+        }
+        let pass = self.engine.pass(model, &models)?;
+        let rows: Vec<usize> = pass.grams.iter().map(|gram| gram.rows).collect();
+        let weights = block_weights(&pass.base, &rows);
+        let even: [Vec<f64>; 6] = {
+            let channel = self.engine.weights(&pass.base);
+            std::array::from_fn(|index| vec![channel[index]; rows.len()])
+        };
+        let one = |(index, candidate): (usize, &&'c Candidate)| {
+            let trials: Vec<&Trial> = owner
+                .iter()
+                .zip(&pass.trials)
+                .filter(|(owner, _)| **owner == index)
+                .filter_map(|(_, trial)| trial.as_ref())
+                .collect();
+            self.scored(candidate, &trials, &pass, &weights, &even)
+        };
+        #[cfg(feature = "rayon")]
+        let scored: Vec<Option<Scored<'c>>> = {
+            use rayon::prelude::*;
+            open.par_iter().enumerate().map(one).collect()
+        };
+        #[cfg(not(feature = "rayon"))]
+        let scored: Vec<Option<Scored<'c>>> = open.iter().enumerate().map(one).collect();
+        Ok((pass.base, scored.into_iter().flatten().collect()))
+    }
+
+    pub(super) fn scored<'c>(
+        &self,
+        candidate: &'c Candidate,
+        trials: &[&Trial],
+        pass: &Pass,
+        weights: &[Vec<f64>; 6],
+        even: &[Vec<f64>; 6],
+    ) -> Option<Scored<'c>> {
+        let gains: Vec<Vec<f64>> = trials.iter().map(|trial| gains(&pass.base, trial)).collect();
+        let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
+        let best = (0..trials.len()).max_by(|&left, &right| total(&gains[left]).total_cmp(&total(&gains[right])))?;
+        let flips = self.flips.as_ref()?;
+        let raw: Vec<Option<Raw>> = trials.iter().map(|trial| raw_scores(&pass.base, trial, &pass.grams, weights)).collect();
+        let p_value = if candidate.is_by_flight() {
+            // The blocks of a flight share its numbers: a flight is flipped as a whole.
+            let by_flight: Vec<Vec<f64>> = gains.iter().map(|gains| self.by_flight(gains)).collect();
+            flips.p_value_of_sums(&by_flight)
+        } else {
+            let whitened: Vec<_> = raw.iter().flatten().filter_map(Raw::whitened).collect();
+            if whitened.is_empty() { 1.0 } else { flips.p_value(&whitened) }
+        };
+        let movement = trials.iter().filter_map(|trial| {
+            let raw = raw_scores(&pass.base, trial, &pass.grams, even)?;
+            Some(self.movement(candidate, trial, &raw))
+        });
+        let movement = movement.max_by(|left, right| left.share.total_cmp(&right.share));
+        let trial = trials[best];
+        let (before, after) = (self.engine.mse(&pass.base), self.engine.mse(trial));
+        let falls = (0..6).filter(|&channel| trial.changed[channel] && self.touches(trial, &pass.base, channel));
+        let falls = falls.map(|channel| (channel, 1.0 - after[channel] / before[channel])).collect();
+        Some(Scored {
+            candidate,
+            best: trial.clone(),
+            gain: total(&gains[best]),
+            gains: gains[best].clone(),
+            falls,
+            p_value,
+            detection: movement.as_ref().map(|movement| movement.detection.max(SMALLEST_FALL)),
+            excited: movement.as_ref().is_some_and(|movement| movement.excited),
+            plausible: plausible(&pass.base.model, trial),
+            carrying: movement.map_or(0, |movement| movement.carrying),
+            rival: None,
+        })
+    }
+
+    /// Whether a trial has other columns than the base in a channel, or only shares coefficients with one that has.
+    pub(super) fn touches(&self, trial: &Trial, base: &Trial, channel: usize) -> bool {
+        trial.layout.channels[channel] != base.layout.channels[channel]
+    }
+
+    pub(super) fn by_flight(&self, gains: &[f64]) -> Vec<f64> {
+        let mut sums: Vec<f64> = Vec::new();
+        let mut last = None;
+        for (block, gain) in self.engine.blocks.iter().zip(gains) {
+            match sums.last_mut() {
+                Some(sum) if last == Some(block.flight) => *sum += gain,
+                _ => sums.push(*gain),
+            }
+            last = Some(block.flight);
+        }
+        sums
+    }
+
+    pub(super) fn movement(&self, candidate: &Candidate, trial: &Trial, raw: &Raw) -> Movement {
+        let rows = self.engine.rows() as f64;
+        let effect = trial.model.effects.last();
+        let mut largest = Movement { share: 0.0, detection: 1.0, carrying: 0, excited: false };
+        let mut detection = 0.0_f64;
+        for column in 0..raw.scores.ncols() {
+            let energy: f64 = raw.energy.column(column).sum();
+            let variance = raw.scores.column(column).norm_squared();
+            detection = detection.max(DETECTION * DETECTION * variance / (energy * rows));
+            let name = effect.and_then(|effect| effect.coefficients.get(column)).map(|coefficient| coefficient.name.as_str());
+            let known = candidate.definition.zip(name).and_then(|(definition, name)| definition.coefficient(name));
+            let size = match known.map(|known| known.by_flight.or(known.expected.map(|[low, high]| low.abs().max(high.abs())))) {
+                Some(Some(size)) => Some(size),
+                // A swap has the size it has; of a user's formula none is known.
+                Some(None) | None => raw.one_sided.then_some(1.0),
+            };
+            let share = size.map_or(f64::INFINITY, |size| size * (energy / rows).sqrt());
+            let mut parts: Vec<f64> = raw.energy.column(column).iter().copied().collect();
+            parts.sort_by(|left, right| right.total_cmp(left));
+            let mut sum = 0.0;
+            let carrying = 1 + parts
+                .iter()
+                .take_while(|part| {
+                    sum += **part;
+                    sum < CARRIED_SHARE * energy
+                })
+                .count();
+            let excited = share >= SMALLEST_MOVEMENT && carrying >= FEWEST_CARRYING;
+            if (excited, share) >= (largest.excited, largest.share) {
+                largest = Movement { share, detection: 1.0, carrying, excited };
+            }
+        }
+        Movement { detection: detection.min(1.0), ..largest }
+    }
+}
+
+/// A block's gain: half the logarithm of the ratio of its held-out errors, over the channels, within bounds.
+pub(super) fn gains(base: &Trial, trial: &Trial) -> Vec<f64> {
+    (0..base.errors[0].len())
+        .map(|block| {
+            (0..6)
+                .filter(|&channel| trial.changed[channel])
+                .map(|channel| {
+                    let (before, after) = (base.errors[channel][block], trial.errors[channel][block]);
+                    let gain = 0.5 * (before / after).ln();
+                    if gain.is_finite() { gain.clamp(-LARGEST_GAIN, LARGEST_GAIN) } else { 0.0 }
+                })
+                .sum()
+        })
+        .collect()
+}
+
+/// Mean difference of paired gains times their number, and its standard error.
+pub(super) fn paired(left: &[f64], right: &[f64]) -> (f64, f64) {
+    let differences: Vec<f64> = left.iter().zip(right).map(|(left, right)| left - right).collect();
+    let count = differences.len().max(1) as f64;
+    let mean = differences.iter().sum::<f64>() / count;
+    let variance = differences.iter().map(|difference| (difference - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
+    (mean * count, (variance * count).sqrt())
+}
+
+/// The controls must keep acting the way they act without the effect; an effect whose every coefficient had to be put on a bound of
+/// zero does nothing.
+pub(super) fn plausible(base: &Model, trial: &Trial) -> bool {
+    let powers = ["collective_thrust", "control_moment"];
+    let keeps = base.effects.iter().filter(|effect| powers.contains(&effect.kind.as_str())).all(|effect| {
+        let now = trial.model.effect(&effect.name);
+        effect.coefficients.iter().all(|coefficient| {
+            let value = now.and_then(|now| now.coefficient(&coefficient.name)).map_or(0.0, |now| now.value);
+            value * coefficient.value > 0.0 || coefficient.value == 0.0
+        })
+    });
+    let acts = trial.model.effects.last().is_none_or(|effect| {
+        effect.coefficients.is_empty()
+            || effect.coefficients.iter().any(|coefficient| coefficient.value != 0.0 || coefficient.by_flight.is_some())
+    });
+    keeps && acts
+}

@@ -1,0 +1,187 @@
+//! From flights and a model to a diagnosis: blocks, search, what is left, confirmation, verdict.
+
+use super::candidate::candidates;
+use super::confirm::confirm;
+use super::describe::summary;
+use super::engine::{Engine, FOLDS};
+use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
+use super::gram::blocks;
+use super::report::{CandidateReport, Diagnosis, Method, Status, Step, Verdict};
+use super::rest::{channel, dependences, stands_in};
+use super::search::{Found, Search};
+use super::significance::Flips;
+use crate::critique::unknown::Unknown;
+use crate::error::Result;
+use crate::flight::{Flight, Span};
+use crate::physics::Model;
+use phyture_kernels::random::permutation;
+use std::time::Instant;
+
+/// How a search is done.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Most effects to accept.
+    pub max_effects: usize,
+    /// Seed of folds, flips and resampling.
+    pub seed: u64,
+    /// Candidates to leave out.
+    pub without: Vec<String>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self { max_effects: 6, seed: 1, without: Vec::new() }
+    }
+}
+
+/// A diagnosis and the model with what it found.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The verdict and its figures.
+    pub diagnosis: Diagnosis,
+    /// The model with the accepted effects, fitted on the searched blocks.
+    pub model: Model,
+}
+
+/// Searches the catalogue for effects that `model` lacks on `searched` spans, and confirms them on `locked` ones (named `part`).
+///
+/// Coefficients of `model` are fitted anew; effects that are switched off in it are candidates. Verdict `convention_fault` is the
+/// caller's to give, before.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub fn diagnose(
+    flights: &[Flight],
+    model: &Model,
+    searched: &[Span],
+    locked: &[Span],
+    part: &str,
+    options: &Options,
+) -> Result<Outcome> {
+    let begun = Instant::now();
+    let mut base = model.clone();
+    base.effects.retain(|effect| effect.enabled);
+    let mut block_s = BLOCK_S;
+    let mut cut = blocks(flights, searched, block_s);
+    if cut.len() < ENOUGH_BLOCKS {
+        block_s = SHORTEST_BLOCK_S;
+        cut = blocks(flights, searched, block_s);
+    }
+    let order = permutation(cut.len(), options.seed, 0);
+    let mut fold = vec![0; cut.len()];
+    order.iter().enumerate().for_each(|(position, &block)| fold[block as usize] = position % FOLDS);
+    let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
+    let engine = Engine { flights, blocks: cut, fold, correlation: 2.0 * CORRELATION_S / step_s };
+    let mut candidates = candidates(model, flights);
+    candidates.retain(|candidate| !options.without.contains(&candidate.id));
+    let in_play = candidates.iter().filter(|candidate| candidate.inapplicable.is_none()).count().max(1);
+    let search = Search { engine, flips: None, largest_p: FAMILY_WISE / in_play as f64, options };
+    let method = Method {
+        blocks: search.engine.blocks.len(),
+        block_s,
+        correlation_s: CORRELATION_S,
+        searched_s: search.engine.rows() as f64 * step_s,
+        seed: options.seed,
+        effects_in_play: in_play,
+        largest_p_value: search.largest_p,
+        smallest_fall: SMALLEST_FALL,
+    };
+    let mut diagnosis = Diagnosis { method: Some(method), ..nothing(Verdict::TooLittleData, String::new()) };
+    let count = search.engine.blocks.len();
+    if count < FEWEST_BLOCKS {
+        diagnosis.summary = format!(
+            "{count} blocks of {block_s:.0} s are too few to tell a missing effect from chance; {FEWEST_BLOCKS} are needed, that is {:.0} s of flight.",
+            FEWEST_BLOCKS as f64 * SHORTEST_BLOCK_S
+        );
+        diagnosis.seconds = begun.elapsed().as_secs_f64();
+        return Ok(Outcome { diagnosis, model: base });
+    }
+    let search = Search { flips: Some(Flips::new(count, options.seed)), ..search };
+    let (before, held) = search.timing(&base)?;
+    if let Some(delay_s) = held {
+        diagnosis.notes.push(format!(
+            "the controls act {:.1} ms after their sample, half a step: they are held from one sample to the next. Taken as a property of \
+             the log (`control_delay_s = {delay_s}` under [data]), not as a missing effect",
+            1e3 * delay_s
+        ));
+    }
+    let (mut found, mut left) = search.forward(&before, &candidates)?;
+    let fitted = |found: &[Found]| found.last().map_or(&before, |last| &last.model).clone();
+    let unknown_of = |model: &Model| dependences(flights, model, searched, block_s, options.seed);
+    let mut unknown = unknown_of(&fitted(&found))?;
+    let stand_ins = search.stand_ins(&found, &before, &unknown)?;
+    if !stand_ins.is_empty() {
+        left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
+        search.without(&mut found, &stand_ins, &before)?;
+        unknown = unknown_of(&fitted(&found))?;
+    }
+    search.intervals(&mut found)?;
+    let mut models = vec![before.clone()];
+    models.extend(found.iter().map(|found| found.model.clone()));
+    let after = models.last().cloned().unwrap_or(before);
+
+    diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
+    diagnosis.steps = found.into_iter().map(|found| found.step).collect();
+    diagnosis.candidates = left;
+    diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
+    diagnosis.locked = confirm(flights, &models, locked, part, block_s, search.engine.correlation)?;
+    diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {
+        (false, _) => Verdict::EffectsMissing,
+        (true, false) => Verdict::NotInCatalogue,
+        (true, true) => Verdict::Explained,
+    };
+    diagnosis.unknown = (!unknown.is_empty()).then(|| unknown.iter().map(channel).collect());
+    diagnosis.summary = summary(&diagnosis);
+    diagnosis.seconds = begun.elapsed().as_secs_f64();
+    Ok(Outcome { diagnosis, model: after })
+}
+
+/// A diagnosis that says nothing but its verdict.
+pub fn nothing(verdict: Verdict, summary: String) -> Diagnosis {
+    Diagnosis {
+        verdict,
+        summary,
+        accepted: Vec::new(),
+        steps: Vec::new(),
+        candidates: Vec::new(),
+        unknown: None,
+        locked: None,
+        method: None,
+        notes: Vec::new(),
+        seconds: 0.0,
+        version: env!("CARGO_PKG_VERSION").into(),
+        data_sha256: String::new(),
+    }
+}
+
+fn accepted(step: &Step) -> CandidateReport {
+    CandidateReport {
+        effect: step.effect.clone(),
+        status: Status::Accepted,
+        held_out_mse_fall: step.held_out_mse_fall.clone(),
+        p_value: Some(step.p_value),
+        detection_limit_mse_fall: None,
+        note: None,
+    }
+}
+
+fn taken_back(found: &Found) -> CandidateReport {
+    let note = "stands in for a stronger dependence that is in no effect of the catalogue".into();
+    CandidateReport { status: Status::SamePhysics, note: Some(note), ..accepted(&found.step) }
+}
+
+impl Search<'_> {
+    /// Effects that only stand in for a dependence outside the catalogue.
+    fn stand_ins(&self, found: &[Found], before: &Model, unknown: &[Unknown]) -> Result<Vec<String>> {
+        let Some(last) = found.last().filter(|_| !unknown.is_empty()) else { return Ok(Vec::new()) };
+        let pass = self.engine.pass(before, std::slice::from_ref(&last.model))?;
+        let whole = self.engine.mse(&pass.base);
+        let left = pass.trials.first().and_then(Option::as_ref).map_or(whole, |trial| self.engine.mse(trial));
+        let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
+        let is_one = |found: &&Found| {
+            let effect = found.model.effect(&found.step.effect);
+            effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
+        };
+        Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
+    }
+}
