@@ -1,5 +1,6 @@
 //! Effects of the catalogue on made-up flights: calibrated back when formulas read other coefficients, flight by flight for wind and
 //! bias, and implanted into recorded flights.
+#![cfg(feature = "files")]
 
 mod flights;
 

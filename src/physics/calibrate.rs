@@ -171,7 +171,7 @@ pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(M
             let change: Vec<f64> = residual.iter().zip(earlier).map(|(now, earlier)| now - earlier).collect();
             let along: f64 = change.iter().zip(earlier).map(|(change, earlier)| change * earlier).sum();
             let square: f64 = change.iter().map(|change| change * change).sum();
-            stride = if square > 0.0 { (-stride * along / square).max(SHORTEST_STRIDE).min(LONGEST_STRIDE) } else { 1.0 };
+            stride = if square > 0.0 { (-stride * along / square).clamp(SHORTEST_STRIDE, LONGEST_STRIDE) } else { 1.0 };
         }
         current = found;
         for (&(effect, index), before) in read.iter().zip(before) {
