@@ -139,7 +139,7 @@ fn judge(alien: usize, found: &[Unknown]) -> (bool, bool) {
 fn hidden_dependences_are_named() -> Result<()> {
     let (mut first, mut shapes) = (0, 0);
     for (alien, (channel, formula, scale, ..)) in ALIENS.into_iter().enumerate() {
-        let table = made(100 + alien as u64, 30, 0.0)?.with(channel, formula, scale)?.table()?;
+        let table = made(100 + alien as u64, 24, 0.0)?.with(channel, formula, scale)?.table()?;
         let found = unknown(&table, &UnknownOptions::default())?;
         let (right, shaped) = judge(alien, &found);
         assert!(found.len() <= 1, "{formula}: only one channel depends: {found:?}");
@@ -185,7 +185,7 @@ fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
     for seed in 0..3 {
         let table = made(200 + seed, 30, 1.0)?.table()?;
         let search = Search::new(&table, &UnknownOptions::default());
-        let roll = search.dependence(&search.features, &table.residual[3]);
+        let roll = search.dependence(&search.features, &search.starts, &table.residual[3]);
         assert!(roll.r2_with_feedback > WORTH, "there is something to resist: {}", roll.r2_with_feedback);
         assert_eq!(unknown(&table, &UnknownOptions::default())?, []);
     }
@@ -347,7 +347,7 @@ fn measure_on_the_simulator() -> Result<()> {
                 if scale == 0.0 {
                     let search = Search::new(&table, &UnknownOptions::default());
                     for channel in 0..6 {
-                        let found = search.dependence(&search.features, &table.residual[channel]);
+                        let found = search.dependence(&search.features, &search.starts, &table.residual[channel]);
                         print!("   {:.3} {:.3} {:.2}", found.r2_with_feedback, found.r2, found.persists);
                     }
                     println!();
