@@ -19,6 +19,7 @@ pub use table::{ROW_S, ROWS_MAX, ResidualTable};
 
 use crate::error::{Error, Result};
 use crate::flight::Column;
+use nalgebra::{DMatrix, DVector};
 use persistence::Moments;
 use phyture_kernels::random::{Stream, permutation};
 use serde::Serialize;
@@ -37,6 +38,10 @@ const PERSISTS: f64 = 0.5;
 const RIVALS: usize = 4;
 /// Share of the whole dependence from which a variable alone is "nearly all of it".
 const NEARLY_ALL: f64 = 0.8;
+/// States and sticks in which a model usually has straight lines.
+const LINES: [&str; 10] = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"];
+/// Rows of value zero that a bin is taken to hold beside its own, next to lines.
+const BIN_RIDGE: f64 = 30.0;
 /// Rows of a half on which importance is measured.
 const IMPORTANCE_ROWS: usize = 3000;
 /// Where pairings are drawn.
@@ -102,7 +107,7 @@ pub struct Unknown {
 pub fn unknown(table: &ResidualTable, options: &UnknownOptions) -> Result<Vec<Unknown>> {
     check(table)?;
     let search = Search::new(table, options);
-    let whole = map(6, &|channel| search.dependence(&search.features, &table.residual[channel]));
+    let whole = map(6, &|channel| search.dependence(&search.features, &search.starts, &table.residual[channel]));
     let worth = |(_, found): &(usize, &Found)| found.r2_with_feedback > options.worth;
     if !whole.iter().enumerate().any(|found| worth(&found)) {
         return Ok(Vec::new());
@@ -121,7 +126,8 @@ pub fn unknown(table: &ResidualTable, options: &UnknownOptions) -> Result<Vec<Un
 
 fn check(table: &ResidualTable) -> Result<()> {
     let rows = table.len();
-    let even = table.features.iter().chain(&table.residual).all(|column| column.len() == rows);
+    let even = table.features.iter().chain(&table.at_start).chain(&table.residual).all(|column| column.len() == rows);
+    let even = even && (table.at_start.is_empty() || table.at_start.len() == table.features.len());
     let steady = table.block.windows(2).all(|pair| pair[1] == pair[0] || pair[1] == pair[0] + 1);
     if !even || table.names.len() != table.features.len() || !steady || table.block.first().is_some_and(|first| *first != 0) {
         let message = "columns of different length, or block numbers that do not rise by one from 0".into();
@@ -158,6 +164,7 @@ struct Search<'a> {
     /// Rows of each half to fit, and to stop on.
     rows: [[Vec<u32>; 2]; 2],
     features: Binned,
+    starts: Binned,
     groups: Vec<(String, Vec<usize>)>,
 }
 
@@ -189,21 +196,25 @@ impl<'a> Search<'a> {
                 None => groups.push((name.to_owned(), vec![feature])),
             }
         }
-        Self { table, seed: options.seed, blocks, halves, rows, features: Binned::new(&table.features), groups }
+        let features = Binned::new(&table.features);
+        let starts = if table.at_start.is_empty() { features.clone() } else { features.like(&table.at_start) };
+        Self { table, seed: options.seed, blocks, halves, rows, features, starts, groups }
     }
 
-    /// Fits each half and judges on the other.
-    fn dependence(&self, features: &Binned, residual: &[f64]) -> Found {
-        let target: Vec<f32> = residual.iter().map(|value| *value as f32).collect();
-        let models = self.rows.each_ref().map(|[fit, aside]| Boosted::fit(features, &target, fit, aside));
+    /// Fits each half and judges on the other; `starts` are the same features at the start of each row.
+    fn dependence(&self, features: &Binned, starts: &Binned, residual: &[f64]) -> Found {
+        let models = self.models(features, residual);
         let mut found = Found { r2: 0.0, r2_with_feedback: 0.0, persists: 0.0, models };
-        for (model, judged) in found.models.iter().zip([&self.halves[1], &self.halves[0]]) {
+        for (model, judged) in found.models.iter().zip(self.judged()) {
             if model.is_constant() {
                 continue;
             }
-            let mut fit = vec![0.0; residual.len()];
-            judged.iter().cloned().flatten().for_each(|row| fit[row] = model.predict(features.row(row)));
-            let moments = Moments::new(judged, residual, &fit);
+            let of = |bins: &Binned| {
+                let mut values = vec![0.0; residual.len()];
+                judged.iter().cloned().flatten().for_each(|row| values[row] = model.predict(bins.row(row)));
+                values
+            };
+            let moments = Moments::new(judged, residual, &of(features), &of(starts));
             let factor = moments.factor();
             found.r2 += 0.5 * moments.r2(factor);
             found.r2_with_feedback += 0.5 * moments.r2(1.0);
@@ -212,13 +223,43 @@ impl<'a> Search<'a> {
         found
     }
 
+    /// One model fitted to each half.
+    fn models(&self, features: &Binned, residual: &[f64]) -> [Boosted; 2] {
+        let target: Vec<f32> = residual.iter().map(|value| *value as f32).collect();
+        self.rows.each_ref().map(|[fit, aside]| Boosted::fit(features, &target, fit, aside))
+    }
+
+    /// The blocks on which each of the two models is judged.
+    fn judged(&self) -> [&[Range<usize>]; 2] {
+        [&self.halves[1], &self.halves[0]]
+    }
+
+    /// R² on the half that was not fitted, feedback included.
+    fn plain_r2(&self, residual: &[f64]) -> f64 {
+        let models = self.models(&self.features, residual);
+        let r2 = models.iter().zip(self.judged()).map(|(model, judged)| {
+            if model.is_constant() {
+                return 0.0;
+            }
+            let rows = || judged.iter().cloned().flatten();
+            let count = rows().count().max(1) as f64;
+            let of = |row: usize| [residual[row], model.predict(self.features.row(row))];
+            let [r, f] = rows().map(of).fold([0.0; 2], |sum, pair| [sum[0] + pair[0], sum[1] + pair[1]]).map(|sum| sum / count);
+            let (left, all) = rows()
+                .map(of)
+                .fold((0.0, 0.0), |(left, all), pair| (left + (pair[0] - r - (pair[1] - f)).powi(2), all + (pair[0] - r).powi(2)));
+            if all > 0.0 { 1.0 - left / all } else { 0.0 }
+        });
+        0.5 * r2.sum::<f64>()
+    }
+
     /// 95 % quantile of the largest R² of the six channels over pairings of residuals with the features of another block.
     fn null(&self, count: usize) -> f64 {
         let pairings: Vec<Vec<usize>> = (0..count as u64).map(|index| self.pairing(index)).collect();
         let r2 = map(pairings.len() * 6, &|task| {
             let channel = &self.table.residual[task % 6];
             let residual: Vec<f64> = pairings[task / 6].iter().map(|row| channel[*row]).collect();
-            self.dependence(&self.features, &residual).r2_with_feedback
+            self.plain_r2(&residual)
         });
         let mut largest: Vec<f64> = r2.chunks_exact(6).map(|channels| channels.iter().copied().fold(0.0, f64::max)).collect();
         largest.sort_by(f64::total_cmp);
@@ -259,6 +300,68 @@ impl<'a> Search<'a> {
         flights.into_iter().enumerate().flat_map(of_flight).collect()
     }
 
+    /// R² of straight lines in all states and sticks beside means by bin of `chosen` features, on the half that was not fitted, mean of
+    /// both ways; and the lines' part of a fit to all rows, those in `chosen` left out.
+    ///
+    /// The model was calibrated with such lines beside the effect that it lacks, and they have taken up part of it. What remains
+    /// looks like a function of every state that moves with the cause, unless the lines are fitted anew.
+    fn beside_lines(&self, chosen: &[usize], residual: &[f64]) -> (f64, Vec<f64>) {
+        let lines = || self.table.names.iter().enumerate().filter(|(_, name)| LINES.contains(&name.as_str())).map(|found| found.0);
+        let scaled: Vec<Vec<f64>> = lines()
+            .map(|feature| {
+                let values = &self.table.features[feature];
+                let count = values.len().max(1) as f64;
+                let mean = values.iter().sum::<f64>() / count;
+                let rms = (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
+                values.iter().map(|value| (value - mean) / rms.max(f64::MIN_POSITIVE)).collect()
+            })
+            .collect();
+        let bins = self.features.select(chosen);
+        let size = 1 + scaled.len() + chosen.len() * trees::BINS;
+        // The regressors of a row that are not zero: a constant, the lines, one bin a feature.
+        let regressors = |row: usize, out: &mut Vec<(usize, f64)>| {
+            out.clear();
+            out.push((0, 1.0));
+            out.extend(scaled.iter().enumerate().map(|(line, values)| (1 + line, values[row])));
+            let bin = |(feature, bin): (usize, &u8)| (1 + scaled.len() + feature * trees::BINS + *bin as usize, 1.0);
+            out.extend(bins.row(row).iter().enumerate().map(bin));
+        };
+        let fit = |ranges: &[&Range<usize>]| {
+            let (mut gram, mut right, mut row) = (DMatrix::<f64>::zeros(size, size), DVector::zeros(size), Vec::new());
+            for index in ranges.iter().flat_map(|range| (*range).clone()) {
+                regressors(index, &mut row);
+                for (i, value) in &row {
+                    right[*i] += value * residual[index];
+                    row.iter().for_each(|(j, other)| gram[(*i, *j)] += value * other);
+                }
+            }
+            for index in 0..size {
+                gram[(index, index)] += if index > scaled.len() { BIN_RIDGE } else { 1e-6 * gram[(index, index)] };
+            }
+            gram.cholesky().map_or_else(|| DVector::zeros(size), |factor| factor.solve(&right))
+        };
+        let value = |factors: &DVector<f64>, index: usize, row: &mut Vec<(usize, f64)>| {
+            regressors(index, row);
+            row.iter().map(|(place, value)| factors[*place] * value).sum::<f64>()
+        };
+        let (mut r2, mut row) = (0.0, Vec::new());
+        for (fitted, judged) in self.halves.iter().zip(self.judged()) {
+            let factors = fit(&fitted.iter().collect::<Vec<_>>());
+            let rows = || judged.iter().cloned().flatten();
+            let mean = rows().map(|index| residual[index]).sum::<f64>() / rows().count().max(1) as f64;
+            let all: f64 = rows().map(|index| (residual[index] - mean).powi(2)).sum();
+            let left: f64 = rows().map(|index| (residual[index] - value(&factors, index, &mut row)).powi(2)).sum();
+            r2 += if all > 0.0 { 0.5 * (1.0 - left / all) } else { 0.0 };
+        }
+        let factors = fit(&self.blocks.iter().collect::<Vec<_>>());
+        let others = lines().zip(&scaled).enumerate().filter(|(_, (feature, _))| !chosen.contains(feature));
+        let mut part = vec![0.0; residual.len()];
+        for (line, (_, values)) in others {
+            part.iter_mut().zip(values).for_each(|(part, value)| *part += factors[1 + line] * value);
+        }
+        (r2, part)
+    }
+
     /// Names the variables behind a dependence; `None` if it is one of feedback.
     fn describe(&self, channel: usize, found: &Found, null_r2_95: f64, worth: f64) -> Option<Unknown> {
         let residual = &self.table.residual[channel];
@@ -267,7 +370,10 @@ impl<'a> Search<'a> {
         let alone: Vec<Found> = shares
             .iter()
             .take(RIVALS)
-            .map(|(group, _)| self.dependence(&self.features.select(&self.groups[*group].1), residual))
+            .map(|(group, _)| {
+                let features = &self.groups[*group].1;
+                self.dependence(&self.features.select(features), &self.starts.select(features), residual)
+            })
             .collect();
         let stands = |found: &Found| found.persists >= PERSISTS && found.r2 > worth && found.r2 > null_r2_95;
         let best = (0..alone.len()).max_by(|a, b| alone[*a].r2.total_cmp(&alone[*b].r2))?;
@@ -279,7 +385,16 @@ impl<'a> Search<'a> {
             }
             (r2, r2_with_feedback) = (alone[best].r2, alone[best].r2_with_feedback);
         }
-        let of_it = (alone[best].r2 / r2).min(1.0);
+        // Where straight lines do not already explain it, rivals are compared with the lines fitted anew.
+        let lines = self.beside_lines(&[], residual).0;
+        let bent = lines < NEARLY_ALL * r2_with_feedback;
+        let beside: Vec<f64> = if bent {
+            shares.iter().take(RIVALS).map(|(group, _)| self.beside_lines(&self.groups[*group].1, residual).0).collect()
+        } else {
+            alone.iter().map(|found| found.r2_with_feedback).collect()
+        };
+        let best = (0..beside.len()).max_by(|a, b| beside[*a].total_cmp(&beside[*b])).unwrap_or(best);
+        let of_it = (beside[best] / r2_with_feedback).clamp(0.0, 1.0);
         if of_it >= NEARLY_ALL {
             let (first, was) = shares.remove(best);
             shares.iter_mut().for_each(|(_, share)| *share *= if was < 1.0 { (1.0 - of_it) / (1.0 - was) } else { 0.0 });
@@ -290,7 +405,11 @@ impl<'a> Search<'a> {
         let first = shares.first().map(|(group, _)| self.groups[*group].1.as_slice()).unwrap_or_default();
         let second = shares.get(1).filter(|_| of_it < NEARLY_ALL).map(|(group, _)| self.groups[*group].1.as_slice());
         let name = Column::TARGETS.get(channel).map_or("?", |column| column.name());
-        let (suggested_formula, skeleton) = skeleton::suggest(self.table, channel, first, second.unwrap_or_default(), &self.halves);
+        let shown = [first, second.unwrap_or_default()].concat();
+        let part = if bent { self.beside_lines(&shown, residual).1 } else { vec![0.0; residual.len()] };
+        let bent: Vec<f64> = residual.iter().zip(part).map(|(residual, part)| residual - part).collect();
+        let (suggested_formula, skeleton) =
+            skeleton::suggest(self.table, channel, &bent, first, second.unwrap_or_default(), &self.halves);
         Some(Unknown { channel: name, r2, r2_with_feedback, null_r2_95, depends_on, suggested_formula, skeleton })
     }
 

@@ -20,19 +20,24 @@ pub(super) struct Moments {
     /// Row: lag of the residual, column: lag of the fit.
     rf: DMatrix<f64>,
     ff: DMatrix<f64>,
+    /// Σ of the instrument at t times residual and fit, by the lag of these.
+    zr: DVector<f64>,
+    zf: DVector<f64>,
     /// Σ r², Σ r f, Σ f² about the means over all rows, not only those with a whole past.
     plain: [f64; 3],
 }
 
 impl Moments {
-    /// `residual` and `fit` are those of all rows of the table; counted are the rows of `blocks`.
-    pub(super) fn new(blocks: &[Range<usize>], residual: &[f64], fit: &[f64]) -> Self {
+    /// `residual` and `fit` are those of all rows of the table, `instrument` is the fit at the start of each row; counted are the rows
+    /// of `blocks`.
+    pub(super) fn new(blocks: &[Range<usize>], residual: &[f64], fit: &[f64], instrument: &[f64]) -> Self {
         let of = |values: &[f64], range: &Range<usize>| values.get(range.clone()).map(<[f64]>::to_vec).unwrap_or_default();
         let count: usize = blocks.iter().map(ExactSizeIterator::len).sum();
         let mean = |values: &[f64]| blocks.iter().flat_map(|range| of(values, range)).sum::<f64>() / count.max(1) as f64;
-        let (mean_r, mean_f) = (mean(residual), mean(fit));
+        let (mean_r, mean_f, mean_z) = (mean(residual), mean(fit), mean(instrument));
         let zero = || DMatrix::zeros(PAST + 1, PAST + 1);
-        let mut moments = Self { rr: zero(), rf: zero(), ff: zero(), plain: [0.0; 3] };
+        let none = || DVector::zeros(PAST + 1);
+        let mut moments = Self { rr: zero(), rf: zero(), ff: zero(), zr: none(), zf: none(), plain: [0.0; 3] };
         for range in blocks {
             let r: Vec<f64> = of(residual, range).iter().map(|value| value - mean_r).collect();
             let f: Vec<f64> = of(fit, range).iter().map(|value| value - mean_f).collect();
@@ -41,8 +46,11 @@ impl Moments {
                 moments.plain[1] += r * f;
                 moments.plain[2] += f * f;
             }
-            for (r, f) in r.windows(PAST + 1).zip(f.windows(PAST + 1)) {
+            let z = of(instrument, range);
+            for ((r, f), z) in r.windows(PAST + 1).zip(f.windows(PAST + 1)).zip(z.iter().skip(PAST)) {
                 for i in 0..=PAST {
+                    moments.zr[i] += (z - mean_z) * r[PAST - i];
+                    moments.zf[i] += (z - mean_z) * f[PAST - i];
                     for j in 0..=PAST {
                         let (r_i, r_j, f_i, f_j) = (r[PAST - i], r[PAST - j], f[PAST - i], f[PAST - j]);
                         moments.rr[(i, j)] += r_i * r_j;
@@ -56,10 +64,10 @@ impl Moments {
     }
 
     /// The factor κ of the fit f that remains once the residual's past is known:
-    /// κ = Σ f_t (r_t − Σ φᵢ r_{t−i}) / Σ f_t (f_t − Σ φᵢ f_{t−i}), i = 1 … [`PAST`], with φ the autoregression of r − κ f; solved
-    /// by repetition from κ = 1 and kept within 0 … 1.
+    /// κ = Σ z_t (r_t − Σ φᵢ r_{t−i}) / Σ z_t (f_t − Σ φᵢ f_{t−i}), i = 1 … [`PAST`], with z the fit at the start of the row and φ the
+    /// autoregression of r − κ f; solved by repetition from κ = 1 and kept within 0 … 1.
     ///
-    /// An instrumental variable: what r's past does not predict is independent of all that happened before, so its product with f
+    /// An instrumental variable: what r's past does not predict is independent of all that happened before, so its product with z
     /// vanishes where f is a consequence of r's past. About 1 for a cause. Least squares on whitened series would do the same with less
     /// scatter, but it weighs the jumps of a fit by trees a hundred times as much as what the fit gets right.
     pub(super) fn factor(&self) -> f64 {
@@ -67,9 +75,8 @@ impl Moments {
         for _ in 0..REPETITIONS {
             let n = &self.rr - (&self.rf + self.rf.transpose()) * factor + &self.ff * (factor * factor);
             let past = autoregression(&n);
-            let whitened = |cross: &dyn Fn(usize) -> f64| cross(0) - (1..=PAST).map(|lag| past[lag - 1] * cross(lag)).sum::<f64>();
-            let above = whitened(&|lag| self.rf[(lag, 0)]);
-            let below = whitened(&|lag| self.ff[(lag, 0)]);
+            let whitened = |by_lag: &DVector<f64>| by_lag[0] - (1..=PAST).map(|lag| past[lag - 1] * by_lag[lag]).sum::<f64>();
+            let (above, below) = (whitened(&self.zr), whitened(&self.zf));
             let next = if below > 0.0 { (above / below).clamp(0.0, 1.0) } else { 0.0 };
             if (next - factor).abs() < 1e-3 {
                 return next;
@@ -122,7 +129,7 @@ mod tests {
             let (gust, cause) = (noise(seed, 8000, 0.8), noise(seed + 100, 8000, 0.97));
             let residual: Vec<f64> = gust.iter().zip(&cause).map(|(gust, cause)| gust + 0.5 * cause).collect();
             let fit: Vec<f64> = cause.iter().map(|cause| 0.5 * cause).collect();
-            let moments = Moments::new(&blocks(8000), &residual, &fit);
+            let moments = Moments::new(&blocks(8000), &residual, &fit, &fit);
             let factor = moments.factor();
             assert!((0.8..1.2).contains(&factor), "{factor}");
             assert!((moments.r2(1.0) - 0.2).abs() < 0.08, "{}", moments.r2(1.0));
@@ -144,7 +151,7 @@ mod tests {
                 })
                 .collect();
             let fit: Vec<f64> = speeds.iter().map(|speed| 0.9 * speed).collect();
-            let moments = Moments::new(&blocks(8000), &gust, &fit);
+            let moments = Moments::new(&blocks(8000), &gust, &fit, &fit);
             assert!(moments.r2(1.0) > 0.2, "the dependence is there: {}", moments.r2(1.0));
             assert!(moments.factor() < 0.35, "{}", moments.factor());
         }
@@ -152,8 +159,8 @@ mod tests {
 
     #[test]
     fn nothing_is_nothing() {
-        let moments = Moments::new(&blocks(400), &vec![0.0; 400], &vec![0.0; 400]);
+        let moments = Moments::new(&blocks(400), &[0.0; 400], &[0.0; 400], &[0.0; 400]);
         assert!(moments.factor() == 0.0 && moments.r2(1.0) == 0.0);
-        assert!(Moments::new(&[], &[], &[]).r2(1.0) == 0.0);
+        assert!(Moments::new(&[], &[], &[], &[]).r2(1.0) == 0.0);
     }
 }

@@ -11,15 +11,15 @@ use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 /// Points into which a half is averaged over a variable.
-const POINTS: usize = 100;
+const POINTS: usize = 200;
 /// What a shape has to gain in R² for each number that it carries.
 const PRICE: f64 = 0.01;
 /// Places, widths and wave numbers that are tried before the best is refined.
 const PLACES: usize = 40;
 const WIDTHS: [f64; 6] = [0.03, 0.05, 0.08, 0.12, 0.2, 0.3];
-const WAVES: usize = 120;
-/// Most periods within the range of the variable: 100 points show no more.
-const MOST_PERIODS: f64 = 8.0;
+const WAVES: usize = 300;
+/// Most periods within the range of the variable: the points show no more.
+const MOST_PERIODS: f64 = 20.0;
 
 /// A term of one channel that comes near an unexplained dependence, ready for an `[[effect]]` of kind `formula`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -208,15 +208,17 @@ struct Candidate {
 }
 
 /// The best term of the features `first` of one variable, or of a product with one of `second`; and its shape in words.
+/// `residual` is that of the channel, less straight lines in other variables.
 pub(super) fn suggest(
     table: &ResidualTable,
     channel: usize,
+    residual: &[f64],
     first: &[usize],
     second: &[usize],
     halves: &[Vec<Range<usize>>; 2],
 ) -> (Option<SuggestedFormula>, String) {
     let rows = halves.each_ref().map(|half| half.iter().cloned().flatten().collect::<Vec<usize>>());
-    let (Some(y), Some(name)) = (table.residual.get(channel), Column::TARGETS.get(channel)) else {
+    let (y, Some(name)) = (residual, Column::TARGETS.get(channel)) else {
         return (None, String::new());
     };
     let mut found: Vec<Candidate> = Vec::new();

@@ -21,6 +21,9 @@ pub struct ResidualTable {
     pub units: Vec<String>,
     /// One column a feature.
     pub features: Vec<Vec<f64>>,
+    /// The features at the first sample of each row: what was so before the row's own residual could act on it. May be empty; then
+    /// the means stand in for them, and a state that follows a gust within a row is harder to tell from a cause.
+    pub at_start: Vec<Vec<f64>>,
     /// Measured − predicted by channel in the order of [`Column::TARGETS`], m/s² and rad/s².
     pub residual: [Vec<f64>; 6],
     /// Block of each row, from 0 without gaps, never falling. A block lies in one span of one flight.
@@ -110,6 +113,7 @@ impl ResidualTable {
         candidates.retain(|candidate| !candidate.reads.iter().any(absent));
         let mut table = Self::default();
         table.features.resize(candidates.len() + 1, Vec::new());
+        table.at_start.resize(candidates.len() + 1, Vec::new());
         let mut blocks = 0;
         for index in of_spans {
             let flight = &flights[index];
@@ -128,7 +132,11 @@ impl ResidualTable {
                     for (out, values) in table.features.iter_mut().zip(&columns) {
                         out.push(mean(values));
                     }
+                    for (out, values) in table.at_start.iter_mut().zip(&columns) {
+                        out.push(values[start]);
+                    }
                     table.features[candidates.len()].push(middle_s);
+                    table.at_start[candidates.len()].push(start as f64 * flight.step_s);
                     for (out, values) in table.residual.iter_mut().zip(&residual) {
                         let value = mean(values);
                         if !value.is_finite() {
@@ -151,13 +159,14 @@ impl ResidualTable {
         let time = if starts_at_zero { "t" } else { "time_in_flight" };
         let named = candidates.into_iter().map(|candidate| (candidate.name, candidate.unit));
         let named = named.chain([(time.to_owned(), "s")]).zip(std::mem::take(&mut table.features));
-        for ((name, unit), values) in named {
+        for (((name, unit), values), at_start) in named.zip(std::mem::take(&mut table.at_start)) {
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
             if high - low > 1e-9 * high.abs().max(low.abs()) && high.is_finite() && low.is_finite() {
                 table.names.push(name);
                 table.units.push(unit.into());
                 table.features.push(values);
+                table.at_start.push(at_start);
             }
         }
         Ok(table)

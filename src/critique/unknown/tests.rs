@@ -3,6 +3,7 @@
 use super::*;
 use crate::flight::{Accelerations, Flight, Span, Targets};
 use phyture_kernels::random::Stream;
+use proptest::prelude::*;
 
 const STEP_S: f64 = 0.02;
 const SAMPLES: usize = 1500;
@@ -125,29 +126,47 @@ const ALIENS: [(usize, &str, f64, &[&str], &str); 8] = [
     (0, "cos(3 * height)", 0.25, &["height"], "sin("),
 ];
 
+/// What is found for one of [`ALIENS`]: right channel and variable first, right shape.
+fn judge(alien: usize, found: &[Unknown]) -> (bool, bool) {
+    let (channel, _, _, variables, shape) = ALIENS[alien];
+    let Some(top) = found.first() else { return (false, false) };
+    let first = top.depends_on.first().is_some_and(|first| variables.contains(&first.variable.as_str()));
+    let shaped = top.suggested_formula.as_ref().is_some_and(|suggested| suggested.formula.contains(shape));
+    (top.channel == Column::TARGETS[channel].name() && first, shaped)
+}
+
 #[test]
 fn hidden_dependences_are_named() -> Result<()> {
-    let (mut first, mut shapes, mut runs) = (0, 0, 0);
-    for (channel, formula, scale, variables, shape) in ALIENS {
-        for seed in 0..2 {
-            let table = made(100 + seed, 40, 0.0)?.with(channel, formula, scale)?.table()?;
-            let found = unknown(&table, &UnknownOptions::default())?;
-            println!("{formula}: {:?}", found);
-            let search = Search::new(&table, &UnknownOptions::default());
-            let all = search.dependence(&search.features, &table.residual[channel]);
-            println!("   {:.3} {:.3} {:.2}", all.r2_with_feedback, all.r2, all.persists);
-            runs += 1;
-            let Some(top) = found.first() else { continue };
-            assert_eq!(found.len(), 1, "{formula}: only one channel depends: {found:?}");
-            first += usize::from(
-                top.channel == Column::TARGETS[channel].name()
-                    && top.depends_on.first().is_some_and(|first| variables.contains(&first.variable.as_str())),
-            );
-            shapes += usize::from(top.suggested_formula.as_ref().is_some_and(|suggested| suggested.formula.contains(shape)));
+    let (mut first, mut shapes) = (0, 0);
+    for (alien, (channel, formula, scale, ..)) in ALIENS.into_iter().enumerate() {
+        let table = made(100 + alien as u64, 24, 0.0)?.with(channel, formula, scale)?.table()?;
+        let found = unknown(&table, &UnknownOptions::default())?;
+        let (right, shaped) = judge(alien, &found);
+        assert!(found.len() <= 1, "{formula}: only one channel depends: {found:?}");
+        for found in &found {
+            assert!(found.r2 > found.null_r2_95 && found.r2 <= 1.0 && found.r2 <= found.r2_with_feedback + 0.01);
+            assert!(found.depends_on.iter().map(|part| part.share).sum::<f64>() < 1.0 + 1e-9);
+            if let Some(suggested) = &found.suggested_formula {
+                assert!(crate::formula::Formula::parse(&suggested.formula)?.to_string() == suggested.formula);
+            }
         }
+        first += usize::from(right);
+        shapes += usize::from(shaped);
     }
-    println!("first {first}/{runs}, shapes {shapes}");
-    assert!(10 * first >= 9 * runs && 10 * shapes >= 8 * runs, "{first} and {shapes} of {runs}");
+    assert!(first >= 7 && shapes >= 6, "{first} named and {shapes} drawn of 8");
+    Ok(())
+}
+
+#[test]
+fn the_sine_of_height_comes_back_as_a_term() -> Result<()> {
+    let table = made(7, 40, 0.0)?.with(2, "sin(2 * height)", 1.0)?.table()?;
+    let found = unknown(&table, &UnknownOptions::default())?;
+    let [found] = found.as_slice() else { panic!("one channel: {found:?}") };
+    assert!(found.depends_on[0].variable == "height" && found.depends_on[0].share > 0.85, "{found:?}");
+    let suggested = found.suggested_formula.as_ref().map(|term| (term.formula.as_str(), term.coefficient, term.r2));
+    assert!(suggested.is_some_and(|(_, coefficient, r2)| (coefficient.abs() - 1.0).abs() < 0.1 && r2 > 0.7), "{found:?}");
+    let json = serde_json::to_value(found).map_err(|error| Error::Undetermined(error.to_string()))?;
+    assert_eq!((&json["channel"], &json["suggested_formula"]["channel"]), (&"vz_dot".into(), &"vz_dot".into()));
     Ok(())
 }
 
@@ -155,7 +174,7 @@ fn hidden_dependences_are_named() -> Result<()> {
 fn gusts_alone_are_not_explained() -> Result<()> {
     let mut alarms = 0;
     for seed in 0..20 {
-        alarms += usize::from(!unknown(&made(seed, 30, 0.0)?.table()?, &UnknownOptions::default())?.is_empty());
+        alarms += usize::from(!unknown(&made(seed, 20, 0.0)?.table()?, &UnknownOptions::default())?.is_empty());
     }
     assert!(alarms <= 1, "{alarms} false alarms in 20");
     Ok(())
@@ -163,37 +182,178 @@ fn gusts_alone_are_not_explained() -> Result<()> {
 
 #[test]
 fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
-    let mut alarms = 0;
-    for seed in 0..6 {
+    for seed in 0..3 {
         let table = made(200 + seed, 30, 1.0)?.table()?;
         let search = Search::new(&table, &UnknownOptions::default());
-        for channel in 0..6 {
-            let found = search.dependence(&search.features, &table.residual[channel]);
-            println!("{channel}: {:.3} {:.3} {:.2}", found.r2_with_feedback, found.r2, found.persists);
-        }
-        let found = unknown(&table, &UnknownOptions::default())?;
-        println!("{found:?}");
-        alarms += usize::from(!found.is_empty());
+        let roll = search.dependence(&search.features, &search.starts, &table.residual[3]);
+        assert!(roll.r2_with_feedback > WORTH, "there is something to resist: {}", roll.r2_with_feedback);
+        assert_eq!(unknown(&table, &UnknownOptions::default())?, []);
     }
-    assert_eq!(alarms, 0);
-    // A cause beside the feedback is still seen.
-    let table = made(300, 40, 1.0)?.with(2, "sin(2 * height)", 0.5)?.table()?;
+    let table = made(300, 30, 1.0)?.with(2, "sin(2 * height)", 0.5)?.table()?;
     let found = unknown(&table, &UnknownOptions::default())?;
-    println!("{found:?}");
-    assert!(found.first().is_some_and(|top| top.channel == "vz_dot" && top.depends_on[0].variable == "height"), "{found:?}");
+    let named = found.first().is_some_and(|top| top.channel == "vz_dot" && top.depends_on[0].variable == "height");
+    assert!(named, "a cause beside the feedback is still seen: {found:?}");
     Ok(())
 }
 
-/// How long it takes on a full table; run by hand: `cargo test --release --lib critique::unknown -- --ignored --nocapture`.
+#[cfg(feature = "rayon")]
+#[test]
+fn the_number_of_threads_changes_nothing() -> Result<()> {
+    let table = made(5, 12, 0.0)?.with(0, "exp(-((vx - 4) / 1.5)^2)", 1.0)?.table()?;
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let pool = pool.map_err(|error| Error::Undetermined(error.to_string()))?;
+        pool.install(|| unknown(&table, &UnknownOptions::default()))
+    };
+    let (one, three) = (on(1)?, on(3)?);
+    assert!(!one.is_empty() && one == three);
+    Ok(())
+}
+
+#[test]
+fn rows_stay_within_blocks_spans_and_what_was_recorded() -> Result<()> {
+    let mut made = made(1, 3, 0.0)?;
+    made.flights[1].absent.push(Column::Yaw);
+    let spans = [(0, 0, 1003), (0, 1100, 1500), (1, 10, 20), (1, 700, 1500)];
+    let spans: Vec<Span> = spans.into_iter().map(|(flight, start, end)| Span { flight, start, end }).collect();
+    let residuals = |flight: usize| Ok(made.residual[flight].clone());
+    let table = ResidualTable::new(&made.flights, &spans, &residuals, 10.0, ROWS_MAX)?;
+    // Five samples a row, 100 rows a block: 200 + 80 + 2 + 160 rows.
+    assert_eq!(table.len(), 442);
+    assert_eq!(table.blocks().iter().map(ExactSizeIterator::len).collect::<Vec<_>>(), [100, 100, 80, 2, 100, 60]);
+    assert!(table.feature("sin(yaw)").is_none() && table.feature("height").is_some() && table.feature("lag(u4, 0.4)").is_some());
+    let expected = made.residual[0][2][5..10].iter().sum::<f64>() / 5.0;
+    assert!((table.residual[2][1] - expected).abs() < 1e-12 && (table.time_s[1] - 0.14).abs() < 1e-12);
+    let few = ResidualTable::new(&made.flights, &spans, &residuals, 10.0, 100)?;
+    assert!(few.len() <= 100 && few.len() > 50, "{}", few.len());
+    let outside = [Span { flight: 0, start: 0, end: 1501 }];
+    assert!(matches!(ResidualTable::new(&made.flights, &outside, &residuals, 10.0, 100), Err(Error::Shape { .. })));
+    assert!(matches!(ResidualTable::new(&made.flights, &[], &residuals, 10.0, 100), Err(Error::Undetermined(_))));
+    assert!(matches!(unknown(&table, &UnknownOptions::default()), Err(Error::Undetermined(text)) if text.contains("6 blocks")));
+    let mut uneven = table;
+    uneven.residual[3].pop();
+    assert!(matches!(unknown(&uneven, &UnknownOptions::default()), Err(Error::Shape { .. })));
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn a_pairing_moves_every_row_to_another_block(lengths in prop::collection::vec(1..400_usize, 8..20), index in 0..50_u64) {
+        let flights = lengths.iter().enumerate().flat_map(|(flight, length)| vec![flight; *length]).collect::<Vec<_>>();
+        let rows = flights.len();
+        let mut table = ResidualTable { names: vec!["vx".into()], features: vec![vec![0.0; rows]], ..Default::default() };
+        table.residual = std::array::from_fn(|_| vec![0.0; rows]);
+        (table.block, table.flight) = (flights.clone(), flights);
+        let paired = Search::new(&table, &UnknownOptions::default()).pairing(index);
+        prop_assert_eq!(paired.len(), rows);
+        prop_assert!(paired.iter().enumerate().all(|(row, other)| table.block[row] != table.block[*other]));
+    }
+}
+
+/// Counts over many seeds and the time of a full table; run by hand:
+/// `cargo test --release --lib critique::unknown -- --ignored --nocapture`.
 #[test]
 #[ignore = "a measurement, not a check"]
-fn time_of_a_full_table() -> Result<()> {
+fn measure() -> Result<()> {
     for (words, formula) in [("nothing", "0 * t"), ("one dependence", "sin(2 * height)")] {
         let table = made(1, 80, 0.0)?.with(2, formula, 1.0)?.table()?;
         let start = std::time::Instant::now();
         let found = unknown(&table, &UnknownOptions::default())?;
         let seconds = start.elapsed().as_secs_f64();
         println!("{words}: {} rows, {} features, {} found, {seconds:.2} s", table.len(), table.names.len(), found.len());
+    }
+    for feedback in [0.0, 1.0] {
+        let (mut alarms, mut runs) = (0, 0);
+        for seed in 1000..1040 {
+            let found = unknown(&made(seed, 30, feedback)?.table()?, &UnknownOptions::default())?;
+            alarms += usize::from(!found.is_empty());
+            runs += 1;
+        }
+        println!("feedback {feedback}: {alarms} false alarms in {runs}");
+        for share in [1.0, 0.5] {
+            for (alien, (channel, formula, scale, ..)) in ALIENS.into_iter().enumerate() {
+                let (mut seen, mut first, mut shapes) = (0, 0, 0);
+                for seed in 2000..2005 {
+                    let table = made(seed, 40, feedback)?.with(channel, formula, share * scale)?.table()?;
+                    let found = unknown(&table, &UnknownOptions::default())?;
+                    let (right, shaped) = judge(alien, &found);
+                    seen += usize::from(!found.is_empty());
+                    first += usize::from(right);
+                    shapes += usize::from(shaped);
+                }
+                println!("  {share} of {formula}: seen {seen}, named first {first}, shape {shapes} of 5");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The built-in helicopter with its pilot, calibrated, with a term added to one channel of its log; run by hand, as [`measure`].
+#[test]
+#[ignore = "a measurement, not a check"]
+fn measure_on_the_simulator() -> Result<()> {
+    use crate::physics::{Model, calibrate};
+    use crate::sim::{INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Simulation};
+    const IMPLANTS: [(usize, &str, f64, &str); 7] = [
+        (2, "t", 0.0, ""),
+        (2, "sin(2 * height)", 0.5, "height"),
+        (0, "exp(-((vx - 5) / 2)^2)", 1.0, "vx"),
+        (5, "max(wz - 0.5, 0)", 2.0, "wz"),
+        (2, "u4 * airspeed", 0.5, "airspeed u4"),
+        (1, "sin(yaw)", 0.4, "yaw"),
+        (3, "u1 * abs(u1)", 10.0, "u1"),
+    ];
+    for (name, level) in [("zero", Level::ZERO), ("one", Level::ONE), ("two", Level::TWO)] {
+        for (channel, formula, scale, variable) in IMPLANTS {
+            for seed in 1..=3 {
+                let simulation = Simulation { seed, minutes: 20.0, level, mechanisms: Mechanisms::none(), ..Simulation::default() };
+                let mut flights = crate::sim::simulate(&simulation)?.flights;
+                let term = crate::formula::Formula::parse(formula)?;
+                for flight in &mut flights {
+                    let added = crate::physics::evaluate(&term, flight)?;
+                    let columns = Column::ALL.map(|column| {
+                        let to = if column == Column::TARGETS[channel] { scale } else { 0.0 };
+                        flight.column(column).iter().zip(&added).map(|(value, added)| value + to * added).collect()
+                    });
+                    *flight =
+                        Flight::new(flight.name.clone(), flight.manoeuvre.clone(), 0.0, flight.step_s, columns, flight.targets)?;
+                }
+                let spans: Vec<Span> =
+                    flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() }).collect();
+                let paper = Model::paper("n9", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+                let (model, _) = calibrate(&paper, &flights, &spans)?;
+                let residuals = |index: usize| {
+                    let predicted = model.predict(&flights[index])?;
+                    let column = |channel: usize| {
+                        let measured = flights[index].column(Column::TARGETS[channel]);
+                        measured.iter().zip(&predicted[channel]).map(|(measured, predicted)| measured - predicted).collect()
+                    };
+                    Ok(std::array::from_fn(column))
+                };
+                let table = ResidualTable::new(&flights, &spans, &residuals, BLOCK_S, ROWS_MAX)?;
+                let found = unknown(&table, &UnknownOptions::default())?;
+                print!("level {name}, {scale} {formula} [{variable}], seed {seed}:");
+                for found in &found {
+                    let first = found.depends_on.first().map_or("", |first| first.variable.as_str());
+                    let term = found.suggested_formula.as_ref().map_or("", |term| term.formula.as_str());
+                    print!(
+                        "  {} {first} {:.3} ({:.3}, null {:.3}) {term};",
+                        found.channel, found.r2, found.r2_with_feedback, found.null_r2_95
+                    );
+                }
+                println!();
+                if scale == 0.0 {
+                    let search = Search::new(&table, &UnknownOptions::default());
+                    for channel in 0..6 {
+                        let found = search.dependence(&search.features, &search.starts, &table.residual[channel]);
+                        print!("   {:.3} {:.3} {:.2}", found.r2_with_feedback, found.r2, found.persists);
+                    }
+                    println!();
+                }
+            }
+        }
     }
     Ok(())
 }

@@ -36,31 +36,41 @@ const EDGE_ROWS: usize = 4096;
 pub(super) struct Binned {
     features: usize,
     bins: Vec<u8>,
+    edges: Vec<Vec<f64>>,
 }
 
 impl Binned {
     /// Cuts each column at its own quantiles into at most [`BINS`] bins. Columns are equally long.
     pub(super) fn new(columns: &[Vec<f64>]) -> Self {
-        let (features, rows) = (columns.len(), columns.first().map_or(0, Vec::len));
-        let mut bins = vec![0; features * rows];
-        for (feature, column) in columns.iter().enumerate() {
-            let mut sorted: Vec<f64> = column.iter().copied().step_by(rows.div_ceil(EDGE_ROWS).max(1)).collect();
+        let edges = columns.iter().map(|column| {
+            let mut sorted: Vec<f64> = column.iter().copied().step_by(column.len().div_ceil(EDGE_ROWS).max(1)).collect();
             sorted.sort_unstable_by(f64::total_cmp);
             let mut edges: Vec<f64> = (1..BINS).filter_map(|bin| sorted.get(bin * sorted.len() / BINS).copied()).collect();
             edges.dedup();
+            edges
+        });
+        Self { features: 0, bins: Vec::new(), edges: edges.collect() }.like(columns)
+    }
+
+    /// Other rows of the same features, cut at the same edges.
+    pub(super) fn like(&self, columns: &[Vec<f64>]) -> Self {
+        let (features, rows) = (columns.len(), columns.first().map_or(0, Vec::len));
+        let mut bins = vec![0; features * rows];
+        for (feature, (column, edges)) in columns.iter().zip(&self.edges).enumerate() {
             for (row, value) in bins.chunks_exact_mut(features).zip(column) {
                 // At most 31 edges, so a bin number fits.
                 row[feature] = edges.partition_point(|edge| edge <= value) as u8;
             }
         }
-        Self { features, bins }
+        Self { features, bins, edges: self.edges.clone() }
     }
 
     /// The same rows with some of the features.
     pub(super) fn select(&self, chosen: &[usize]) -> Self {
         let rows = self.bins.chunks_exact(self.features.max(1));
         let bins = rows.flat_map(|row| chosen.iter().map(|feature| row.get(*feature).copied().unwrap_or_default())).collect();
-        Self { features: chosen.len(), bins }
+        let edges = chosen.iter().filter_map(|feature| self.edges.get(*feature).cloned()).collect();
+        Self { features: chosen.len(), bins, edges }
     }
 
     /// The bins of one row.
