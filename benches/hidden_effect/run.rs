@@ -75,6 +75,8 @@ struct Bench<'a> {
     done: Vec<String>,
     /// Mean squared errors of data without a hidden effect, by seed and level.
     floors: BTreeMap<(u64, u8), [f64; 6]>,
+    /// Wind of level two; none for the shares.
+    calm: bool,
     minutes: f64,
 }
 
@@ -97,7 +99,7 @@ impl Bench<'_> {
             level: if level == 1 { Level::ONE } else { Level::TWO },
             ..Simulation::default()
         };
-        if level == 2 && !hidden.mechanisms.iter().any(|(id, _)| *id == "wind") {
+        if level == 2 && !self.calm && !hidden.mechanisms.iter().any(|(id, _)| *id == "wind") {
             simulation = simulation.hide("wind", 1.0)?;
         }
         for (id, scale) in &hidden.mechanisms {
@@ -156,11 +158,21 @@ impl Bench<'_> {
         }
         let outcome =
             diagnose(&set.flights, &model(), &split.training, &split.test, "test", &Options { seed, ..Options::default() })?;
-        self.fill(&mut line, &outcome.diagnosis, &floor, known);
+        // The share is that of the hidden effect alone, so at level two it is taken from the same session without the wind.
+        let hidden_mse = match level {
+            2 if line.hidden != "null" => {
+                self.calm = true;
+                let calm = self.data(hidden, level, seed).and_then(|calm| self.mse(&calm, &split));
+                self.calm = false;
+                Some(calm?)
+            }
+            _ => None,
+        };
+        self.fill(&mut line, &outcome.diagnosis, &floor, hidden_mse, known);
         self.write(&line)
     }
 
-    fn fill(&self, line: &mut Line, diagnosis: &Diagnosis, floor: &[f64; 6], known: Option<&Single>) {
+    fn fill(&self, line: &mut Line, diagnosis: &Diagnosis, floor: &[f64; 6], alone: Option<[f64; 6]>, known: Option<&Single>) {
         line.verdict = diagnosis.verdict.words().into();
         line.accepted.clone_from(&diagnosis.accepted);
         line.indistinguishable = diagnosis.steps.first().map_or_else(Vec::new, |step| step.indistinguishable.clone());
@@ -173,7 +185,8 @@ impl Bench<'_> {
         let Some(locked) = &diagnosis.locked else { return };
         let squares = |values: phyture::critique::PerChannel| values.channels().map(|value| value.unwrap_or(0.0).powi(2));
         let (before, after) = (squares(locked.rmse_before), squares(locked.rmse_after));
-        let share = |channel: usize| 1.0 - floor[channel] / before[channel];
+        let with = alone.unwrap_or(before);
+        let share = |channel: usize| 1.0 - floor[channel] / with[channel];
         let best = (0..6).max_by(|&left, &right| share(left).total_cmp(&share(right))).unwrap_or(0);
         line.share = share(best);
         line.removed = Some((before[best] - after[best]) / (before[best] - floor[best]));
@@ -238,7 +251,7 @@ fn wanted<'a>(id: &'a str, share: f64) -> (&'a str, f64) {
 /// Everything, resumable.
 pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     let done = read(out)?.iter().map(Line::key).collect();
-    let mut bench = Bench { out, done, floors: BTreeMap::new(), minutes: 30.0 };
+    let mut bench = Bench { out, done, floors: BTreeMap::new(), calm: false, minutes: 30.0 };
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
     let level = |seed: u64| if seed % 2 == 0 { 1 } else { 2 };
     if asked("nulls") {
@@ -308,7 +321,7 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
 
 /// A few cases of each kind.
 pub fn few(out: &Path) -> Result<()> {
-    let mut bench = Bench { out, done: Vec::new(), floors: BTreeMap::new(), minutes: 30.0 };
+    let mut bench = Bench { out, done: Vec::new(), floors: BTreeMap::new(), calm: false, minutes: 30.0 };
     for seed in 1..5 {
         bench.case("null", "", &Hidden { mechanisms: Vec::new(), alien: None }, 1 + (seed % 2) as u8, seed, None)?;
     }

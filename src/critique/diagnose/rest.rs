@@ -26,9 +26,9 @@ pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], blo
     }
 }
 
-/// R² from which a dependence on a stick or a rate is believed: a pilot who answers gusts makes the sticks and rates tell of gusts that
-/// still blow, which no effect of the aircraft is (seen without a hidden effect: up to 0.05).
-const LEAST_OF_LOOP: f64 = 0.1;
+/// R² from which a dependence on a stick or a rate is believed. A pilot who answers gusts makes sticks and rates tell of the gust that
+/// still blows, which no effect of the aircraft is: of a gust that lasts 0.2 s, what was known 0.1 s ago tells exp(−1) of its variance.
+const LEAST_OF_LOOP: f64 = 0.35;
 
 fn least(unknown: &Unknown) -> f64 {
     let of_loop = ["u1", "u2", "u3", "u4", "wx", "wy", "wz"];
@@ -37,7 +37,8 @@ fn least(unknown: &Unknown) -> f64 {
 }
 
 /// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the
-/// effects accepted there took away and that remain.
+/// effects accepted there took away and that remain. Where the effect reads the very variable, the dependence need be only half as
+/// large as what was removed.
 pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6], left: &[f64; 6], unknown: &[Unknown]) -> bool {
     channels.iter().any(|&channel| {
         let name = Column::TARGETS.get(channel).map_or("", |column| column.name());
@@ -45,7 +46,8 @@ pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6],
             let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
             let mut formulas = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
             let reads = formulas.any(|formula| formula.names().iter().any(|name| related(name, variable)));
-            reads && unknown.r2 * left[channel] > removed[channel]
+            let bar = if reads { 0.5 } else { 1.0 };
+            unknown.r2 * left[channel] > bar * removed[channel]
         })
     })
 }
@@ -54,7 +56,11 @@ pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6],
 fn related(name: &str, variable: &str) -> bool {
     let speeds = |name: &str| ["airspeed", "hypot(vx, vy)"].contains(&name);
     let velocities = |name: &str| ["vx", "vy", "vz"].contains(&name);
-    name == variable || speeds(name) && (velocities(variable) || speeds(variable)) || velocities(name) && speeds(variable)
+    let gravity = ["g_x", "g_y", "g_z"].contains(&name) && ["roll", "pitch"].contains(&variable);
+    name == variable
+        || gravity
+        || speeds(name) && (velocities(variable) || speeds(variable))
+        || velocities(name) && speeds(variable)
 }
 
 /// For the report.
