@@ -1,12 +1,14 @@
-//! The program at the sizes its users have: a training step, a forward pass, one window on one thread, and the calibration of
-//! 7376 s at 100 Hz. Times depend on the machine; the ids are stable.
+//! The program at the sizes its users have: a training step, a forward pass, one window on one thread, and the calibration and
+//! the search of 7376 s at 100 Hz. Times depend on the machine; the ids are stable.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use phyture::Result;
+use phyture::critique::diagnose::{Options, diagnose};
 use phyture::flight::Span;
+use phyture::flight::split::Split;
 use phyture::nn::{Network, OutputScale, PhyTureConfig};
 use phyture::physics::{Model, calibrate};
-use phyture::sim::{INERTIA_KG_M2, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
+use phyture::sim::{INERTIA_KG_M2, Level, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::tape::{DropoutKey, Session, Threads};
 use phyture_kernels::adam::{self, Adam};
 use phyture_kernels::random::Stream;
@@ -81,8 +83,23 @@ fn calibration(criterion: &mut Criterion) -> Result<()> {
     Ok(())
 }
 
+/// A search of the whole data set: one hidden effect of each kind, and the wind and noise of level two.
+fn diagnosis(criterion: &mut Criterion) -> Result<()> {
+    let simulation = Simulation { like: Like::Stanford, level: Level::TWO, ..Simulation::baseline() };
+    let set = simulate(&simulation.hide("weathercock", 0.3)?.hide("cyclic_lag", 0.5)?)?;
+    let model = Model::paper("truth", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+    let split = Split::for_search(&set.flights, 1);
+    let mut group = criterion.benchmark_group("diagnose");
+    group.sample_size(10);
+    group.bench_function(BenchmarkId::from_parameter("7376s"), |bencher| {
+        bencher.iter(|| diagnose(&set.flights, &model, &split.training, &split.test, "test", &Options::default()).is_ok())
+    });
+    group.finish();
+    Ok(())
+}
+
 fn all(criterion: &mut Criterion) {
-    for bench in [training, inference, calibration] {
+    for bench in [training, inference, calibration, diagnosis] {
         if let Err(error) = bench(criterion) {
             eprintln!("not measured: {error}");
         }

@@ -276,6 +276,7 @@ impl fmt::Display for Shares {
 }
 
 /// The channels' shares that a stacked bar shows: `None` if one of its parts is not known.
+#[cfg(feature = "report")]
 pub(crate) fn bars(parts: &[ShareOf]) -> Vec<(String, Vec<f64>)> {
     let names = Column::TARGETS.iter().map(|column| column.name()).chain(["mean"]);
     let values = |index: usize| parts.iter().map(|part| part.all()[index].map(|share| share.share)).collect::<Option<Vec<f64>>>();

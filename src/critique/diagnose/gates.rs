@@ -32,3 +32,7 @@ pub(super) const SHADOW: f64 = 0.2;
 pub(super) const SMALLEST_SHARE_OF_ACCEPTED: f64 = 0.05;
 /// … and this share, if the two are known to be mistaken for each other.
 pub(super) const SMALLEST_SHARE_OF_RIVAL: f64 = 0.2;
+/// Effects with this share of the largest gain on the grid may win once their parameters are refined …
+pub(super) const CONTENDER: f64 = 0.7;
+/// … and of those the best so many are refined.
+pub(super) const MOST_CONTENDERS: usize = 3;

@@ -25,6 +25,8 @@ pub(super) struct Scored<'a> {
     pub carrying: usize,
     /// An accepted effect whose flaw it describes.
     pub rival: Option<String>,
+    /// Values of each open parameter that are as good as the best; empty before refinement.
+    pub profiles: BTreeMap<String, [f64; 2]>,
 }
 
 impl Scored<'_> {
@@ -123,22 +125,29 @@ impl Search<'_> {
         });
         let movement = movement.max_by(|left, right| left.share.total_cmp(&right.share));
         let trial = trials[best];
-        let (before, after) = (self.engine.mse(&pass.base), self.engine.mse(trial));
-        let falls = (0..6).filter(|&channel| trial.changed[channel] && self.touches(trial, &pass.base, channel));
-        let falls = falls.map(|channel| (channel, 1.0 - after[channel] / before[channel])).collect();
         Some(Scored {
             candidate,
             best: trial.clone(),
             gain: total(&gains[best]),
             gains: gains[best].clone(),
-            falls,
+            falls: self.falls(&pass.base, trial),
             p_value,
             detection: movement.as_ref().map(|movement| movement.detection.max(SMALLEST_FALL)),
             excited: movement.as_ref().is_some_and(|movement| movement.excited),
             plausible: plausible(&pass.base.model, trial),
             carrying: movement.map_or(0, |movement| movement.carrying),
             rival: None,
+            profiles: BTreeMap::new(),
         })
+    }
+
+    /// Share of the held-out mean squared error that a trial removes, by channel that it acts in.
+    pub(super) fn falls(&self, base: &Trial, trial: &Trial) -> BTreeMap<usize, f64> {
+        let (before, after) = (self.engine.mse(base), self.engine.mse(trial));
+        (0..6)
+            .filter(|&channel| trial.changed[channel] && self.touches(trial, base, channel))
+            .map(|channel| (channel, 1.0 - after[channel] / before[channel]))
+            .collect()
     }
 
     /// Whether a trial has other columns than the base in a channel, or only shares coefficients with one that has.

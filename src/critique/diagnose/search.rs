@@ -3,7 +3,7 @@
 use super::candidate::{Candidate, with};
 use super::describe::stability;
 use super::engine::{Engine, Trial};
-use super::gates::{SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
+use super::gates::{CONTENDER, MOST_CONTENDERS, SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
 use super::report::{CandidateReport, Step};
 use super::resample::{RESAMPLES, draw, intervals};
 use super::score::{Scored, gains, paired};
@@ -102,6 +102,9 @@ impl Search<'_> {
             for scored in &mut scored {
                 scored.rival = found.iter().find(|found| found.is_flawed_by(scored, &mse)).map(|found| found.step.effect.clone());
             }
+            if found.len() < self.options.max_effects {
+                self.refine_contenders(&base, &mut scored)?;
+            }
             let passing: Vec<&Scored<'_>> = scored.iter().filter(|scored| scored.passes(self.largest_p)).collect();
             let best = passing.iter().max_by(|left, right| left.gain.total_cmp(&right.gain));
             let Some(best) = best.filter(|_| found.len() < self.options.max_effects) else {
@@ -129,12 +132,12 @@ impl Search<'_> {
                 .map(|other| (other.candidate.id.as_str(), other.gain))
                 .collect();
             tied.sort_by(|left, right| right.1.total_cmp(&left.1));
-            let (refined, profiles) = self.refine(&base, chosen)?;
-            let mut step = self.step(chosen, &refined, tied.iter().map(|entry| entry.0.to_owned()).collect());
+            let refined = &chosen.best;
+            let mut step = self.step(chosen, refined, tied.iter().map(|entry| entry.0.to_owned()).collect());
             step.selection_frequency = self.selection_frequency(chosen, &passing);
             step.stability = stability(step.selection_frequency).into();
             for parameter in &mut step.parameters {
-                parameter.profile = profiles.get(&parameter.name).copied();
+                parameter.profile = chosen.profiles.get(&parameter.name).copied();
             }
             earlier = passing.iter().map(|scored| (scored.candidate.id.clone(), scored.gain)).collect();
             let confusable =
@@ -148,8 +151,27 @@ impl Search<'_> {
                 mse_before: mse,
                 removed: [0.0; 6],
             });
-            model = refined.model;
+            model = found.last().map_or(model, |last| last.model.clone());
         }
+    }
+
+    /// Refines the open parameters of all that could win: on a coarse grid an effect with a lag would lose to one whose coefficients
+    /// are found exactly.
+    fn refine_contenders(&self, base: &Trial, scored: &mut [Scored<'_>]) -> Result<()> {
+        let gains_of = |scored: &Scored<'_>| if scored.passes(self.largest_p) { scored.gain } else { 0.0 };
+        let largest = scored.iter().map(gains_of).fold(0.0, f64::max);
+        let mut contenders: Vec<&mut Scored<'_>> =
+            scored.iter_mut().filter(|scored| scored.passes(self.largest_p) && scored.gain >= CONTENDER * largest).collect();
+        contenders.sort_by(|left, right| right.gain.total_cmp(&left.gain));
+        for contender in contenders.into_iter().take(MOST_CONTENDERS) {
+            let (refined, profiles) = self.refine(base, contender)?;
+            contender.gains = gains(base, &refined);
+            contender.gain = contender.gains.iter().sum();
+            contender.falls = self.falls(base, &refined);
+            contender.best = refined;
+            contender.profiles = profiles;
+        }
+        Ok(())
     }
 
     /// Drops accepted effects that the later ones have made needless, and refits.

@@ -158,7 +158,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "quick rolls and flips",
-            confusable_with: &["ctrl_delay"],
+            confusable_with: &["ctrl_delay", "inflow_lag"],
             would_tell_apart: "coasting rolls with the sticks held: a control delay has no part in them",
             source: "first order of a shift in time; g' = -w x g is kinematics",
             searched: true,

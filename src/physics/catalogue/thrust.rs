@@ -184,7 +184,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick collective inputs",
-            confusable_with: &["collective_lag", "rotor_droop", "climb_inflow"],
+            confusable_with: &["collective_lag", "rotor_droop", "climb_inflow", "sync"],
             would_tell_apart: "collective steps: the flow overshoots, a servo lag never does",
             source: "Carpenter & Fridovich, NACA TN 3044, 1953; apparent mass 8/3 rho R^3: Pitt & Peters 1981",
             searched: true,
