@@ -32,16 +32,18 @@ use trees::{Binned, Boosted};
 pub const WORTH: f64 = 0.02;
 /// Blocks below which the question is not answered: halves of four blocks, three to fit and one to stop on, are the fewest.
 pub const FEWEST_BLOCKS: usize = 8;
-/// Share of a dependence that has to remain once the residual's past is known.
+/// Share of a dependence that has to remain once the residual's past is known, both ways.
 const PERSISTS: f64 = 0.5;
+/// The same for a dependence that is straight lines in states and sticks: calibration leaves few of them, feedback makes them.
+const LINES_PERSIST: f64 = 0.75;
 /// Variables that compete for the first place.
-const RIVALS: usize = 4;
+const RIVALS: usize = 6;
 /// Share of the whole dependence from which a variable alone is "nearly all of it".
 const NEARLY_ALL: f64 = 0.8;
 /// States and sticks in which a model usually has straight lines.
 const LINES: [&str; 10] = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"];
-/// Rows of value zero that a bin is taken to hold beside its own, next to lines.
-const BIN_RIDGE: f64 = 30.0;
+/// Rows of value zero that a knot of a broken line is taken to hold beside its own.
+const KNOT_RIDGE: f64 = 10.0;
 /// Rows of a half on which importance is measured.
 const IMPORTANCE_ROWS: usize = 3000;
 /// Where pairings are drawn.
@@ -98,7 +100,8 @@ pub struct Unknown {
 ///
 /// R² = 1 − Σ (r − κ f)² / Σ (r − r̄)² on the half that was not fitted, mean of both ways; f are boosted trees, and κ ≤ 1 is what
 /// remains of them once the residual's past is known. Reported where R² exceeds [`UnknownOptions::worth`] and the 95 % quantile of its
-/// maximum over channels under pairings that cannot depend, and where κ is at least one half. The result does not depend on the
+/// maximum over channels under pairings that cannot depend, and where κ is at least one half both ways, or three quarters where straight lines in
+/// states and sticks are all of it. The result does not depend on the
 /// number of threads.
 ///
 /// # Errors
@@ -149,7 +152,7 @@ fn check(table: &ResidualTable) -> Result<()> {
 struct Found {
     r2: f64,
     r2_with_feedback: f64,
-    /// κ, the mean of both ways.
+    /// κ, the smaller of both ways.
     persists: f64,
     models: [Boosted; 2],
 }
@@ -204,9 +207,10 @@ impl<'a> Search<'a> {
     /// Fits each half and judges on the other; `starts` are the same features at the start of each row.
     fn dependence(&self, features: &Binned, starts: &Binned, residual: &[f64]) -> Found {
         let models = self.models(features, residual);
-        let mut found = Found { r2: 0.0, r2_with_feedback: 0.0, persists: 0.0, models };
+        let mut found = Found { r2: 0.0, r2_with_feedback: 0.0, persists: 1.0, models };
         for (model, judged) in found.models.iter().zip(self.judged()) {
             if model.is_constant() {
+                found.persists = 0.0;
                 continue;
             }
             let of = |bins: &Binned| {
@@ -218,7 +222,7 @@ impl<'a> Search<'a> {
             let factor = moments.factor();
             found.r2 += 0.5 * moments.r2(factor);
             found.r2_with_feedback += 0.5 * moments.r2(1.0);
-            found.persists += 0.5 * factor;
+            found.persists = found.persists.min(factor);
         }
         found
     }
@@ -300,7 +304,7 @@ impl<'a> Search<'a> {
         flights.into_iter().enumerate().flat_map(of_flight).collect()
     }
 
-    /// R² of straight lines in all states and sticks beside means by bin of `chosen` features, on the half that was not fitted, mean of
+    /// R² of straight lines in all states and sticks beside a broken line in each of the `chosen` features, on the half that was not fitted, mean of
     /// both ways; and the lines' part of a fit to all rows, those in `chosen` left out.
     ///
     /// The model was calibrated with such lines beside the effect that it lacks, and they have taken up part of it. What remains
@@ -316,15 +320,22 @@ impl<'a> Search<'a> {
                 values.iter().map(|value| (value - mean) / rms.max(f64::MIN_POSITIVE)).collect()
             })
             .collect();
-        let bins = self.features.select(chosen);
-        let size = 1 + scaled.len() + chosen.len() * trees::BINS;
-        // The regressors of a row that are not zero: a constant, the lines, one bin a feature.
+        let knots: Vec<(&[f64], Vec<f64>)> = chosen
+            .iter()
+            .map(|feature| (self.table.features[*feature].as_slice(), self.features.knots(&self.table.features, *feature)))
+            .collect();
+        let size = 1 + scaled.len() + chosen.len() * (trees::BINS + 1);
+        // The regressors of a row that are not zero: a constant, the lines, and two hats a feature, which make a broken line.
         let regressors = |row: usize, out: &mut Vec<(usize, f64)>| {
             out.clear();
             out.push((0, 1.0));
             out.extend(scaled.iter().enumerate().map(|(line, values)| (1 + line, values[row])));
-            let bin = |(feature, bin): (usize, &u8)| (1 + scaled.len() + feature * trees::BINS + *bin as usize, 1.0);
-            out.extend(bins.row(row).iter().enumerate().map(bin));
+            for (number, (values, knots)) in knots.iter().enumerate() {
+                let upper = knots.partition_point(|knot| *knot <= values[row]).clamp(1, knots.len() - 1);
+                let share = (values[row] - knots[upper - 1]) / (knots[upper] - knots[upper - 1]);
+                let first = 1 + scaled.len() + number * (trees::BINS + 1);
+                out.extend([(first + upper - 1, 1.0 - share), (first + upper, share)]);
+            }
         };
         let fit = |ranges: &[&Range<usize>]| {
             let (mut gram, mut right, mut row) = (DMatrix::<f64>::zeros(size, size), DVector::zeros(size), Vec::new());
@@ -336,7 +347,7 @@ impl<'a> Search<'a> {
                 }
             }
             for index in 0..size {
-                gram[(index, index)] += if index > scaled.len() { BIN_RIDGE } else { 1e-6 * gram[(index, index)] };
+                gram[(index, index)] += if index > scaled.len() { KNOT_RIDGE } else { 1e-6 * gram[(index, index)] };
             }
             gram.cholesky().map_or_else(|| DVector::zeros(size), |factor| factor.solve(&right))
         };
@@ -362,6 +373,16 @@ impl<'a> Search<'a> {
         (r2, part)
     }
 
+    /// R² of the best function of one variable beside lines. A stick and its lags are tried one by one: three functions in one would
+    /// have an advantage.
+    fn rival(&self, group: usize, residual: &[f64]) -> f64 {
+        let (name, features) = &self.groups[group];
+        if name == "yaw" {
+            return self.beside_lines(features, residual).0;
+        }
+        features.iter().map(|feature| self.beside_lines(&[*feature], residual).0).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     /// Names the variables behind a dependence; `None` if it is one of feedback.
     fn describe(&self, channel: usize, found: &Found, null_r2_95: f64, worth: f64) -> Option<Unknown> {
         let residual = &self.table.residual[channel];
@@ -375,7 +396,11 @@ impl<'a> Search<'a> {
                 self.dependence(&self.features.select(features), &self.starts.select(features), residual)
             })
             .collect();
-        let stands = |found: &Found| found.persists >= PERSISTS && found.r2 > worth && found.r2 > null_r2_95;
+        // Where straight lines do not already explain it, rivals are compared with the lines fitted anew.
+        let lines = self.beside_lines(&[], residual).0;
+        let bent = lines < NEARLY_ALL * found.r2_with_feedback;
+        let persists = if bent { PERSISTS } else { LINES_PERSIST };
+        let stands = |found: &Found| found.persists >= persists && found.r2 > worth && found.r2 > null_r2_95;
         let best = (0..alone.len()).max_by(|a, b| alone[*a].r2.total_cmp(&alone[*b].r2))?;
         let (mut r2, mut r2_with_feedback) = (found.r2, found.r2_with_feedback);
         if !stands(found) {
@@ -385,11 +410,8 @@ impl<'a> Search<'a> {
             }
             (r2, r2_with_feedback) = (alone[best].r2, alone[best].r2_with_feedback);
         }
-        // Where straight lines do not already explain it, rivals are compared with the lines fitted anew.
-        let lines = self.beside_lines(&[], residual).0;
-        let bent = lines < NEARLY_ALL * r2_with_feedback;
         let beside: Vec<f64> = if bent {
-            shares.iter().take(RIVALS).map(|(group, _)| self.beside_lines(&self.groups[*group].1, residual).0).collect()
+            shares.iter().take(RIVALS).map(|(group, _)| self.rival(*group, residual)).collect()
         } else {
             alone.iter().map(|found| found.r2_with_feedback).collect()
         };

@@ -9,6 +9,8 @@ use crate::physics::evaluate;
 
 /// Length of a row, s: well below the 0.5 s for which a gust lasts and the 1 s of the quickest manoeuvres.
 pub const ROW_S: f64 = 0.1;
+/// Time before a row at which [`ResidualTable::at_start`] is read, s: smoothed logs already know of a gust that far ahead.
+const LEAD_S: f64 = 0.03;
 /// Most rows, if the caller has no other wish.
 pub const ROWS_MAX: usize = 24_000;
 
@@ -21,7 +23,8 @@ pub struct ResidualTable {
     pub units: Vec<String>,
     /// One column a feature.
     pub features: Vec<Vec<f64>>,
-    /// The features at the first sample of each row: what was so before the row's own residual could act on it. May be empty; then
+    /// The features shortly before each row, or at its start where a span begins: what was so before the row's own residual could
+    /// act on it. May be empty; then
     /// the means stand in for them, and a state that follows a gust within a row is harder to tell from a cause.
     pub at_start: Vec<Vec<f64>>,
     /// Measured − predicted by channel in the order of [`Column::TARGETS`], m/s² and rad/s².
@@ -132,11 +135,12 @@ impl ResidualTable {
                     for (out, values) in table.features.iter_mut().zip(&columns) {
                         out.push(mean(values));
                     }
+                    let before = start.saturating_sub((LEAD_S / flight.step_s).round() as usize).max(span.start);
                     for (out, values) in table.at_start.iter_mut().zip(&columns) {
-                        out.push(values[start]);
+                        out.push(values[before]);
                     }
                     table.features[candidates.len()].push(middle_s);
-                    table.at_start[candidates.len()].push(start as f64 * flight.step_s);
+                    table.at_start[candidates.len()].push(before as f64 * flight.step_s);
                     for (out, values) in table.residual.iter_mut().zip(&residual) {
                         let value = mean(values);
                         if !value.is_finite() {

@@ -88,7 +88,7 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
         }
         set(Column::Roll, of(8, 1.0, 0.2, 0.0));
         set(Column::Pitch, of(9, 1.0, 0.2, 0.0));
-        let start = 6.28 * stream(30).uniform(0);
+        let start = std::f64::consts::TAU * stream(30).uniform(0);
         set(Column::Yaw, of(10, 5.0, 1.0, start));
         made.flights.push(Flight::new(format!("f{flight}"), "m", 0.0, STEP_S, columns, Targets::Recorded)?);
         made.residual.push(gust);

@@ -73,6 +73,18 @@ impl Binned {
         Self { features: chosen.len(), bins, edges }
     }
 
+    /// Ends and edges of a feature, rising, at least two.
+    pub(super) fn knots(&self, columns: &[Vec<f64>], feature: usize) -> Vec<f64> {
+        let values = columns.get(feature).map(Vec::as_slice).unwrap_or_default();
+        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let edges = self.edges.get(feature).map(Vec::as_slice).unwrap_or_default();
+        let inner = edges.iter().copied().filter(|edge| *edge > low && *edge < high);
+        let mut knots: Vec<f64> = std::iter::once(low).chain(inner).collect();
+        knots.push(if high > low { high } else { low + 1.0 });
+        knots
+    }
+
     /// The bins of one row.
     pub(super) fn row(&self, row: usize) -> &[u8] {
         self.bins.get(row * self.features..(row + 1) * self.features).unwrap_or_default()
