@@ -227,6 +227,7 @@ fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
     let map = Map {
         caption: format!("Movement of {} when a coefficient moves by half its 95 % interval, root mean square", uncertainty.name),
         shade: "movement over the RMSE of the channel".into(),
+        full: None,
         columns: channel_columns("coefficient", false, false),
         rows: rows.collect(),
     };
@@ -258,6 +259,7 @@ pub(super) fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
         Part::Map(Map {
             caption: format!("RMSE of {} by {what}, 95 % interval below", model.name),
             shade: "RMSE over the standard deviation of the channel; 1 is as bad as predicting its mean".into(),
+            full: None,
             columns: channel_columns(what, false, false),
             rows,
         })
@@ -358,6 +360,7 @@ fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
         Part::Map(Map {
             caption: format!("Share of the residual of {} that goes with one variable alone", row.name),
             shade: "correlation ratio η² of binned means".into(),
+            full: None,
             columns: channel_columns("variable", true, false).into_iter().map(|(name, _)| (name, String::new())).collect(),
             rows: rows.collect(),
         }),

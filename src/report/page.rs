@@ -88,6 +88,8 @@ pub struct Map {
     pub caption: String,
     /// What the shade means.
     pub shade: String,
+    /// The value of the darkest shade, so that maps can be compared; the largest value of the map if absent or smaller.
+    pub full: Option<f64>,
     /// Column headings with their units.
     pub columns: Vec<(String, String)>,
     /// Row headings, each with a second, smaller line, and the cells.
@@ -185,7 +187,7 @@ fn head_html(columns: &[(String, String)]) -> String {
 
 fn map_html(map: &Map) -> String {
     let values = map.rows.iter().flat_map(|(.., cells)| cells).filter_map(|cell| cell.value).filter(|value| value.is_finite());
-    let largest = values.fold(0.0, f64::max);
+    let largest = values.chain(map.full).fold(0.0, f64::max);
     let mut out = format!("<div class=\"wide\"><table class=\"map\">\n<caption>{}</caption>\n", escape(&map.caption));
     out.push_str(&head_html(&map.columns));
     for (name, detail, cells) in &map.rows {
@@ -311,6 +313,7 @@ mod tests {
         let map = Map {
             caption: evil.into(),
             shade: evil.into(),
+            full: None,
             columns: vec![(evil.into(), evil.into())],
             rows: vec![(evil.into(), evil.into(), vec![map_cell])],
         };

@@ -25,6 +25,10 @@ const SAMPLES: usize = 150_000;
 const BLOCK_S: f64 = 10.0;
 /// Variables of a channel that are shown besides those that an added effect reads.
 const TELLING: usize = 3;
+/// Share of a residual that the darkest shade stands for at least: below it all is noise.
+const LEAST_DARKEST: f64 = 0.1;
+/// RMSE of the loudest region over that of all flights from which regions are shown.
+const UNEVEN: f64 = 1.25;
 /// Share of a residual below which a variable is not shown, unless an added effect reads it.
 const SHARE_SHOWN: f64 = 0.01;
 
@@ -146,9 +150,20 @@ impl Seen<'_> {
         let deviation = deviation(report.flights, &windows)?;
         let every = if stride > 1 { format!(" Every {stride}th sample is taken.") } else { String::new() };
         let mut parts = vec![Part::Text(format!(
-            "All flights, searched and not. A dark row is a manoeuvre, a dark column a channel that the model misses.{every}"
+            "All flights, searched and not. A dark row is a manoeuvre, a dark column a channel that the model misses. All maps have one \
+             scale.{every}"
         ))];
         parts.extend(comparison.models.iter().flat_map(|model| maps(model, &deviation).parts));
+        let values = |part: &Part| match part {
+            Part::Map(map) => map.rows.iter().flat_map(|(.., cells)| cells).filter_map(|cell| cell.value).fold(0.0, f64::max),
+            _ => 0.0,
+        };
+        let darkest = parts.iter().map(values).fold(0.0, f64::max);
+        for part in &mut parts {
+            if let Part::Map(map) = part {
+                map.full = Some(darkest);
+            }
+        }
         // The same words stand under each model; once is enough.
         let mut said: Vec<String> = Vec::new();
         parts.retain(|part| match part {
@@ -177,6 +192,8 @@ impl Seen<'_> {
              every interval holds zero. Hollow points rest on fewer than five blocks of ten seconds and say little. A dashed line is \
              an added effect's own contribution, about its mean; coefficients fitted beside it may take up a part of it.",
         )];
+        let shares = before.iter().flat_map(|(_, of)| of.iter().map(|one| one.share));
+        let darkest = shares.fold(LEAST_DARKEST, f64::max);
         for (side, found) in self.sides.iter().zip(&found) {
             let rows = found.iter().map(|(variable, of)| {
                 let cells = of.iter().map(|one| MapCell {
@@ -189,6 +206,7 @@ impl Seen<'_> {
             parts.push(Part::Map(Map {
                 caption: format!("Share of the residual of the {} that goes with one variable alone", side.name),
                 shade: "correlation ratio η² of binned means".into(),
+                full: Some(darkest),
                 columns: channel_columns("variable", true, false),
                 rows: rows.collect(),
             }));
@@ -357,7 +375,8 @@ impl Seen<'_> {
             let mut even = Vec::new();
             for (channel, column) in Column::TARGETS.iter().enumerate() {
                 let tree = regions(table, channel)?;
-                if tree.split.is_none() {
+                let loudest = tree.leaves().iter().map(|leaf| leaf.rmse).fold(0.0, f64::max);
+                if tree.split.is_none() || loudest < UNEVEN * tree.rmse {
                     even.push(column.name());
                     continue;
                 }
@@ -377,7 +396,11 @@ impl Seen<'_> {
                 parts.push(Part::Table(Table { caption: format!("{}, {}", column.name(), side.name), columns, rows }));
             }
             if !even.is_empty() {
-                parts.push(Part::Text(format!("{}: the error of {} is even; no rule parts it.", side.name, even.join(", "))));
+                parts.push(Part::Text(format!(
+                    "{}: the error of {} is even; no rule finds a region in which it is a quarter larger.",
+                    side.name,
+                    even.join(", ")
+                )));
             }
         }
         Ok(parts)
@@ -507,6 +530,7 @@ fn sticks(model: &str, found: Vec<StickCorrelation>) -> Vec<Part> {
         parts.push(Part::Map(Map {
             caption: format!("Largest correlation of each stick with the residual of the {model}, and its lag"),
             shade: "size of the correlation; at a negative lag the residual comes first".into(),
+            full: Some(0.5),
             columns: channel_columns("stick", true, false),
             rows,
         }));
