@@ -140,14 +140,14 @@ fn normalised(part: &PartError, deviation: &PerChannel) -> [Option<f64>; 6] {
     std::array::from_fn(|channel| Some(part.rmse.channels()[channel]? / deviation.channels()[channel]?))
 }
 
-fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, String)> {
+pub(super) fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, String)> {
     let unit = |column: &Column| if share { "" } else { column.unit() }.to_owned();
     let channels = Column::TARGETS.iter().map(|column| (column.name().to_owned(), unit(column)));
     let last = mean.then(|| ("mean".to_owned(), String::new()));
     [(first.to_owned(), String::new())].into_iter().chain(channels).chain(last).collect()
 }
 
-fn error_tables(comparison: &Comparison) -> Vec<Part> {
+pub(super) fn error_tables(comparison: &Comparison) -> Vec<Part> {
     let table = |(title, words, kind, measure): (&str, &str, Kind, fn(&ModelError) -> PerChannel)| {
         let values: Vec<Vec<Option<f64>>> = comparison.models.iter().map(|model| with_mean(&measure(model))).collect();
         let best: Vec<Vec<usize>> = (0..7)
@@ -227,6 +227,7 @@ fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
     let map = Map {
         caption: format!("Movement of {} when a coefficient moves by half its 95 % interval, root mean square", uncertainty.name),
         shade: "movement over the RMSE of the channel".into(),
+        full: None,
         columns: channel_columns("coefficient", false, false),
         rows: rows.collect(),
     };
@@ -243,7 +244,7 @@ fn with_mean(values: &PerChannel) -> Vec<Option<f64>> {
 }
 
 /// Manoeuvre × channel and regime × channel.
-fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
+pub(super) fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
     let row = |name: &str, part: &PartError| {
         let shades = normalised(part, deviation);
         let cells =
@@ -258,6 +259,7 @@ fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
         Part::Map(Map {
             caption: format!("RMSE of {} by {what}, 95 % interval below", model.name),
             shade: "RMSE over the standard deviation of the channel; 1 is as bad as predicting its mean".into(),
+            full: None,
             columns: channel_columns(what, false, false),
             rows,
         })
@@ -289,11 +291,11 @@ fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
     Section { title: "Where the error lies".into(), parts }
 }
 
-fn channel_panels() -> Vec<(String, String)> {
+pub(super) fn channel_panels() -> Vec<(String, String)> {
     Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect()
 }
 
-fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &Stretch) -> figures::Figure {
+pub(super) fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &Stretch) -> figures::Figure {
     let span = stretch.span;
     let flight = &report.flights[span.flight];
     let mut at: Vec<(usize, usize)> = report
@@ -358,6 +360,7 @@ fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
         Part::Map(Map {
             caption: format!("Share of the residual of {} that goes with one variable alone", row.name),
             shade: "correlation ratio η² of binned means".into(),
+            full: None,
             columns: channel_columns("variable", true, false).into_iter().map(|(name, _)| (name, String::new())).collect(),
             rows: rows.collect(),
         }),
@@ -377,7 +380,7 @@ fn residuals(report: &CompareReport<'_>, row: &Row) -> Result<Section> {
             .take(PANELS)
             .filter_map(|(index, (variable, _))| {
                 let dependence = &found.get(*index)?.1[channel];
-                Some(BinnedPanel { variable: variable.name(), unit: variable.unit(), dependence, curve: None })
+                Some(BinnedPanel { variable: variable.name(), unit: variable.unit(), dependence, curve: None, after: None })
             })
             .collect();
         let caption = "The variables it goes with most, share of the residual's variance in brackets.";

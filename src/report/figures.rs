@@ -6,13 +6,15 @@
 use super::colour;
 use super::page::escape;
 use crate::critique::locate::{Bin, Dependence};
+use crate::critique::residual_views::Surface;
 use plotly::common::{
-    Anchor, DashType, ErrorData, ErrorType, Font, Line, Marker, MarkerSymbol, Mode, Orientation, TextAnchor, Visible,
+    Anchor, ColorBar, ColorScale, ColorScaleElement, DashType, ErrorData, ErrorType, Font, HoverInfo, Line, Marker, MarkerSymbol,
+    Mode, Orientation, TextAnchor, Visible,
 };
 use plotly::layout::{
     Annotation, Axis, AxisType, BarMode, HoverMode, Legend, Margin, SpikeMode, SpikeSnap, TicksDirection, TraceOrder,
 };
-use plotly::{Bar, Layout, Scatter, Traces};
+use plotly::{Bar, HeatMap, Layout, Scatter, Traces};
 
 /// Points of one line that a figure draws at most; more are thinned with [`thin`].
 pub const POINTS: usize = 1000;
@@ -58,6 +60,22 @@ pub struct LineData {
 /// Lines in panels with linked horizontal axes and one legend: measured against predicted. The first line is what was measured,
 /// thin and black on top of all; the second, wide, the model in focus. `panels` are (title, unit of the vertical axis).
 pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
+    lines_on(AxisType::Linear, title, caption, x_title, panels, data)
+}
+
+/// As [`lines`], on logarithmic vertical axes.
+pub fn log_lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
+    lines_on(AxisType::Log, title, caption, x_title, panels, data)
+}
+
+fn lines_on(
+    vertical: AxisType,
+    title: &str,
+    caption: &str,
+    x_title: &str,
+    panels: &[(String, String)],
+    data: &[LineData],
+) -> Figure {
     let grid = Grid::new(panels.len(), 2, 150, 34).by_column();
     let mut traces = Traces::new();
     // Drawn in this order: other models, the first model, and on top what was measured.
@@ -84,7 +102,7 @@ pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, Strin
     let mut layout = layout.hover_mode(HoverMode::XUnified).annotations(grid.titles(panels.iter().map(|(title, _)| title)));
     for (panel, (_, unit)) in panels.iter().enumerate().take(grid.panels) {
         let y = grid.y(panel).title(escape(unit)).anchor(axis_name('x', grid.column(panel)));
-        layout = set_y(layout, panel, y);
+        layout = set_y(layout, panel, if matches!(vertical, AxisType::Log) { y.type_(AxisType::Log).n_ticks(5) } else { y });
     }
     for panel in (0..grid.panels).filter(|panel| grid.is_lowest(*panel)) {
         let column = grid.column(panel);
@@ -106,6 +124,8 @@ pub struct BinnedPanel<'a> {
     pub dependence: &'a Dependence,
     /// A curve through the bins, such as an effect that would explain them: its name, the variable, the residual.
     pub curve: Option<(String, Vec<f64>, Vec<f64>)>,
+    /// The residual of an amended model in the same bins.
+    pub after: Option<&'a Dependence>,
 }
 
 /// Mean residual of one channel in bins of several variables, one panel each, with 95 % intervals. Bins on few blocks are hollow.
@@ -114,6 +134,8 @@ pub fn binned(title: &str, caption: &str, unit: &str, panels: &[BinnedPanel<'_>]
     let grid = Grid::new(panels.len(), 3, 190, 92);
     let mut traces = Traces::new();
     let first = |thin: bool| panels.iter().position(|panel| panel.dependence.bins.iter().any(|bin| bin.is_thin() == thin));
+    let amended = panels.iter().any(|panel| panel.after.is_some());
+    let mut curves: Vec<&str> = Vec::new();
     for (number, panel) in panels.iter().enumerate().take(grid.panels) {
         for thin in [false, true] {
             let bins: Vec<&Bin> = panel.dependence.bins.iter().filter(|bin| bin.is_thin() == thin).collect();
@@ -128,7 +150,11 @@ pub fn binned(title: &str, caption: &str, unit: &str, panels: &[BinnedPanel<'_>]
             let mean: Vec<f64> = bins.iter().map(|bin| bin.mean).collect();
             let trace = Scatter::new(rounded(&at), rounded(&mean))
                 .mode(Mode::Markers)
-                .name(if thin { "on fewer than 5 blocks" } else { "mean residual, 95 % interval" })
+                .name(match (thin, amended) {
+                    (true, _) => "on fewer than 5 blocks",
+                    (false, false) => "mean residual, 95 % interval",
+                    (false, true) => "before, mean residual with 95 % interval",
+                })
                 .legend_group(thin.to_string())
                 .show_legend(first(thin) == Some(number))
                 .text_array(hover)
@@ -136,10 +162,21 @@ pub fn binned(title: &str, caption: &str, unit: &str, panels: &[BinnedPanel<'_>]
                 .error_y(error.color(if thin { FAINT } else { colour::line(0) }).thickness(1.4).width(3));
             traces.push(trace.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
         }
+        if let Some(after) = panel.after {
+            let (at, mean): (Vec<f64>, Vec<f64>) = after.bins.iter().map(|bin| (bin.at, bin.mean)).unzip();
+            let trace = Scatter::new(rounded(&at), rounded(&mean)).mode(Mode::Markers).name("after");
+            let marker = Marker::new().color(colour::line(2)).size(6).symbol(MarkerSymbol::SquareOpen);
+            let first = panels.iter().position(|panel| panel.after.is_some()) == Some(number);
+            let trace = trace.marker(marker).legend_group("after").show_legend(first);
+            traces.push(trace.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
+        }
         if let Some((name, x, y)) = &panel.curve {
             let (x, y) = thin(x, y);
             let curve = Scatter::new(rounded(&x), rounded(&y)).mode(Mode::Lines).name(escape(name));
+            let known = curves.contains(&name.as_str());
+            curves.push(name);
             let curve = curve.line(Line::new().color(colour::line(1)).dash(DashType::Dash).width(2.0));
+            let curve = curve.legend_group(escape(name)).show_legend(!known);
             traces.push(curve.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
         }
     }
@@ -169,6 +206,61 @@ fn bin_range<'a>(found: impl Iterator<Item = &'a Dependence>) -> Option<[f64; 2]
         ends.chain([0.0]).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
     let margin = 0.06 * (high - low);
     (margin > 0.0).then_some([low - margin, high + margin])
+}
+
+/// The residual over two variables, one panel a model, on one colour scale: blue below zero, white at zero, orange above. Cells on
+/// fewer than 5 blocks are crossed. `panels` are (title, surface); `axes` the titles of the axes; `unit` that of the residual.
+pub fn surfaces(title: &str, caption: &str, unit: &str, axes: [&str; 2], panels: &[(String, &Surface)]) -> Figure {
+    let grid = Grid::new(panels.len(), 2, 320, 60);
+    let mut traces = Traces::new();
+    // Thin cells do not set the scale.
+    let cells = || panels.iter().flat_map(|(_, surface)| &surface.cells);
+    let sound = cells().filter(|cell| !cell.thin).map(|cell| cell.mean.abs()).fold(0.0, f64::max);
+    let largest = if sound > 0.0 { sound } else { cells().map(|cell| cell.mean.abs()).fold(f64::MIN_POSITIVE, f64::max) };
+    let scale = [(0.0, colour::line(0)), (0.5, "#ffffff"), (1.0, colour::line(1))];
+    let scale: Vec<ColorScaleElement> = scale.map(|(at, colour)| ColorScaleElement(at, colour.into())).into();
+    for (number, (_, surface)) in panels.iter().enumerate().take(grid.panels) {
+        let middle = |edges: &[f64]| rounded(&edges.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect::<Vec<_>>());
+        let [x, y] = [middle(&surface.edges[0]), middle(&surface.edges[1])];
+        let mut z: Vec<Vec<Option<f64>>> = vec![vec![None; x.len()]; y.len()];
+        let mut words = vec![vec![String::new(); x.len()]; y.len()];
+        let (mut thin_x, mut thin_y) = (Vec::new(), Vec::new());
+        for cell in &surface.cells {
+            let Some(place) = z.get_mut(cell.row).and_then(|row| row.get_mut(cell.column)) else { continue };
+            *place = Some(round(cell.mean));
+            if let Some(word) = words.get_mut(cell.row).and_then(|row| row.get_mut(cell.column)) {
+                let interval = cell.ci95.map(|[low, high]| format!(" [{low:.3}, {high:.3}]")).unwrap_or_default();
+                *word = format!("{:.3}{interval}, {} rows in {} blocks", cell.mean, cell.n, cell.blocks);
+            }
+            if let (true, Some(x), Some(y)) = (cell.thin, x.get(cell.column), y.get(cell.row)) {
+                thin_x.push(*x);
+                thin_y.push(*y);
+            }
+        }
+        let bar = ColorBar::new().title(escape(unit)).thickness(14);
+        let map = HeatMap::new(x, y, z)
+            .zmin(-largest)
+            .zmax(largest)
+            .zmid(0.0)
+            .auto_color_scale(false)
+            .color_scale(ColorScale::Vector(scale.clone()))
+            .color_bar(bar)
+            .show_scale(number == 0)
+            .hover_on_gaps(false)
+            .hover_text_matrix(words);
+        traces.push(map.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
+        let thin = Scatter::new(thin_x, thin_y).mode(Mode::Markers).name("on fewer than 5 blocks").legend_group("thin");
+        let marker = Marker::new().symbol(MarkerSymbol::XThinOpen).size(7).color("#7a7a7a");
+        let thin = thin.marker(marker).show_legend(number == 0).hover_info(HoverInfo::Skip);
+        traces.push(thin.x_axis(axis_name('x', number)).y_axis(axis_name('y', number)));
+    }
+    let mut layout = grid.layout().annotations(grid.titles(panels.iter().map(|(title, _)| title)));
+    for number in 0..grid.panels {
+        let x = grid.x(grid.column(number)).anchor(axis_name('y', number)).title(escape(axes[0])).show_grid(false);
+        let y = grid.y(number).anchor(axis_name('x', number)).title(escape(axes[1])).show_grid(false);
+        layout = set_y(set_x(layout, number, x), number, y);
+    }
+    figure(title, caption, traces, layout, grid.height_px())
 }
 
 /// Bars of each step in panels of channels: how an error falls from step to step (a waterfall). `values[step][panel]`; a step
@@ -453,7 +545,7 @@ mod tests {
         let wide = Bin { ci95: Some([-900.0, 900.0]), ..bin(2.0, 0.5, 2) };
         let dependence = Dependence { bins: vec![bin(0.0, 1.0, 9), bin(1.0, -1.0, 9), wide], share: 0.25 };
         let curve = Some(("drag".to_owned(), vec![0.0, 1.0], vec![1.0, -1.0]));
-        let panel = BinnedPanel { variable: "vx", unit: "m/s", dependence: &dependence, curve };
+        let panel = BinnedPanel { variable: "vx", unit: "m/s", dependence: &dependence, after: None, curve };
         let found = json(&binned("t", "c", "m/s²", &[panel]));
         assert_eq!(found["data"][0]["error_y"]["array"], serde_json::json!([2.0, 2.0]));
         assert_eq!(found["data"][0]["error_y"]["arrayminus"], serde_json::json!([1.0, 1.0]));

@@ -4,9 +4,11 @@
 
 pub mod colour;
 pub mod compare;
+pub mod diagnose;
 pub mod figures;
 pub mod page;
 
 pub use compare::{CompareReport, compare_page};
+pub use diagnose::{DiagnoseReport, diagnose_page};
 pub use figures::Figure;
 pub use page::{Cell, Map, MapCell, Page, Part, Section, Table, page};

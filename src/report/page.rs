@@ -38,6 +38,10 @@ pub enum Part {
     Map(Map),
     /// An interactive figure.
     Figure(Figure),
+    /// Lines to be copied: a formula, a piece of a file.
+    Code(String),
+    /// A long text under a line that opens it.
+    Details(String, String),
 }
 
 /// A cell of a [`Table`].
@@ -84,6 +88,8 @@ pub struct Map {
     pub caption: String,
     /// What the shade means.
     pub shade: String,
+    /// The value of the darkest shade, so that maps can be compared; the largest value of the map if absent or smaller.
+    pub full: Option<f64>,
     /// Column headings with their units.
     pub columns: Vec<(String, String)>,
     /// Row headings, each with a second, smaller line, and the cells.
@@ -124,6 +130,10 @@ pub fn page(page: &Page) -> String {
                 Part::Text(text) => _ = writeln!(body, "<p>{}</p>", escape(text)),
                 Part::Table(table) => body.push_str(&table_html(table)),
                 Part::Map(map) => body.push_str(&map_html(map)),
+                Part::Code(text) => _ = writeln!(body, "<pre>{}</pre>", escape(text)),
+                Part::Details(line, text) => {
+                    _ = writeln!(body, "<details><summary>{}</summary><pre>{}</pre></details>", escape(line), escape(text));
+                }
                 Part::Figure(figure) => {
                     body.push_str(&figure_html(figure, figures));
                     figures += 1;
@@ -143,6 +153,9 @@ pub fn page(page: &Page) -> String {
     )
 }
 
+/// Longest text of a cell that stays on one line.
+const ONE_LINE: usize = 44;
+
 fn table_html(table: &Table) -> String {
     let mut out = format!("<div class=\"wide\"><table>\n<caption>{}</caption>\n", escape(&table.caption));
     out.push_str(&head_html(&table.columns));
@@ -153,6 +166,7 @@ fn table_html(table: &Table) -> String {
             _ = match (column, cell.best) {
                 (0, _) => write!(out, "<th scope=\"row\">{text}</th>"),
                 (_, true) => write!(out, "<td><b title=\"best of the column\">{text}</b><span class=\"star\">*</span></td>"),
+                (_, false) if cell.text.chars().count() > ONE_LINE => write!(out, "<td class=\"prose\">{text}</td>"),
                 (_, false) => write!(out, "<td>{text}<span class=\"star\"></span></td>"),
             };
         }
@@ -173,7 +187,7 @@ fn head_html(columns: &[(String, String)]) -> String {
 
 fn map_html(map: &Map) -> String {
     let values = map.rows.iter().flat_map(|(.., cells)| cells).filter_map(|cell| cell.value).filter(|value| value.is_finite());
-    let largest = values.fold(0.0, f64::max);
+    let largest = values.chain(map.full).fold(0.0, f64::max);
     let mut out = format!("<div class=\"wide\"><table class=\"map\">\n<caption>{}</caption>\n", escape(&map.caption));
     out.push_str(&head_html(&map.columns));
     for (name, detail, cells) in &map.rows {
@@ -254,6 +268,9 @@ th:first-child { text-align: left; }
 tbody th { font-weight: 500; }
 small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem; line-height: 1.25; }
 .star { display: inline-block; width: .6em; text-align: left; font-weight: 700; }
+.prose { white-space: normal; text-align: left; min-width: 15rem; overflow-wrap: anywhere; }
+pre { background: #f4f4f4; padding: .6rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
+summary { cursor: pointer; color: #005a8c; }
 .map td { min-width: 6.2rem; border: 2px solid #fff; }
 .map td small { color: inherit; }
 .map tbody th { border-bottom-color: #fff; }
@@ -296,6 +313,7 @@ mod tests {
         let map = Map {
             caption: evil.into(),
             shade: evil.into(),
+            full: None,
             columns: vec![(evil.into(), evil.into())],
             rows: vec![(evil.into(), evil.into(), vec![map_cell])],
         };

@@ -3,12 +3,13 @@
 use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
-use phyture::critique::check::check;
+use phyture::critique::check;
 use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose, nothing};
-use phyture::flight::split::Split;
+use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
-use phyture::physics::{Entry, Model, calibrate};
+use phyture::physics::{Effect, Entry, Model, calibrate};
+use phyture::report::{DiagnoseReport, diagnose_page, page};
 use phyture::{Error, Result};
 use serde::Serialize;
 use std::io::Write;
@@ -49,14 +50,95 @@ fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
     Diagnosis { data_sha256, ..nothing(Verdict::ConventionFault, summary) }
 }
 
+/// A folder for a page and what stands in it besides the diagnosis.
+struct Paper<'a> {
+    title: String,
+    folder: &'a Path,
+    provenance: Vec<(String, String)>,
+}
+
+impl<'a> Paper<'a> {
+    fn new(context: &Context, command: &str, data: &Data, model: &Model, folder: &'a Path) -> Self {
+        let provenance = [
+            ("command", command.to_owned()),
+            ("data", data.data.display().to_string()),
+            ("model", model.name.clone()),
+            ("seed", context.seed().to_string()),
+        ];
+        let name = data.data.file_name().unwrap_or(data.data.as_os_str()).to_string_lossy();
+        Self {
+            title: format!("Which physics is missing: {} on {name}", model.name),
+            folder,
+            provenance: provenance.map(|(what, value)| (what.to_owned(), value)).into(),
+        }
+    }
+
+    /// Writes `report.html`.
+    fn write(
+        &self,
+        context: &Context,
+        diagnoses: &[Diagnosis],
+        flights: &[Flight],
+        split: &Split,
+        models: [&Model; 2],
+    ) -> Result<()> {
+        std::fs::create_dir_all(self.folder).map_err(Error::io(self.folder))?;
+        let searched: Vec<Span> = split.training.iter().chain(&split.validation).copied().collect();
+        let [before, after] = models;
+        let report = DiagnoseReport {
+            title: &self.title,
+            diagnoses,
+            flights,
+            searched: &searched,
+            locked: &split.test,
+            before,
+            after,
+            provenance: &self.provenance,
+        };
+        let html = page(&diagnose_page(&report)?);
+        let path = self.folder.join("report.html");
+        phyture::flight::atomic::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
+        context.say(format!("report: {}", path.display()));
+        Ok(())
+    }
+}
+
+/// The model as it was given, without what is switched off, calibrated on what is searched; as it stands if the flights do not determine
+/// its coefficients.
+fn calibrated(model: &Model, set: &DataSet, split: &Split) -> Result<Model> {
+    let mut model = model.clone();
+    model.effects.retain(|effect| effect.enabled);
+    let searched: Vec<Span> = split.training.iter().chain(&split.validation).copied().collect();
+    match calibrate(&model, &set.flights, &searched) {
+        Err(Error::Undetermined(_)) => Ok(model),
+        calibrated => Ok(calibrated?.0),
+    }
+}
+
 /// Reads and checks the flights and divides them. `None` after a convention fault, which is reported.
-fn prepare(context: &Context, data: &Data, model: &Model, division: &Division) -> Result<Option<(DataSet, Split, String)>> {
+fn prepare(
+    context: &Context,
+    data: &Data,
+    model: &Model,
+    division: &Division,
+    paper: Option<&Paper<'_>>,
+) -> Result<Option<(DataSet, Split, String)>> {
     let set = context.flights(data, 1)?;
     let sha = data_sha256(data)?;
-    let report = check(&set, Some(model));
+    let report = check::check(&set, Some(model));
     if report.fault {
         context.say(format!("\n{report}"));
-        context.json(&convention_fault(report.summary, sha))?;
+        let faults = report.findings.iter().filter(|finding| finding.verdict == check::Verdict::Fault);
+        let notes = faults.map(|finding| match &finding.set {
+            Some(set) => format!("{}; set {set}", finding.message),
+            None => finding.message.clone(),
+        });
+        let diagnosis = Diagnosis { notes: notes.collect(), ..convention_fault(report.summary.clone(), sha) };
+        if let Some(paper) = paper {
+            let split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
+            paper.write(context, std::slice::from_ref(&diagnosis), &set.flights, &split, [model, model])?;
+        }
+        context.json(&diagnosis)?;
         return Ok(None);
     }
     context.say(format!("check: {}", report.summary));
@@ -83,7 +165,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         (Some(hybrid), None) => hybrid.description().model.clone(),
         (_, model) => context.model(model)?,
     };
-    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division)? else {
+    let paper = wanted.report.map(|folder| Paper::new(context, "diagnose", data, &model, folder));
+    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     if let Some(hybrid) = hybrid {
@@ -109,7 +192,11 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     let task = Task { set: &set, split: &split, data_sha256, options };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", outcome.diagnosis));
-    let _ = wanted.report;
+    if let Some(paper) = paper {
+        let before = calibrated(&model, &set, &split)?;
+        let after = if outcome.diagnosis.accepted.is_empty() { &before } else { &outcome.model };
+        paper.write(context, std::slice::from_ref(&outcome.diagnosis), &set.flights, &split, [&before, after])?;
+    }
     context.json(&outcome.diagnosis)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -146,7 +233,9 @@ pub struct Amended {
 
 /// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger.
 pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
-    let (mut model, _) = calibrate(model, &task.set.flights, &task.split.training)?;
+    let off: Vec<_> = model.effects.iter().filter(|effect| !effect.enabled).cloned().collect();
+    let mut model = calibrated(model, task.set, task.split)?;
+    model.effects.extend(off);
     let mut rounds = Vec::new();
     for round in 1..=MOST_ROUNDS {
         let outcome = task.diagnose(&model)?;
@@ -157,12 +246,10 @@ pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -
         if !found {
             break;
         }
-        let disabled =
-            model.effects.iter().filter(|effect| !effect.enabled && outcome.model.effect(&effect.name).is_none()).cloned();
-        let disabled: Vec<_> = disabled.collect();
-        let mut amended = outcome.model;
-        amended.effects.extend(disabled);
-        model = calibrate(&amended, &task.set.flights, &task.split.training)?.0;
+        let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
+        let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
+        model = calibrated(&outcome.model, task.set, task.split)?;
+        model.effects.extend(off);
     }
     Ok(Amended { rounds, model })
 }
@@ -200,12 +287,14 @@ pub fn run_loop(
     division: &Division,
 ) -> Result<ExitCode> {
     let model = context.model(model)?;
-    let Some((set, split, data_sha256)) = prepare(context, data, &model, division)? else {
+    let paper = report.map(|folder| Paper::new(context, "loop", data, &model, folder));
+    let Some((set, split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
     let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options };
     let ledger = output.with_extension("ledger.jsonl");
+    let before = paper.as_ref().map(|_| calibrated(&model, &set, &split)).transpose()?;
     let Amended { rounds, mut model } = amend(context, &task, &model, &ledger)?;
     model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
     model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
@@ -213,7 +302,10 @@ pub fn run_loop(
     model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
     model.write(output)?;
     context.say(format!("\nmodel written to {}, ledger {}", output.display(), ledger.display()));
-    let _ = report;
+    if let (Some(paper), Some(before)) = (paper, before) {
+        let after = if rounds.iter().all(|round| round.accepted.is_empty()) { &before } else { &model };
+        paper.write(context, &rounds, &set.flights, &split, [&before, after])?;
+    }
     context.json(&LoopOutput { rounds, model: output.into() })?;
     Ok(ExitCode::SUCCESS)
 }

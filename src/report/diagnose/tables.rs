@@ -1,0 +1,335 @@
+//! What a diagnosis says, as tables: every effect that was tried, the fall of the error, what these flights cannot show, and where it
+//! comes from. No measuring: every number is one of [`Diagnosis`].
+
+use super::super::compare::{channel_columns, channel_panels};
+use super::super::figures;
+use super::super::page::{Cell, Part, Table};
+use super::{DiagnoseReport, notes};
+use crate::critique::diagnose::{CandidateReport, Diagnosis, Status, Step};
+use crate::critique::table::{Kind, significant};
+use crate::error::{Error, Result};
+use crate::flight::{Column, Span};
+use crate::physics::catalogue;
+use std::collections::BTreeMap;
+
+fn columns(names: &[(&str, &str)]) -> Vec<(String, String)> {
+    names.iter().map(|(name, unit)| ((*name).to_owned(), (*unit).to_owned())).collect()
+}
+
+/// Falls of the error in percent, the largest first; those that round to nothing are left out unless all do.
+fn falls(falls: &BTreeMap<String, f64>) -> String {
+    let mut sorted: Vec<(&String, f64)> = falls.iter().map(|(channel, fall)| (channel, 100.0 * fall)).collect();
+    sorted.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let shown: Vec<String> =
+        sorted.iter().filter(|(_, fall)| fall.abs() >= 0.1).map(|(channel, fall)| format!("{channel} {fall:.1} %")).collect();
+    match (sorted.is_empty(), shown.is_empty()) {
+        (true, _) => "–".into(),
+        (false, true) => "less than 0.1 %".into(),
+        (false, false) => shown.join(", "),
+    }
+}
+
+/// Coefficients and parameters of an accepted effect: as found, and what is usual.
+fn numbers(step: &Step) -> [String; 2] {
+    let with_unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
+    let mut found = Vec::new();
+    let mut usual = Vec::new();
+    for number in &step.coefficients {
+        let interval = number.ci95.map(|[low, high]| format!(" [{}, {}]", significant(low, 3), significant(high, 3)));
+        let spread = number.rms_over_flights.map(|rms| format!(", rms over flights {}", significant(rms, 3)));
+        found.push(format!(
+            "{} = {}{}{}{}",
+            number.name,
+            significant(number.value, 4),
+            interval.unwrap_or_default(),
+            with_unit(&number.unit),
+            spread.unwrap_or_default()
+        ));
+        if let Some([low, high]) = number.expected {
+            let outside = number.value < low || number.value > high;
+            usual.push(format!("{} {low} to {high}{}", number.name, if outside { " (found outside)" } else { "" }));
+        }
+    }
+    for parameter in &step.parameters {
+        let how = match (parameter.fixed, parameter.profile) {
+            (true, _) => "known".to_owned(),
+            (false, None) => "fitted".to_owned(),
+            (false, Some([low, high])) => format!("fitted, {} to {}", significant(low, 3), significant(high, 3)),
+        };
+        found.push(format!("{} = {}{} ({how})", parameter.name, significant(parameter.value, 4), with_unit(&parameter.unit)));
+    }
+    [found.join("; "), usual.join("; ")].map(|text| if text.is_empty() { "–".into() } else { text })
+}
+
+/// View 7.
+pub(super) fn ranking(report: &DiagnoseReport<'_>) -> Vec<Part> {
+    let mut parts = vec![Part::Text(
+        "Accepted effects first, then by what they would still remove. A p-value never stands alone: an effect is accepted only if it \
+         cannot be chance and removes a share of the error on blocks that it was not fitted to. Competes with: for an accepted \
+         effect, what these flights cannot tell from it; for others, what the catalogue knows to look alike."
+            .into(),
+    )];
+    for (round, diagnosis) in report.diagnoses.iter().enumerate() {
+        let caption = if report.diagnoses.len() > 1 { format!("Round {}", round + 1) } else { "Effects tried".into() };
+        if diagnosis.candidates.is_empty() {
+            parts.push(Part::Text(format!("{caption}: no effect was tried. {}", diagnosis.summary)));
+            continue;
+        }
+        let rows = diagnosis.candidates.iter().map(|candidate| row(diagnosis, candidate)).collect();
+        let names = [
+            ("effect", ""),
+            ("status", ""),
+            ("held-out error removed", "share of the mean squared error"),
+            ("p", "one effect"),
+            ("wins", "of resampled worlds"),
+            ("numbers", "95 % interval"),
+            ("usual", "5 kg helicopter"),
+            ("competes with", ""),
+            ("the physics", ""),
+            ("needs", "to show at all"),
+            ("remark", ""),
+        ];
+        parts.push(Part::Table(Table { caption, columns: columns(&names), rows }));
+        for step in &diagnosis.steps {
+            parts.push(Part::Text(format!("{} as formulas, with its numbers in place:", step.effect)));
+            parts.push(Part::Code(step.formula.clone()));
+        }
+        if let Some(method) = &diagnosis.method {
+            parts.push(Part::Text(format!(
+                "Accepted: p at most {:.4} ({} effects in play), and at least {:.1} % of a channel's held-out error.",
+                method.largest_p_value,
+                method.effects_in_play,
+                100.0 * method.smallest_fall
+            )));
+        }
+    }
+    parts
+}
+
+fn row(diagnosis: &Diagnosis, candidate: &CandidateReport) -> Vec<Cell> {
+    let step = diagnosis.steps.iter().find(|step| step.effect == candidate.effect);
+    let known = catalogue::definition(&candidate.effect);
+    let dash = || "–".to_owned();
+    let [found, usual] = step.map_or_else(|| [dash(), dash()], numbers);
+    let competes = match (step, notes(&candidate.effect)) {
+        (Some(step), _) if step.indistinguishable.is_empty() => "nothing fits as well".into(),
+        (Some(step), _) => step.indistinguishable.join(", "),
+        (None, Some(notes)) if !notes.confusable_with.is_empty() => notes.confusable_with.join(", "),
+        (None, _) => dash(),
+    };
+    let meaning = step.map(|step| step.meaning.clone()).or_else(|| known.map(|known| known.meaning.to_owned()));
+    let wins = step.map_or_else(dash, |step| format!("{:.0} % ({})", 100.0 * step.selection_frequency, step.stability));
+    let cells = [
+        candidate.effect.clone(),
+        candidate.status.words().to_owned(),
+        falls(&candidate.held_out_mse_fall),
+        candidate.p_value.map_or_else(dash, |p| format!("{p:.4}")),
+        wins,
+        found,
+        usual,
+        competes,
+        meaning.unwrap_or_else(|| "a formula of the model file".into()),
+        notes(&candidate.effect).map_or_else(dash, |notes| notes.excitation.to_owned()),
+        candidate.note.clone().unwrap_or_else(dash),
+    ];
+    cells.map(Cell::from).into()
+}
+
+/// What to paste where something is left that no effect of the catalogue explains.
+pub(super) fn suggestions(report: &DiagnoseReport<'_>) -> Vec<Part> {
+    let unknown = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref());
+    let mut parts = Vec::new();
+    for unknown in unknown.into_iter().flatten() {
+        let on: Vec<String> =
+            unknown.depends_on.iter().take(4).map(|on| format!("{} ({:.0} %)", on.variable, 100.0 * on.share)).collect();
+        parts.push(Part::Text(format!(
+            "What is left of {} depends on {}: measured variables predict {:.0} % of its variance on blocks that were not learned \
+             from (chance reaches {:.1} % in one of twenty data sets). {}",
+            unknown.channel,
+            on.join(", "),
+            100.0 * unknown.r2,
+            100.0 * unknown.null_r2_95.max(0.0),
+            unknown.shape
+        )));
+        if let Some(formula) = &unknown.suggested_formula {
+            parts.push(Part::Text("To try, in the model file:".into()));
+            parts.push(Part::Code(format!(
+                "[[effect]]\nkind = \"formula\"\nname = \"suggested_{0}\"\nchannel = \"{0}\"\nformula = \"{formula}\"\ncoefficient = {1:.4}",
+                unknown.channel,
+                unknown.suggested_coefficient.unwrap_or_default()
+            )));
+        }
+    }
+    parts
+}
+
+/// View 8.
+pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
+    let mut names = Vec::new();
+    let mut values: Vec<Vec<Option<f64>>> = Vec::new();
+    for diagnosis in report.diagnoses {
+        let Some(locked) = &diagnosis.locked else { continue };
+        for (step, rmse) in locked.waterfall.iter().enumerate().skip(usize::from(!values.is_empty())) {
+            names.push(match step {
+                0 => "model".to_owned(),
+                _ => diagnosis.accepted.get(step - 1).map_or_else(|| "?".into(), |effect| format!("+ {effect}")),
+            });
+            values.push(rmse.channels().into());
+        }
+    }
+    let Some(last) = values.last().cloned() else {
+        return vec![Part::Text(
+            "No flights were kept from the search, or nothing was searched: there is nothing to confirm on.".into(),
+        )];
+    };
+    let caption = if names.len() == 1 {
+        "Nothing was added. The bar is what is left of the error on flights that no search has seen."
+    } else {
+        "Each bar adds one effect, in order of acceptance. Look for the step in the channels that an effect changes; a bar that does \
+         not fall here, on flights that no search has seen, speaks against it."
+    };
+    let mut words = Vec::new();
+    if let Some(unknown) = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref()) {
+        let rest = |channel: usize| {
+            let of = unknown.iter().find(|unknown| unknown.channel == Column::TARGETS[channel].name())?;
+            Some(last.get(channel).copied().flatten()? * (1.0 - of.r2).max(0.0).sqrt())
+        };
+        names.push("unknown modelled".into());
+        values.push((0..Column::TARGETS.len()).map(rest).collect());
+        words.push(Part::Text(
+            "The last bar is an estimate: what would be left if all that measured variables still predict were modelled, \
+             RMSE √(1 − R²) with the R² of the searched flights. Channels without it showed no such dependence."
+                .into(),
+        ));
+    }
+    let rows = names.iter().zip(&values).map(|(name, values)| {
+        let cells = values.iter().map(|value| Cell::from(Kind::Error.text(*value)));
+        [Cell::from(name.clone())].into_iter().chain(cells).collect()
+    });
+    let table = Table {
+        caption: "The same as numbers: RMSE on flights that no search has seen".into(),
+        columns: channel_columns("model", false, false),
+        rows: rows.collect(),
+    };
+    let figure = figures::steps("RMSE from effect to effect", caption, &channel_panels(), &names, &values);
+    let mut parts = vec![Part::Figure(figure), Part::Table(table)];
+    parts.extend(words);
+    for (round, diagnosis) in report.diagnoses.iter().enumerate() {
+        let Some(locked) = diagnosis.locked.as_ref().filter(|locked| !locked.mse_fall.is_empty()) else { continue };
+        let round = if report.diagnoses.len() > 1 { format!(", round {}", round + 1) } else { String::new() };
+        let rows = locked.mse_fall.iter().map(|(channel, fall)| {
+            let [fall, low, high] = fall.map(|share| format!("{:.1}", 100.0 * share));
+            vec![channel.as_str().into(), fall.into(), low.into(), high.into()]
+        });
+        parts.push(Part::Table(Table {
+            caption: format!("Share of the mean squared error removed on {:.0} s ({}){round}", locked.duration_s, locked.part),
+            columns: columns(&[("channel", ""), ("removed", "%"), ("from", "% (95 %)"), ("to", "% (95 %)")]),
+            rows: rows.collect(),
+        }));
+    }
+    parts
+}
+
+/// View 9.
+pub(super) fn not_judged(diagnosis: &Diagnosis) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for step in diagnosis.steps.iter().filter(|step| !step.indistinguishable.is_empty()) {
+        let others = step.indistinguishable.join(", ");
+        parts.push(Part::Text(format!("{} or {others}? These flights fit both. To tell: {}.", step.effect, step.would_tell_apart)));
+    }
+    let mut candidates: Vec<&CandidateReport> =
+        diagnosis.candidates.iter().filter(|candidate| candidate.status != Status::Accepted).collect();
+    if candidates.is_empty() {
+        parts.push(Part::Text(if diagnosis.candidates.is_empty() {
+            "No effect was tried, so none can be ruled out.".into()
+        } else {
+            "Every effect that was tried was accepted.".into()
+        }));
+        return parts;
+    }
+    // Those that cannot be judged at all first, then those that could hide the most.
+    let rank = |candidate: &CandidateReport| {
+        (candidate.status == Status::NotExcited, candidate.detection_limit_mse_fall.unwrap_or_default())
+    };
+    candidates.sort_by(|a, b| rank(b).0.cmp(&rank(a).0).then(rank(b).1.total_cmp(&rank(a).1)));
+    let dash = || "–".to_owned();
+    let rows = candidates.iter().map(|candidate| {
+        let limit = candidate.detection_limit_mse_fall.map_or_else(dash, |limit| format!("{:.1} %", 100.0 * limit));
+        let about = |text: fn(&crate::physics::Notes) -> &str| {
+            notes(&candidate.effect).map(text).filter(|text| !text.is_empty()).map_or_else(dash, str::to_owned)
+        };
+        let cells = [
+            candidate.effect.clone(),
+            candidate.status.words().to_owned(),
+            limit,
+            about(|notes| notes.excitation),
+            about(|notes| notes.would_tell_apart),
+            candidate.note.clone().unwrap_or_else(dash),
+        ];
+        cells.map(Cell::from).into()
+    });
+    parts.insert(
+        0,
+        Part::Text(
+            "That an effect was not named does not mean that it is absent. Below its limit it would go unnoticed in these flights; \
+             an effect that is not excited cannot be judged at all until it is flown."
+                .into(),
+        ),
+    );
+    parts.push(Part::Table(Table {
+        caption: "Effects not named: how large one could be and stay unnoticed".into(),
+        columns: columns(&[
+            ("effect", ""),
+            ("status", ""),
+            ("limit", "share of the error, 80 % power"),
+            ("the flights must contain", ""),
+            ("the flight that would tell", ""),
+            ("remark", ""),
+        ]),
+        rows: rows.collect(),
+    }));
+    parts
+}
+
+/// View 10.
+pub(super) fn provenance(report: &DiagnoseReport<'_>) -> Result<Vec<Part>> {
+    let mut rows: Vec<(String, String)> = Vec::new();
+    let mut add = |what: &str, value: String| rows.push((what.to_owned(), value));
+    let seconds = |spans: &[Span]| {
+        let of = |span: &Span| report.flights.get(span.flight).map_or(0.0, |flight| (span.end - span.start) as f64 * flight.step_s);
+        spans.iter().map(of).sum::<f64>()
+    };
+    add("flights", report.flights.len().to_string());
+    add("searched", format!("{:.0} s", seconds(report.searched)));
+    add("kept from the search", format!("{:.0} s", seconds(report.locked)));
+    if let Some(diagnosis) = report.diagnoses.last() {
+        add("data, SHA-256", diagnosis.data_sha256.clone());
+        add("phyture", diagnosis.version.clone());
+        if let Some(method) = &diagnosis.method {
+            add("seed of the search", method.seed.to_string());
+            add("blocks", format!("{} of {:.1} s", method.blocks, method.block_s));
+            add("residual taken as correlated over", format!("{} s", method.correlation_s));
+            add("largest p-value", format!("{:.5} ({} effects in play)", method.largest_p_value, method.effects_in_play));
+            add("smallest share of a channel's error", format!("{:.1} %", 100.0 * method.smallest_fall));
+        }
+    }
+    let time: f64 = report.diagnoses.iter().map(|diagnosis| diagnosis.seconds).sum();
+    add("time of the search", format!("{time:.1} s"));
+    rows.extend(report.provenance.iter().cloned());
+    let rows = rows.into_iter().map(|(what, value)| vec![what.into(), value.into()]).collect();
+    let mut parts = vec![Part::Table(Table { caption: String::new(), columns: columns(&[("what", ""), ("value", "")]), rows })];
+    let mut said: Vec<&String> = Vec::new();
+    for note in report.diagnoses.iter().flat_map(|diagnosis| &diagnosis.notes) {
+        if !said.contains(&note) {
+            said.push(note);
+            parts.push(Part::Text(format!("Note: {note}")));
+        }
+    }
+    let json = match report.diagnoses {
+        [one] => serde_json::to_string_pretty(one),
+        many => serde_json::to_string_pretty(many),
+    };
+    let json = json.map_err(|error| Error::Undetermined(format!("a number of the diagnosis has no JSON: {error}")))?;
+    parts.push(Part::Details("The diagnosis as JSON, the numbers of this page".into(), json));
+    Ok(parts)
+}

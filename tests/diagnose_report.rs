@@ -1,0 +1,269 @@
+//! The page of `diagnose`, as a whole: the verdict first, ten views, the numbers of the JSON, nothing loaded; and the pages of diagnoses
+//! that found nothing.
+//!
+//! The page is left in `target/tmp/diagnose.html`, to be looked at.
+#![cfg(feature = "report")]
+
+use phyture::critique::PerChannel;
+use phyture::critique::diagnose::{
+    CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, Status, Step, UnknownChannel, Verdict,
+};
+use phyture::flight::{Column, Flight, Span, Targets};
+use phyture::physics::{Model, catalogue};
+use phyture::report::diagnose::VIEWS;
+use phyture::report::{DiagnoseReport, diagnose_page, page};
+use phyture::{Error, Result};
+
+const EVIL: &str = "</script><script>alert('x')</script>";
+
+/// A flight whose states swing and whose accelerations are those of the model.
+fn flight(name: &str, seconds: usize, phase: f64, model: &Model, absent: &[Column]) -> Result<Flight> {
+    let samples = seconds * 100;
+    let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; samples]);
+    for (place, _) in Column::STATE.into_iter().enumerate().filter(|(_, column)| !absent.contains(column)) {
+        let (rate, size) = (0.17 + 0.13 * place as f64, if place < 3 { 4.0 } else { 0.3 });
+        let wave = |sample: usize| size * (rate * sample as f64 / 100.0 + phase + place as f64).sin();
+        columns[place] = (0..samples).map(wave).collect();
+    }
+    if !absent.contains(&Column::Z) {
+        columns[Column::Z as usize] = (0..samples).map(|sample| -2.0 + 1.5 * (0.003 * sample as f64 + phase).sin()).collect();
+    }
+    let mut flight = Flight::new(name, "hover & <b>", 0.0, 0.01, columns.clone(), Targets::Recorded)?;
+    let predicted = model.predict(&flight)?;
+    for (target, values) in Column::TARGETS.into_iter().zip(predicted) {
+        let noise = |(sample, value): (usize, f64)| value + 0.1 * (sample as f64 * 12.9898 + phase).sin();
+        columns[target as usize] = values.into_iter().enumerate().map(noise).collect();
+    }
+    flight = Flight::new(name, "hover & <b>", 0.0, 0.01, columns, Targets::Recorded)?;
+    flight.absent = absent.to_vec();
+    Ok(flight)
+}
+
+fn diagnosis(verdict: Verdict) -> Diagnosis {
+    Diagnosis {
+        verdict,
+        summary: format!("Said in words {EVIL}."),
+        accepted: Vec::new(),
+        steps: Vec::new(),
+        candidates: Vec::new(),
+        unknown: None,
+        locked: None,
+        method: None,
+        notes: vec!["a note <i>".into()],
+        seconds: 1.5,
+        version: "0.0".into(),
+        data_sha256: "4d1c".into(),
+    }
+}
+
+fn candidate(effect: &str, status: Status, fall: f64) -> CandidateReport {
+    CandidateReport {
+        effect: effect.into(),
+        status,
+        held_out_mse_fall: [("vz_dot".to_owned(), fall)].into(),
+        p_value: Some(0.0123),
+        detection_limit_mse_fall: Some(0.0345),
+        note: None,
+    }
+}
+
+fn found() -> Diagnosis {
+    let rmse = |value: f64| PerChannel::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)]);
+    Diagnosis {
+        accepted: vec!["ground_effect".into()],
+        steps: vec![Step {
+            effect: "ground_effect".into(),
+            meaning: "near the ground".into(),
+            channels: vec!["vz_dot".into()],
+            held_out_mse_fall: [("vz_dot".to_owned(), 0.3172)].into(),
+            p_value: 0.0001,
+            selection_frequency: 0.97,
+            stability: "stable".into(),
+            indistinguishable: vec!["rotor_droop".into()],
+            coefficients: vec![Number {
+                name: "k".into(),
+                value: 0.9173,
+                ci95: Some([0.8614, 0.9725]),
+                unit: "1".into(),
+                expected: Some([0.6, 1.3]),
+                rms_over_flights: None,
+            }],
+            parameters: Vec::new(),
+            would_tell_apart: "hover at 0.5, 1, 2 and 4 m".into(),
+            formula: "k * <height>".into(),
+            rests_on_flight: None,
+        }],
+        candidates: vec![
+            candidate("ground_effect", Status::Accepted, 0.3172),
+            candidate("wind", Status::NotExcited, 0.0),
+            candidate("my_own", Status::NotSignificant, 0.0012),
+        ],
+        locked: Some(Locked {
+            part: "test".into(),
+            duration_s: 40.0,
+            rmse_before: rmse(0.4567),
+            rmse_after: rmse(0.3456),
+            mse_fall: [("vz_dot".to_owned(), [0.427, 0.391, 0.463])].into(),
+            waterfall: vec![rmse(0.4567), rmse(0.3456)],
+        }),
+        method: Some(Method {
+            blocks: 60,
+            block_s: 10.0,
+            correlation_s: 0.5,
+            searched_s: 200.0,
+            seed: 77,
+            effects_in_play: 33,
+            largest_p_value: 0.0015,
+            smallest_fall: 0.01,
+        }),
+        ..diagnosis(Verdict::EffectsMissing)
+    }
+}
+
+/// The model without and with ground effect.
+fn models() -> [Model; 2] {
+    let before = Model::paper("n9", 4.6, [0.08, 0.25, 0.3], 0.8);
+    let mut after = before.clone();
+    if let Some(definition) = catalogue::definition("ground_effect") {
+        let mut effect = definition.effect(after.mass_kg, after.rotor_radius_m);
+        effect.coefficients.iter_mut().for_each(|coefficient| coefficient.value = 0.9173);
+        after.effects.push(effect);
+    }
+    for effect in after.effects.iter_mut().filter(|effect| effect.name == "collective_thrust") {
+        effect.coefficients.iter_mut().for_each(|coefficient| coefficient.value = -9.0);
+    }
+    [before, after]
+}
+
+/// The page's own text: without the embedded figure library, whose licence texts name addresses that are never opened.
+fn html(diagnoses: &[Diagnosis], absent: &[Column], [before, after]: [&Model; 2], seconds: usize) -> Result<String> {
+    let [_, truth] = models();
+    let flights = ["a", "b", EVIL].iter().enumerate();
+    let mut plain = truth.clone();
+    if absent.contains(&Column::Z) {
+        plain.effects.retain(|effect| effect.name != "ground_effect");
+    }
+    let flights: Vec<Flight> =
+        flights.map(|(number, name)| flight(name, seconds, number as f64, &plain, absent)).collect::<Result<_>>()?;
+    let span = |flight: usize| Span { flight, start: 0, end: flights[flight].len() };
+    let provenance = [("command".to_owned(), "diagnose".to_owned())];
+    let (searched, locked) = ([span(0), span(1)], [span(2)]);
+    let report = DiagnoseReport {
+        title: "Missing physics",
+        diagnoses,
+        flights: &flights,
+        searched: &searched,
+        locked: &locked,
+        before,
+        after,
+        provenance: &provenance,
+    };
+    let html = page(&diagnose_page(&report)?);
+    let Some(start) = html.find("<script type=\"text/javascript\">") else { return Ok(html) };
+    let end = start + html[start..].find("</script>").unwrap_or_default();
+    if diagnoses.len() == 1 && diagnoses[0].accepted.len() == 1 {
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("diagnose.html");
+        std::fs::write(&path, &html).map_err(Error::io(&path))?;
+    }
+    Ok(format!("{}{}", &html[..start], &html[end..]))
+}
+
+fn is_self_contained(own: &str) {
+    for loads in ["http:", "https:", "src=", "<link", "@import", "url(", "<script>alert"] {
+        assert!(!own.contains(loads), "the page has {loads}");
+    }
+}
+
+#[test]
+fn the_page_has_ten_views_after_the_verdict_and_the_numbers_of_the_json() -> Result<()> {
+    let [before, after] = models();
+    let own = html(&[found()], &[], [&before, &after], 100)?;
+    is_self_contained(&own);
+    let verdict = own.find("Verdict: effects missing.").ok_or_else(|| Error::Undetermined("no verdict".into()))?;
+    let mut last = verdict;
+    for view in VIEWS {
+        let at = own.find(&format!("<h2>{view}</h2>")).ok_or_else(|| Error::Undetermined(format!("no view {view}")))?;
+        assert!(at > last, "{view} is out of order");
+        last = at;
+    }
+    for text in [
+        "vz_dot 31.7 %",
+        "k = 0.9173 [0.861, 0.973]",
+        "97 % (stable)",
+        "rotor_droop",
+        "0.0123",
+        "3.5 %",
+        "0.457",
+        "0.346",
+        "42.7",
+        "hover at 0.5, 1, 2 and 4 m",
+        "k * &lt;height&gt;",
+        "&quot;p_value&quot;: 0.0123",
+        "Note: a note &lt;i&gt;",
+        "4d1c",
+        "model after",
+        "&lt;/script&gt;",
+    ] {
+        assert!(own.contains(text), "the page lacks {text}");
+    }
+    // The effect's own curve stands in the residual of its channel.
+    assert!(own.contains("\"name\":\"ground_effect\""));
+    assert!(own.len() < 3_000_000, "{} bytes", own.len());
+    Ok(())
+}
+
+#[test]
+fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
+    let [before, _] = models();
+    for verdict in [Verdict::Explained, Verdict::TooLittleData, Verdict::ConventionFault] {
+        let own = html(&[diagnosis(verdict)], &[], [&before, &before], 20)?;
+        is_self_contained(&own);
+        assert!(own.contains(&format!("Verdict: {}.", verdict.words())) && !own.contains("model after"));
+        assert_eq!(own.contains(VIEWS[0]), verdict != Verdict::ConventionFault);
+    }
+    let unknown = UnknownChannel {
+        channel: "vx_dot".into(),
+        r2: 0.51,
+        null_r2_95: 0.01,
+        depends_on: vec![DependsOn { variable: "height".into(), share: 0.89 }],
+        shape: "bends once".into(),
+        suggested_formula: Some("height ^ 2".into()),
+        suggested_coefficient: Some(0.25),
+    };
+    let rounds =
+        [found(), Diagnosis { unknown: Some(vec![unknown]), locked: found().locked, ..diagnosis(Verdict::NotInCatalogue) }];
+    let own = html(&rounds, &[], [&before, &before], 20)?;
+    for text in ["Round 2: not in the catalogue", "formula = &quot;height ^ 2&quot;", "height (89 %)", "unknown modelled"] {
+        assert!(own.contains(text), "the page lacks {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn columns_that_were_not_recorded_do_not_matter() -> Result<()> {
+    let [before, _] = models();
+    let own = html(&[diagnosis(Verdict::Explained)], &[Column::X, Column::Y, Column::Z], [&before, &before], 20)?;
+    assert!(VIEWS.iter().all(|view| own.contains(view)) && !own.contains("height, m"));
+    Ok(())
+}
+
+#[test]
+fn a_page_without_a_diagnosis_or_with_a_span_elsewhere_is_refused() {
+    let [before, _] = models();
+    let report = |diagnoses: &[Diagnosis], locked: &[Span]| {
+        let report = DiagnoseReport {
+            title: "t",
+            diagnoses,
+            flights: &[],
+            searched: &[],
+            locked,
+            before: &before,
+            after: &before,
+            provenance: &[],
+        };
+        diagnose_page(&report).map(|_| ())
+    };
+    assert!(matches!(report(&[], &[]), Err(Error::Shape { .. })));
+    let span = [Span { flight: 3, start: 0, end: 9 }];
+    assert!(matches!(report(&[diagnosis(Verdict::Explained)], &span), Err(Error::Shape { .. })));
+}
