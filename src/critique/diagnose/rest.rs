@@ -38,9 +38,9 @@ fn least(unknown: &Unknown) -> f64 {
 
 /// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the
 /// effects accepted there took away and that remain. Where the effect reads the very variable, the dependence need be only half as
-/// large as what was removed.
+/// large as what was removed. An effect that is worth while in another channel as well is not one.
 pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6], left: &[f64; 6], unknown: &[Unknown]) -> bool {
-    channels.iter().any(|&channel| {
+    channels.iter().all(|&channel| {
         let name = Column::TARGETS.get(channel).map_or("", |column| column.name());
         unknown.iter().filter(|unknown| unknown.channel == name).any(|unknown| {
             let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());

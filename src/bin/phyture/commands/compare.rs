@@ -12,7 +12,7 @@ use phyture::flight::{DataSet, Span, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
-use phyture::report::{CompareReport, compare_page, page};
+use phyture::report::{CompareReport, Page, compare_page, page};
 use phyture::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -161,9 +161,12 @@ impl Contest<'_> {
 impl Judged {
     /// Writes `report.html` into `folder`.
     pub fn write_page(&self, set: &DataSet, folder: &Path, provenance: &[(String, String)]) -> Result<PathBuf> {
-        std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-        let path = folder.join("report.html");
-        let report = CompareReport {
+        write_page(&self.page(set, provenance)?, folder)
+    }
+
+    /// The page, to be written or put into a larger one.
+    pub fn page(&self, set: &DataSet, provenance: &[(String, String)]) -> Result<Page> {
+        compare_page(&CompareReport {
             comparison: &self.comparison,
             flights: &set.flights,
             windows: &self.windows,
@@ -171,9 +174,15 @@ impl Judged {
             focus: self.focus,
             yardstick: Some(0),
             provenance,
-        };
-        let html = page(&compare_page(&report)?);
-        phyture::flight::atomic::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
-        Ok(path)
+        })
     }
+}
+
+/// Writes a page as `report.html` of a folder.
+pub fn write_page(content: &Page, folder: &Path) -> Result<PathBuf> {
+    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let path = folder.join("report.html");
+    let html = page(content);
+    phyture::flight::atomic::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
+    Ok(path)
 }

@@ -4,7 +4,7 @@
 //! locked away; the paper's baseline calibrated on the rest; what is missing found, added, calibrated; the residual network trained on
 //! the baseline and on the amended model; everything judged on the locked flights.
 
-use super::compare::Contest;
+use super::compare::{Contest, write_page};
 use super::diagnose::{self, Amended};
 use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
@@ -15,6 +15,7 @@ use phyture::flight::split::{Protocol, Split};
 use phyture::flight::write;
 use phyture::nn::PhyTureConfig;
 use phyture::physics::Model;
+use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate};
 use phyture::train::TrainConfig;
 use phyture::{Error, Result};
@@ -134,7 +135,22 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
         ),
         ("locked".to_owned(), LOCKED.join(", ")),
     ];
-    let page = judged.write_page(&set, out, &provenance)?;
+    // One page: what was missing, then the network, then where everything stands.
+    let title = "Hidden effects found, added, and the rest learned".to_owned();
+    let mut whole = diagnose_page(&DiagnoseReport {
+        title: &title,
+        diagnoses: &rounds,
+        flights: &set.flights,
+        searched: &split.training,
+        locked: &split.test,
+        before: &model,
+        after: &amended,
+        provenance: &provenance,
+    })?;
+    let compared = judged.page(&set, &provenance)?;
+    whole.summary.extend(compared.summary);
+    whole.sections.extend(compared.sections);
+    let page = write_page(&whole, out)?;
     let seconds = begun.elapsed().as_secs_f64();
     context.say(format!("report: {}   ({seconds:.0} s)", page.display()));
     context.json(&Output { rounds, comparison: judged.comparison, report: page, seconds })?;

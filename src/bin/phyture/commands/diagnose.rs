@@ -1,5 +1,6 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
+use super::compare::write_page;
 use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
@@ -9,7 +10,7 @@ use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
 use phyture::physics::{Effect, Entry, Model, calibrate};
-use phyture::report::{DiagnoseReport, diagnose_page, page};
+use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::{Error, Result};
 use serde::Serialize;
 use std::io::Write;
@@ -82,7 +83,6 @@ impl<'a> Paper<'a> {
         split: &Split,
         models: [&Model; 2],
     ) -> Result<()> {
-        std::fs::create_dir_all(self.folder).map_err(Error::io(self.folder))?;
         let searched: Vec<Span> = split.training.iter().chain(&split.validation).copied().collect();
         let [before, after] = models;
         let report = DiagnoseReport {
@@ -95,9 +95,7 @@ impl<'a> Paper<'a> {
             after,
             provenance: &self.provenance,
         };
-        let html = page(&diagnose_page(&report)?);
-        let path = self.folder.join("report.html");
-        phyture::flight::atomic::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
+        let path = write_page(&diagnose_page(&report)?, self.folder)?;
         context.say(format!("report: {}", path.display()));
         Ok(())
     }
