@@ -545,7 +545,7 @@ mod tests {
         let wide = Bin { ci95: Some([-900.0, 900.0]), ..bin(2.0, 0.5, 2) };
         let dependence = Dependence { bins: vec![bin(0.0, 1.0, 9), bin(1.0, -1.0, 9), wide], share: 0.25 };
         let curve = Some(("drag".to_owned(), vec![0.0, 1.0], vec![1.0, -1.0]));
-        let panel = BinnedPanel { variable: "vx", unit: "m/s", dependence: &dependence, curve };
+        let panel = BinnedPanel { variable: "vx", unit: "m/s", dependence: &dependence, curve, after: None };
         let found = json(&binned("t", "c", "m/s²", &[panel]));
         assert_eq!(found["data"][0]["error_y"]["array"], serde_json::json!([2.0, 2.0]));
         assert_eq!(found["data"][0]["error_y"]["arrayminus"], serde_json::json!([1.0, 1.0]));
