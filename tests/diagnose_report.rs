@@ -20,7 +20,7 @@ const EVIL: &str = "</script><script>alert('x')</script>";
 fn flight(name: &str, seconds: usize, phase: f64, model: &Model, absent: &[Column]) -> Result<Flight> {
     let samples = seconds * 100;
     let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; samples]);
-    for (place, _) in Column::STATE.into_iter().enumerate().filter(|(_, column)| !absent.contains(column)) {
+    for (place, _) in Column::STATE.iter().enumerate().filter(|(_, column)| !absent.contains(column)) {
         let (rate, size) = (0.17 + 0.13 * place as f64, if place < 3 { 4.0 } else { 0.3 });
         let wave = |sample: usize| size * (rate * sample as f64 / 100.0 + phase + place as f64).sin();
         columns[place] = (0..samples).map(wave).collect();

@@ -153,12 +153,14 @@ pub fn page(page: &Page) -> String {
     )
 }
 
-/// Longest text of a cell that stays on one line.
-const ONE_LINE: usize = 44;
+/// Longest text of a cell that stays on one line. A column with a longer one is set as prose: wrapped and to the left.
+const ONE_LINE: usize = 30;
 
 fn table_html(table: &Table) -> String {
     let mut out = format!("<div class=\"wide\"><table>\n<caption>{}</caption>\n", escape(&table.caption));
-    out.push_str(&head_html(&table.columns));
+    let long = |row: &Vec<Cell>, column: usize| row.get(column).is_some_and(|cell| cell.text.chars().count() > ONE_LINE);
+    let prose: Vec<bool> = (0..table.columns.len()).map(|column| table.rows.iter().any(|row| long(row, column))).collect();
+    out.push_str(&head_html(&table.columns, &prose));
     for row in &table.rows {
         out.push_str("<tr>");
         for (column, cell) in row.iter().enumerate() {
@@ -166,7 +168,7 @@ fn table_html(table: &Table) -> String {
             _ = match (column, cell.best) {
                 (0, _) => write!(out, "<th scope=\"row\">{text}</th>"),
                 (_, true) => write!(out, "<td><b title=\"best of the column\">{text}</b><span class=\"star\">*</span></td>"),
-                (_, false) if cell.text.chars().count() > ONE_LINE => write!(out, "<td class=\"prose\">{text}</td>"),
+                (_, false) if prose.get(column) == Some(&true) => write!(out, "<td class=\"prose\">{text}</td>"),
                 (_, false) => write!(out, "<td>{text}<span class=\"star\"></span></td>"),
             };
         }
@@ -176,10 +178,11 @@ fn table_html(table: &Table) -> String {
     out
 }
 
-fn head_html(columns: &[(String, String)]) -> String {
+fn head_html(columns: &[(String, String)], prose: &[bool]) -> String {
     let mut out = "<thead><tr>".to_owned();
-    for (name, unit) in columns {
-        _ = write!(out, "<th scope=\"col\">{}<small>{}</small></th>", escape(name), escape(unit));
+    for (column, (name, unit)) in columns.iter().enumerate() {
+        let class = if column > 0 && prose.get(column) == Some(&true) { " class=\"prose\"" } else { "" };
+        _ = write!(out, "<th scope=\"col\"{class}>{}<small>{}</small></th>", escape(name), escape(unit));
     }
     out.push_str("</tr></thead>\n<tbody>\n");
     out
@@ -189,7 +192,7 @@ fn map_html(map: &Map) -> String {
     let values = map.rows.iter().flat_map(|(.., cells)| cells).filter_map(|cell| cell.value).filter(|value| value.is_finite());
     let largest = values.chain(map.full).fold(0.0, f64::max);
     let mut out = format!("<div class=\"wide\"><table class=\"map\">\n<caption>{}</caption>\n", escape(&map.caption));
-    out.push_str(&head_html(&map.columns));
+    out.push_str(&head_html(&map.columns, &[]));
     for (name, detail, cells) in &map.rows {
         _ = write!(out, "<tr><th scope=\"row\">{}<small>{}</small></th>", escape(name), escape(detail));
         for cell in cells {
@@ -268,7 +271,7 @@ th:first-child { text-align: left; }
 tbody th { font-weight: 500; }
 small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem; line-height: 1.25; }
 .star { display: inline-block; width: .6em; text-align: left; font-weight: 700; }
-.prose { white-space: normal; text-align: left; min-width: 15rem; overflow-wrap: anywhere; }
+td.prose, thead th.prose { white-space: normal; text-align: left; min-width: 9.5rem; overflow-wrap: anywhere; }
 pre { background: #f4f4f4; padding: .6rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
 summary { cursor: pointer; color: #005a8c; }
 .map td { min-width: 6.2rem; border: 2px solid #fff; }

@@ -109,7 +109,8 @@ fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
         .flat_map(|locked| locked.mse_fall.iter().map(move |(channel, fall)| (channel, fall, locked.duration_s)))
         .map(|(channel, fall, seconds)| {
             let [fall, low, high] = fall.map(|share| 100.0 * share);
-            format!("{channel} {fall:.1} % [{low:.1}, {high:.1}] on {seconds:.0} s")
+            let doubt = if low > 0.0 { "" } else { " (not confirmed: the interval holds zero)" };
+            format!("{channel} {fall:.1} % [{low:.1}, {high:.1}] on {seconds:.0} s{doubt}")
         })
         .collect();
     if !locked.is_empty() {

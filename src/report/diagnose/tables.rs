@@ -81,15 +81,22 @@ pub(super) fn ranking(report: &DiagnoseReport<'_>) -> Vec<Part> {
             ("status", ""),
             ("held-out error removed", "share of the mean squared error"),
             ("p", "one effect"),
-            ("wins", "of resampled worlds"),
-            ("numbers", "95 % interval"),
-            ("usual", "5 kg helicopter"),
-            ("competes with", ""),
             ("the physics", ""),
+            ("competes with", ""),
             ("needs", "to show at all"),
-            ("remark", ""),
         ];
         parts.push(Part::Table(Table { caption, columns: columns(&names), rows }));
+        if !diagnosis.steps.is_empty() {
+            let rows = diagnosis.steps.iter().map(|step| {
+                let [found, usual] = numbers(step);
+                let wins = format!("{:.0} % ({})", 100.0 * step.selection_frequency, step.stability);
+                [step.effect.clone(), wins, found, usual].map(Cell::from).into()
+            });
+            let names =
+                [("effect", ""), ("wins", "of resampled worlds"), ("numbers", "95 % interval"), ("usual", "5 kg helicopter")];
+            let caption = "Numbers of the accepted effects, in order of acceptance".into();
+            parts.push(Part::Table(Table { caption, columns: columns(&names), rows: rows.collect() }));
+        }
         for step in &diagnosis.steps {
             parts.push(Part::Text(format!("{} as formulas, with its numbers in place:", step.effect)));
             parts.push(Part::Code(step.formula.clone()));
@@ -110,27 +117,23 @@ fn row(diagnosis: &Diagnosis, candidate: &CandidateReport) -> Vec<Cell> {
     let step = diagnosis.steps.iter().find(|step| step.effect == candidate.effect);
     let known = catalogue::definition(&candidate.effect);
     let dash = || "–".to_owned();
-    let [found, usual] = step.map_or_else(|| [dash(), dash()], numbers);
     let competes = match (step, notes(&candidate.effect)) {
         (Some(step), _) if step.indistinguishable.is_empty() => "nothing fits as well".into(),
         (Some(step), _) => step.indistinguishable.join(", "),
         (None, Some(notes)) if !notes.confusable_with.is_empty() => notes.confusable_with.join(", "),
         (None, _) => dash(),
     };
+    // The remark of a candidate that is not excited names what is wanted, too.
+    let needs = || notes(&candidate.effect).map(|notes| notes.excitation.to_owned());
     let meaning = step.map(|step| step.meaning.clone()).or_else(|| known.map(|known| known.meaning.to_owned()));
-    let wins = step.map_or_else(dash, |step| format!("{:.0} % ({})", 100.0 * step.selection_frequency, step.stability));
     let cells = [
         candidate.effect.clone(),
         candidate.status.words().to_owned(),
         falls(&candidate.held_out_mse_fall),
         candidate.p_value.map_or_else(dash, |p| format!("{p:.4}")),
-        wins,
-        found,
-        usual,
-        competes,
         meaning.unwrap_or_else(|| "a formula of the model file".into()),
-        notes(&candidate.effect).map_or_else(dash, |notes| notes.excitation.to_owned()),
-        candidate.note.clone().unwrap_or_else(dash),
+        competes,
+        candidate.note.clone().or_else(needs).unwrap_or_else(dash),
     ];
     cells.map(Cell::from).into()
 }
@@ -144,7 +147,7 @@ pub(super) fn suggestions(report: &DiagnoseReport<'_>) -> Vec<Part> {
             unknown.depends_on.iter().take(4).map(|on| format!("{} ({:.0} %)", on.variable, 100.0 * on.share)).collect();
         parts.push(Part::Text(format!(
             "What is left of {} depends on {}: measured variables predict {:.0} % of its variance on blocks that were not learned \
-             from (chance reaches {:.1} % in one of twenty data sets). {}",
+             from (chance reaches {:.1} % in one of twenty data sets). Shape: {}.",
             unknown.channel,
             on.join(", "),
             100.0 * unknown.r2,
@@ -262,9 +265,8 @@ pub(super) fn not_judged(diagnosis: &Diagnosis) -> Vec<Part> {
             candidate.effect.clone(),
             candidate.status.words().to_owned(),
             limit,
-            about(|notes| notes.excitation),
+            candidate.note.clone().unwrap_or_else(|| about(|notes| notes.excitation)),
             about(|notes| notes.would_tell_apart),
-            candidate.note.clone().unwrap_or_else(dash),
         ];
         cells.map(Cell::from).into()
     });
@@ -284,7 +286,6 @@ pub(super) fn not_judged(diagnosis: &Diagnosis) -> Vec<Part> {
             ("limit", "share of the error, 80 % power"),
             ("the flights must contain", ""),
             ("the flight that would tell", ""),
-            ("remark", ""),
         ]),
         rows: rows.collect(),
     }));
