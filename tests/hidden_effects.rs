@@ -18,7 +18,8 @@ use phyture::formula::Formula;
 use phyture::physics::{Model, evaluate};
 use phyture::sim::{INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Simulation, simulate};
 
-/// Removable share of the best channel's held-out mean squared error at which effects are hidden: between medium and large.
+/// Removable share of the best channel's held-out mean squared error at which effects are hidden: between medium and large. Effects in
+/// time are hidden at their physical size: this share would be a delay of less than a sample, and all of them look alike then.
 const SHARE: f64 = 0.3;
 
 /// A session with these mechanisms and no others. At level two, as in a real field, there is wind.
@@ -28,8 +29,9 @@ fn session(minutes: f64, hidden: &[&str], level: Level, seed: u64) -> Result<Vec
         simulation = simulation.hide("wind", 1.0)?;
     }
     for id in hidden {
-        let odds = SINGLES.iter().find(|single| single.id == *id).map_or(1.0, |single| single.odds);
-        simulation = simulation.hide(id, (SHARE / (1.0 - SHARE) / odds).sqrt().min(3.0))?;
+        let single = SINGLES.iter().find(|single| single.id == *id && !single.dynamic);
+        let scale = single.map_or(1.0, |single| (SHARE / (1.0 - SHARE) / single.odds).sqrt().min(3.0));
+        simulation = simulation.hide(id, scale)?;
     }
     Ok(simulate(&simulation)?.flights)
 }
@@ -40,6 +42,9 @@ fn search(flights: &[Flight], seed: u64) -> Result<Diagnosis> {
     let options = Options { seed, ..Options::default() };
     let diagnosis = diagnose(flights, &model, &split.training, &split.test, "test", &options)?.diagnosis;
     println!("seed {seed}: {} {:?}, {:.1} s", diagnosis.verdict.words(), diagnosis.accepted, diagnosis.seconds);
+    if std::env::var_os("PRINT_ALL").is_some() {
+        println!("{diagnosis}");
+    }
     Ok(diagnosis)
 }
 
@@ -77,10 +82,10 @@ fn a_single_hidden_effect_is_named_first() -> Result<()> {
         let level = level(seed);
         let diagnosis = search(&session(20.0, &[id], level, seed)?, seed)?;
         if named(&diagnosis, level).first() != Some(&id) {
-            missed.push(format!("{id} (seed {seed}): {:?}", diagnosis.accepted));
+            missed.push(format!("{id} (seed {seed}): {diagnosis}"));
         }
     }
-    assert!(missed.len() <= 2, "{missed:?}");
+    assert!(missed.len() <= 2, "{}", missed.join("\n"));
     Ok(())
 }
 
@@ -92,21 +97,23 @@ fn nothing_is_named_where_nothing_is_hidden() -> Result<()> {
         let level = level(seed);
         let diagnosis = search(&session(15.0, &[], level, seed)?, seed)?;
         if !named(&diagnosis, level).is_empty() {
-            alarms.push(format!("seed {seed}: {:?}", diagnosis.accepted));
+            alarms.push(format!("seed {seed}: {diagnosis}"));
         }
     }
-    assert!(alarms.len() <= 1, "{alarms:?}");
+    assert!(alarms.len() <= 1, "{}", alarms.join("\n"));
     Ok(())
 }
 
 /// Each effect by itself would remove 30 % of a channel's error, ten times what is certain to be found; nothing is left to chance.
 #[test]
 fn of_two_hidden_effects_both_are_named_and_nothing_else() -> Result<()> {
-    for (pair, seed) in [(["quad_drag", "collective_torque"], 1130), (["dihedral_speedstab", "rate_cross"], 1132)] {
+    for (pair, seed) in [(["collective_torque", "quad_drag"], 1130), (["dihedral_speedstab", "rate_cross"], 1132)] {
         let diagnosis = search(&session(20.0, &pair, Level::ONE, seed)?, seed)?;
         let mut names = named(&diagnosis, Level::ONE);
         names.sort_unstable();
         assert_eq!(names, pair, "{diagnosis}");
+        let doubted = diagnosis.steps.iter().flat_map(|step| &step.indistinguishable);
+        assert_eq!(doubted.filter(|other| pair.contains(&other.as_str())).count(), 0, "{diagnosis}");
     }
     Ok(())
 }

@@ -191,7 +191,7 @@ fn the_pseudo_gain_of_nonlinear_controls_is_not_worth_a_name() -> Result<()> {
 /// Ground effect is strong enough to be named only where a session flies low much of the time.
 fn low() -> Result<&'static Vec<Flight>> {
     static FLIGHTS: Shared<Vec<Flight>> = OnceLock::new();
-    shared(&FLIGHTS, || session(20.0, &[("ground_effect", 3.0)], Level::ONE, 36))
+    shared(&FLIGHTS, || session(20.0, &[("ground_effect", 2.0)], Level::ONE, 36))
 }
 
 /// A radius and a coefficient that are both free trade off: a small rotor with a large gain fits as well as the true one.
@@ -204,7 +204,7 @@ fn ground_effect_takes_its_radius_from_geometry() -> Result<()> {
     assert!(radius.fixed && radius.value == ROTOR_RADIUS_M, "{radius:?}");
     let k = step.coefficients.iter().find(|number| number.name == "k").ok_or_else(|| missing("k"))?;
     println!("k = {k:?}");
-    assert!((0.0..=3.0).contains(&k.value), "{k:?}");
+    assert!(0.0 < k.value && k.value < 3.0, "{k:?}");
     Ok(())
 }
 
@@ -272,17 +272,12 @@ fn one_wild_block_does_not_make_an_effect() -> Result<()> {
 #[test]
 fn an_effect_that_one_manoeuvre_carries_is_not_excited() -> Result<()> {
     let flights = clean()?;
-    let fastest = |flight: usize| {
-        let end = flights[flight].len() / 3;
-        flights[flight].column(Column::Vx)[..end].iter().copied().fold(f64::NEG_INFINITY, f64::max)
-    };
-    let searched: Vec<usize> = Split::for_search(flights, SEED).training.iter().map(|span| span.flight).collect();
     let peak = |flight: usize| flights[flight].column(Column::Vx).iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let flight = searched.iter().copied().max_by(|&left, &right| fastest(left).total_cmp(&fastest(right)));
-    let flight = flight.ok_or_else(|| missing("flight"))?;
-    let others = searched.iter().filter(|&&other| other != flight).map(|&other| peak(other)).fold(0.0, f64::max);
-    let knee = others.max(0.5 * fastest(flight));
-    let outcome = in_one_flight(&format!("max(vx - {knee}, 0)"), flight, 5.0)?;
+    let mut searched: Vec<usize> = Split::for_search(flights, SEED).training.iter().map(|span| span.flight).collect();
+    searched.sort_by(|&left, &right| peak(right).total_cmp(&peak(left)));
+    // Two flights are faster than the third.
+    let (Some(&fastest), Some(&third)) = (searched.first(), searched.get(2)) else { return Err(missing("flights")) };
+    let outcome = in_one_flight(&format!("max(vx - {}, 0)", peak(third)), fastest, 5.0)?;
     let report = report(&outcome, "fluke")?;
     println!("{report:?}");
     assert_eq!(report.status, Status::NotExcited, "{}", outcome.diagnosis);
