@@ -205,6 +205,8 @@ fn ground_effect_takes_its_radius_from_geometry() -> Result<()> {
     let k = step.coefficients.iter().find(|number| number.name == "k").ok_or_else(|| missing("k"))?;
     println!("k = {k:?}");
     assert!(0.0 < k.value && k.value < 3.0, "{k:?}");
+    // Twice the theory is what was hidden.
+    assert!(k.ci95.is_some_and(|[low, high]| low <= 2.0 && 2.0 <= high), "{k:?}");
     Ok(())
 }
 
