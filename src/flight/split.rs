@@ -309,4 +309,32 @@ mod tests {
         assert_eq!(folds.len(), 10);
         assert_eq!(folds[3], ["m06", "m07"]);
     }
+
+    proptest! {
+        #[test]
+        fn a_search_keeps_a_fifth_of_whole_flights_from_itself(lengths in prop::collection::vec(1usize..50, 10..80), seed: u64) {
+            let logs = flights(&lengths);
+            let split = Split::for_search(&logs, seed);
+            let mut seen: Vec<usize> = split.training.iter().chain(&split.test).map(|span| span.flight).collect();
+            seen.sort_unstable();
+            prop_assert_eq!(seen, (0..logs.len()).collect::<Vec<_>>());
+            prop_assert!(split.training.iter().chain(&split.test).all(|span| span.start == 0 && span.end == lengths[span.flight]));
+            prop_assert!(split.validation.is_empty());
+            prop_assert!((split.test.len() * 5).abs_diff(logs.len()) < 5);
+            prop_assert_eq!(&split.test, &Split::for_search(&logs, seed).test);
+        }
+
+        #[test]
+        fn of_few_flights_a_search_keeps_the_end_of_each(lengths in prop::collection::vec(10usize..500, 1..10), seed: u64) {
+            let logs = flights(&lengths);
+            let split = Split::for_search(&logs, seed);
+            for (flight, length) in lengths.iter().enumerate() {
+                let of = |spans: &[Span]| spans.iter().copied().filter(|span| span.flight == flight).collect::<Vec<_>>();
+                let (search, kept) = (of(&split.training), of(&split.test));
+                prop_assert!(search.len() == 1 && kept.len() == 1);
+                prop_assert_eq!((search[0].start, search[0].end, kept[0].end), (0, kept[0].start, *length));
+                prop_assert!((samples(&kept) * 5).abs_diff(*length) <= 3);
+            }
+        }
+    }
 }

@@ -100,7 +100,9 @@ impl Search<'_> {
                     held_out_mse_fall: BTreeMap::new(),
                     p_value: None,
                     detection_limit_mse_fall: None,
-                    note: candidate.inapplicable.clone().or_else(|| Some("its regressors are those of the model".into())),
+                    note: candidate.inapplicable.clone().or_else(|| {
+                        Some("these flights do not tell its regressors from those of the model, or one part of them alone carries it".into())
+                    }),
                 },
             })
             .collect();

@@ -90,3 +90,50 @@ pub(super) fn enlarged(model: &Model, base: &[Regressor]) -> Result<Vec<Regresso
     }
     model.regressors(|_| true)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gram::tests::model;
+    use super::*;
+    use crate::physics::Effect;
+
+    #[test]
+    fn equal_formulas_are_one_column_and_one_coefficient_in_two_channels_is_one() -> Result<()> {
+        let mut model = model();
+        model.effects.push(Effect::formula("again", 0, "vx", 0.0)?);
+        let mut design = Design::default();
+        let layout = design.add(&model.regressors(|_| true)?);
+        assert_eq!(design.formulas.iter().filter(|formula| formula.to_string() == "vx").count(), 1);
+        // Two coefficients on one column: the model's own drag and the copy.
+        let columns: Vec<_> = layout.channels[0].free.iter().map(|entry| entry.1.clone()).collect();
+        assert_eq!(columns.len(), 2);
+        assert_eq!(columns[0], columns[1]);
+        let free: usize = model.effects.iter().map(|effect| effect.coefficients.len()).sum();
+        assert_eq!(layout.free.len(), free);
+        Ok(())
+    }
+
+    #[test]
+    fn adding_a_model_twice_adds_no_column() -> Result<()> {
+        let mut design = Design::default();
+        let first = design.add(&model().regressors(|_| true)?);
+        let formulas = design.formulas.len();
+        let second = design.add(&model().regressors(|_| true)?);
+        assert_eq!(design.formulas.len(), formulas);
+        assert_eq!(first.channels, second.channels);
+        assert_eq!(first.free, second.free);
+        Ok(())
+    }
+
+    #[test]
+    fn a_model_enlarged_piece_by_piece_has_the_columns_of_the_whole() -> Result<()> {
+        let base = model().regressors(|_| true)?;
+        let mut larger = model();
+        larger.effects.push(Effect::formula("more", 3, "u4 * wz", 0.0)?);
+        let mut design = Design::default();
+        let (pieces, whole) = (design.add(&enlarged(&larger, &base)?), design.add(&larger.regressors(|_| true)?));
+        assert_eq!(pieces.channels, whole.channels);
+        assert_eq!(pieces.free, whole.free);
+        Ok(())
+    }
+}

@@ -341,3 +341,114 @@ impl Component<'_> {
 
 /// Smallest diagonal element of the Cholesky factor of a correlation matrix.
 const SMALLEST_PIVOT: f64 = 1e-4;
+
+#[cfg(test)]
+mod tests {
+    use super::super::design::Design;
+    use super::super::engine::Engine;
+    use super::super::gram::tests::{model, near, noise, whole};
+    use super::super::gram::{blocks, grams};
+    use super::*;
+    use crate::error::Result;
+    use crate::flight::Column;
+    use crate::physics::{Effect, calibrate};
+    use proptest::prelude::*;
+
+    fn squared(flights: &[crate::flight::Flight], model: &crate::physics::Model, block: &Block) -> Result<[f64; 6]> {
+        let flight = &flights[block.flight];
+        let predicted = model.predict(flight)?;
+        Ok(std::array::from_fn(|channel| {
+            let measured = &flight.column(Column::TARGETS[channel])[block.start..block.end];
+            measured.iter().zip(&predicted[channel][block.start..block.end]).map(|(y, f)| (y - f).powi(2)).sum()
+        }))
+    }
+
+    /// With a shared coefficient over two channels, if wanted.
+    fn compare(seed: u64, lengths: &[usize], shared: bool) -> Result<bool> {
+        let flights = noise(seed, lengths);
+        let mut model = model();
+        if shared {
+            let mut effect = Effect::formula("shared", 0, "vy * wz", 0.0)?;
+            effect.terms.push(crate::physics::Term { channel: 1, ..effect.terms[0].clone() });
+            model.effects.push(effect);
+        }
+        let cut = blocks(&flights, &whole(&flights), 2.0);
+        let fold: Vec<usize> = (0..cut.len()).map(|block| block % 5).collect();
+        let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0 };
+        let found = engine.pass(&model, &[])?.base;
+        if !shared {
+            let (calibrated, _) = calibrate(&model, &flights, &whole(&flights))?;
+            let values = |model: &crate::physics::Model| -> Vec<f64> {
+                model.effects.iter().flat_map(|effect| &effect.coefficients).map(|coefficient| coefficient.value).collect()
+            };
+            if !near(&values(&found.model), &values(&calibrated)) {
+                return Ok(false);
+            }
+        }
+        // Each block of a fold under what the other folds say.
+        for held in 0..5 {
+            let mut design = Design::default();
+            let layout = design.add(&model.regressors(|_| true)?);
+            let all = grams(&flights, &engine.blocks, &design)?;
+            let mut fitted = model.clone();
+            for (channels, members) in components(&layout) {
+                let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &all)).collect();
+                let priors = vec![Prior::FREE; layout.free.len()];
+                let weights = if shared { engine.weights(&engine.pass(&model, &[])?.base) } else { [1.0; 6] };
+                let component = engine.component(&channels, &members, &reduced, &weights, &priors);
+                let weight = |block: usize| if engine.fold[block] == held { 0.0 } else { 1.0 };
+                let Some(solution) = component.solve(&weight) else { return Ok(false) };
+                for (&member, value) in members.iter().zip(&solution.values) {
+                    let free = layout.free[member];
+                    fitted.effects[free.effect].coefficients[free.coefficient].value = *value;
+                }
+                let Some(errors) = component.held_out(5, &|block| engine.fold[block]) else { return Ok(false) };
+                for (index, block) in engine.blocks.iter().enumerate().filter(|(index, _)| engine.fold[*index] == held) {
+                    let direct = squared(&flights, &fitted, block)?;
+                    if !errors.iter().all(|(channel, errors)| near(&[errors[index]], &[direct[*channel]])) {
+                        return Ok(false);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(8))]
+        #[test]
+        fn gram_fit_is_calibration_and_held_out_errors_are_those_of_predicting(seed: u64, lengths in prop::collection::vec(700usize..1500, 2..4), shared: bool) {
+            let agrees = compare(seed, &lengths, shared).map_err(|error| TestCaseError::fail(error.to_string()))?;
+            prop_assert!(agrees);
+        }
+
+        #[test]
+        fn bounds_hold_and_the_rest_is_fitted_to_them(
+            entries in prop::collection::vec(-1.0..1.0_f64, 40), side in prop::collection::vec(-3.0..3.0_f64, 4),
+            low in -0.5..0.0_f64, high in 0.0..0.5_f64,
+        ) {
+            let x = DMatrix::from_row_slice(10, 4, &entries);
+            let matrix = x.transpose() * &x + DMatrix::identity(4, 4) * 0.1;
+            let side = DVector::from_column_slice(&side);
+            let priors = vec![Prior::FREE, Prior { bounds: [low, high], by_flight: None }, Prior { bounds: [0.0, 9.0], by_flight: None }, Prior::FREE];
+            let component = Component { channels: Vec::new(), members: (0..4).collect(), priors, blocks: &[], correlation: 1.0 };
+            let Some((values, bound)) = component.bounded(&matrix, &side) else { return Err(TestCaseError::fail("singular")) };
+            for ((value, prior), bound) in values.iter().zip(&component.priors).zip(&bound) {
+                prop_assert!((prior.bounds[0]..=prior.bounds[1]).contains(value), "{values:?}");
+                prop_assert!(!bound || prior.bounds.contains(value), "{values:?}");
+            }
+            let gradient = &matrix * DVector::from_column_slice(&values) - &side;
+            let open: Vec<f64> = (0..4).filter(|&member| !bound[member]).map(|member| gradient[member]).collect();
+            prop_assert!(near(&open, &vec![0.0; open.len()]), "{open:?}");
+        }
+    }
+
+    #[test]
+    fn a_coefficient_that_no_row_moves_is_not_determined() {
+        let component =
+            Component { channels: Vec::new(), members: vec![0, 1], priors: vec![Prior::FREE; 2], blocks: &[], correlation: 1.0 };
+        let side = DVector::from_element(2, 1.0);
+        assert!(component.bounded(&DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.0]), &side).is_none());
+        assert!(component.bounded(&DMatrix::from_row_slice(2, 2, &[1.0, 1.0, 1.0, 1.0]), &side).is_none());
+    }
+}

@@ -110,3 +110,85 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
     }
     Ok(found)
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::flight::Targets;
+    use crate::physics::Model;
+    use phyture_kernels::Tolerance;
+    use phyture_kernels::random::Stream;
+    use proptest::prelude::*;
+
+    /// Flights of uniform random columns, targets included.
+    pub(in super::super) fn noise(seed: u64, lengths: &[usize]) -> Vec<Flight> {
+        let flight = |(index, &samples): (usize, &usize)| {
+            let columns = std::array::from_fn(|column| {
+                let stream = Stream::new(seed, index as u64, column as u64, 0);
+                (0..samples as u64).map(|sample| 2.0 * stream.uniform(sample) - 1.0).collect()
+            });
+            Flight::new(format!("f{index}"), "noise", 0.0, 0.01, columns, Targets::Recorded)
+        };
+        lengths.iter().enumerate().filter_map(|entry| flight(entry).ok()).collect()
+    }
+
+    pub(in super::super) fn whole(flights: &[Flight]) -> Vec<Span> {
+        flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() }).collect()
+    }
+
+    pub(in super::super) fn model() -> Model {
+        Model::paper("noise", 4.58, [0.18, 0.34, 0.28], 0.8)
+    }
+
+    /// Equal but for the order of summation, relative to the largest.
+    pub(in super::super) fn near(found: &[f64], expected: &[f64]) -> bool {
+        let scale = expected.iter().fold(1.0_f64, |scale, value| scale.max(value.abs()));
+        let pairs = found.iter().zip(expected);
+        found.len() == expected.len() && pairs.into_iter().all(|(a, b)| (a - b).abs() <= Tolerance::Close.relative_f64() * scale)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn blocks_cover_each_sample_once(lengths in prop::collection::vec(1usize..4000, 1..6), block_s in 0.5..12.0) {
+            let flights = noise(1, &lengths);
+            let cut = blocks(&flights, &whole(&flights), block_s);
+            let mut next = vec![0; flights.len()];
+            for block in &cut {
+                prop_assert_eq!(block.start, next[block.flight]);
+                prop_assert!(block.end > block.start);
+                next[block.flight] = block.end;
+            }
+            prop_assert_eq!(next, lengths);
+        }
+
+        #[test]
+        fn grams_of_blocks_add_up_to_that_of_the_whole(seed: u64, samples in 300usize..3000, block_s in 0.7..8.0) {
+            let flights = noise(seed, &[samples]);
+            let mut design = Design::default();
+            let failed = |error: Error| TestCaseError::fail(error.to_string());
+            design.add(&model().regressors(|_| true).map_err(failed)?);
+            let one = grams(&flights, &[Block { flight: 0, start: 0, end: samples }], &design).map_err(failed)?;
+            let parts = grams(&flights, &blocks(&flights, &whole(&flights), block_s), &design).map_err(failed)?;
+            prop_assert_eq!(parts.iter().map(|part| part.rows).sum::<usize>(), one[0].rows);
+            for channel in 0..6 {
+                let mut total = Array2::<f64>::zeros(one[0].channels[channel].dim());
+                parts.iter().for_each(|part| total += &part.channels[channel]);
+                let expected: Vec<f64> = one[0].channels[channel].iter().copied().collect();
+                prop_assert!(near(&total.iter().copied().collect::<Vec<_>>(), &expected));
+            }
+        }
+    }
+
+    #[test]
+    fn a_formula_that_is_no_number_somewhere_is_named() -> Result<()> {
+        let flights = noise(2, &[600]);
+        let mut design = Design::default();
+        let mut model = model();
+        model.effects.push(crate::physics::Effect::formula("root", 0, "sqrt(vx)", 0.0)?);
+        design.add(&model.regressors(|_| true)?);
+        let message = grams(&flights, &blocks(&flights, &whole(&flights), 3.0), &design).map_err(|error| error.to_string());
+        assert!(matches!(message, Err(text) if text.contains("sqrt(vx)") && text.contains("`f0`")));
+        Ok(())
+    }
+}

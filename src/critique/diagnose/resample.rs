@@ -59,3 +59,66 @@ pub(super) fn intervals(engine: &Engine<'_>, model: &Model, seed: u64) -> Result
     }
     Ok(found)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gram::tests::{model, noise, whole};
+    use super::super::gram::{Block, blocks};
+    use super::*;
+    use crate::flight::Column;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn draws_are_of_the_blocks_and_repeat(count in 1usize..300, seed: u64, world in 0usize..500) {
+            let drawn = draw(count, seed, world);
+            prop_assert_eq!(drawn.len(), count);
+            prop_assert!(drawn.iter().all(|block| *block < count));
+            prop_assert_eq!(drawn, draw(count, seed, world));
+        }
+
+        #[test]
+        fn a_quantile_is_one_of_the_numbers_and_grows(mut values in prop::collection::vec(-1e6..1e6_f64, 1..200), a in 0.0..1.0_f64, b in 0.0..1.0_f64) {
+            values.sort_by(f64::total_cmp);
+            let (low, high) = (quantile(&values, a.min(b)), quantile(&values, a.max(b)));
+            prop_assert!(low <= high && values.contains(&low) && values.contains(&high));
+            prop_assert_eq!(quantile(&values, 0.0), values[0]);
+            prop_assert_eq!(quantile(&values, 1.0), values[values.len() - 1]);
+        }
+    }
+
+    #[test]
+    fn worlds_differ_and_the_quantile_of_nothing_is_no_number() {
+        assert_ne!(draw(60, 1, 0), draw(60, 1, 1));
+        assert_ne!(draw(60, 1, 0), draw(60, 2, 0));
+        assert!(quantile(&[], 0.5).is_nan());
+    }
+
+    /// Regressor and error that last for two seconds each: an interval that took rows for observations would be narrower by the root of
+    /// the number of rows that say the same.
+    #[test]
+    fn intervals_from_blocks_are_wider_than_from_rows_where_errors_last() -> Result<()> {
+        let mut flights = noise(3, &[24_000]);
+        let hold = |values: &[f64]| -> Vec<f64> { (0..values.len()).map(|sample| values[sample / 200 * 200]).collect() };
+        let columns = Column::ALL.map(|column| match column {
+            Column::Vx | Column::VxDot => hold(flights[0].column(column)),
+            _ => flights[0].column(column).to_vec(),
+        });
+        flights = vec![crate::flight::Flight::new("held", "noise", 0.0, 0.01, columns, crate::flight::Targets::Recorded)?];
+        let width = |block_s: f64| -> Result<f64> {
+            let cut: Vec<Block> = blocks(&flights, &whole(&flights), block_s);
+            let fold = (0..cut.len()).map(|block| block % 10).collect();
+            let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0 };
+            let found = intervals(&engine, &model(), 1)?;
+            Ok(found.get(&(index(), 0)).map_or(f64::NAN, |[low, high]| high - low))
+        };
+        let (by_block, by_row) = (width(10.0)?, width(0.1)?);
+        assert!(by_block > 2.0 * by_row, "{by_block} from blocks, {by_row} from rows");
+        Ok(())
+    }
+
+    /// Where the drag stands in the model.
+    fn index() -> usize {
+        model().effects.iter().position(|effect| effect.name == "linear_drag").unwrap_or(usize::MAX)
+    }
+}

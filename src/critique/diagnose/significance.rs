@@ -229,3 +229,87 @@ impl Flips {
         (reached + 1) as f64 / (FLIPS + 1) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    /// Scores of pure noise: symmetric, and louder in some blocks than in others.
+    fn noise(seed: u64, blocks: usize, columns: usize) -> Raw {
+        let stream = Stream::new(seed, 1, 2, 3);
+        let score = |block: usize, column: usize| {
+            let loud = 1.0 + 9.0 * stream.uniform(block as u64).powi(4);
+            loud * (2.0 * stream.uniform((1000 + block * columns + column) as u64) - 1.0)
+        };
+        Raw {
+            scores: DMatrix::from_fn(blocks, columns, score),
+            energy: DMatrix::from_element(blocks, columns, 1.0),
+            one_sided: false,
+        }
+    }
+
+    /// Of 200 p-values of pure noise 10 are expected below 0.05; fewer than 2 or more than 21 come with a probability of 0.1 % together
+    /// (binomial).
+    #[test]
+    fn p_values_of_pure_noise_are_below_five_percent_one_time_in_twenty() {
+        let flips = Flips::new(60, 1);
+        for columns in [1, 3] {
+            let p = |seed: u64| noise(seed, 60, columns).whitened().map_or(f64::NAN, |scores| flips.p_value(&[scores]));
+            let values: Vec<f64> = (0..200).map(p).collect();
+            assert!(values.iter().all(|p| (0.0..=1.0).contains(p)));
+            let below = values.iter().filter(|p| **p < 0.05).count();
+            assert!((2..=21).contains(&below), "{columns} columns: {below} of 200");
+            // And half of them below one half: 72 to 128 with a probability of 99.99 %.
+            let below = values.iter().filter(|p| **p < 0.5).count();
+            assert!((72..=128).contains(&below), "{columns} columns: {below} of 200");
+        }
+    }
+
+    #[test]
+    fn p_values_of_sums_of_pure_noise_are_uniform_too() {
+        let flips = Flips::new(60, 1);
+        let p = |seed: u64| flips.p_value_of_sums(&[noise(seed, 60, 1).scores.column(0).iter().copied().collect()]);
+        let below = (300..500).map(p).filter(|p| *p < 0.05).count();
+        assert!((2..=21).contains(&below), "{below} of 200");
+    }
+
+    #[test]
+    fn what_is_in_every_block_is_significant_and_what_is_in_one_is_not() {
+        let flips = Flips::new(60, 1);
+        let p = |shift: &dyn Fn(usize) -> f64| {
+            let mut raw = noise(7, 60, 1);
+            (0..60).for_each(|block| raw.scores[(block, 0)] += shift(block));
+            raw.whitened().map_or(f64::NAN, |scores| flips.p_value(&[scores]))
+        };
+        assert!(p(&|_| 3.0) < 0.001);
+        assert!(p(&|block| if block == 5 { 1e4 } else { 0.0 }) > 0.3);
+    }
+
+    #[test]
+    fn a_swap_has_to_gain() {
+        let flips = Flips::new(60, 1);
+        let p = |shift: f64| {
+            let mut raw = Raw { one_sided: true, ..noise(7, 60, 1) };
+            (0..60).for_each(|block| raw.scores[(block, 0)] += shift);
+            raw.whitened().map_or(f64::NAN, |scores| flips.p_value(&[scores]))
+        };
+        assert!(p(3.0) < 0.001 && p(-3.0) > 0.999);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn studentised_scores_do_not_depend_on_units(seed: u64, factors in prop::collection::vec(1e-3..1e3_f64, 3)) {
+            let raw = noise(seed, 40, 3);
+            let scores = DMatrix::from_fn(40, 3, |block, column| raw.scores[(block, column)] * factors[column]);
+            let other = Raw { scores, ..noise(seed, 40, 3) };
+            let (Some(one), Some(other)) = (raw.whitened(), other.whitened()) else { return Err(TestCaseError::fail("singular")) };
+            prop_assert!((one.blocks.clone() - other.blocks).amax() < Tolerance::Close.relative_f64());
+            // And their squares add up to one in each column, with nothing between columns.
+            let square = one.blocks.transpose() * &one.blocks;
+            prop_assert!((square - DMatrix::identity(3, 3)).amax() < Tolerance::Close.relative_f64());
+        }
+    }
+}

@@ -121,6 +121,10 @@ pub fn diagnose(
     let after = models.last().cloned().unwrap_or(before);
 
     diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
+    // Two that were accepted beside each other have been told apart.
+    for found in &mut found {
+        found.step.indistinguishable.retain(|other| !diagnosis.accepted.contains(other));
+    }
     diagnosis.steps = found.into_iter().map(|found| found.step).collect();
     diagnosis.candidates = left;
     diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
