@@ -130,7 +130,7 @@ pub(super) fn summary(diagnosis: &Diagnosis) -> String {
     match diagnosis.verdict {
         Verdict::EffectsMissing => {
             let names: Vec<String> = diagnosis.steps.iter().map(falls).collect();
-            format!("The model lacks {}.", names.join(", then "))
+            format!("The model lacks {}.{}", names.join(", then "), confirmation(diagnosis))
         }
         Verdict::NotInCatalogue => {
             let parts: Vec<String> = diagnosis
@@ -149,4 +149,24 @@ pub(super) fn summary(diagnosis: &Diagnosis) -> String {
         }
         _ => String::new(),
     }
+}
+
+/// What the flights that no search has seen say of the accepted effects, all together.
+fn confirmation(diagnosis: &Diagnosis) -> String {
+    let Some(locked) = &diagnosis.locked else { return String::new() };
+    let of_steps = |channel: &&String| diagnosis.steps.iter().any(|step| step.channels.contains(channel));
+    let channels: Vec<&String> = locked.mse_fall.keys().filter(of_steps).collect();
+    let (sure, unsure): (Vec<&String>, Vec<&String>) =
+        channels.into_iter().partition(|channel| locked.mse_fall.get(*channel).is_some_and(|[_, low, _]| *low > 0.0));
+    let falls = |channel: &&String| locked.mse_fall.get(*channel).map_or(0.0, |fall| 100.0 * fall[0]);
+    let mut text = String::new();
+    if !sure.is_empty() {
+        let parts: Vec<String> = sure.iter().map(|channel| format!("{channel} by {:.0} %", falls(channel))).collect();
+        text += &format!(" On flights that no search has seen the error falls: {}.", parts.join(", "));
+    }
+    if !unsure.is_empty() {
+        let parts: Vec<String> = unsure.iter().map(|channel| format!("{channel} ({:+.0} %)", -falls(channel))).collect();
+        text += &format!(" Those flights do not confirm a fall in {}.", parts.join(", "));
+    }
+    text
 }
