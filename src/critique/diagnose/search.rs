@@ -43,7 +43,13 @@ impl Found {
 
     /// Whether a candidate removes so little beside what this effect did, in every channel in which it is worth while, that it may
     /// only mend the form of this one.
+    ///
+    /// The form of a property of each flight is not in doubt.
     pub(super) fn is_flawed_by(&self, other: &Scored<'_>, mse: &[f64; 6]) -> bool {
+        let own = self.model.effect(&self.step.effect);
+        if own.is_some_and(|effect| effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some())) {
+            return false;
+        }
         let notes = other.candidate.definition.and_then(|definition| definition.notes);
         let related = self.confusable.contains(&other.candidate.id.as_str())
             || notes.is_some_and(|notes| notes.confusable_with.contains(&self.step.effect.as_str()));
@@ -61,11 +67,11 @@ pub(super) struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The fitted model; with half a step of control delay, if it states none and half a step is better than none and than a whole
-    /// one and more: then the controls are held between samples, which is how the log was made and no effect. A longer delay is one.
+    /// The fitted model; with half a step of control delay, if it states none and half a step is better than none and than a little
+    /// less or more: then the controls are held between samples, which is how the log was made and no effect. Another delay is one.
     pub(super) fn timing(&self, base: &Model) -> Result<(Model, Option<f64>)> {
         let step_s = self.engine.flights.first().map_or(0.01, |flight| flight.step_s);
-        let delays: Vec<f64> = [0.5, 1.0, 1.5, 2.0].iter().map(|steps| steps * step_s).collect();
+        let delays: Vec<f64> = [0.5, 0.35, 0.65, 1.0, 1.5, 2.0].iter().map(|steps| steps * step_s).collect();
         let delayed = |delay_s: &f64| {
             let mut model = base.clone();
             model.data.control_delay_s = *delay_s;
