@@ -34,8 +34,14 @@ impl Scored<'_> {
         self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Whether no channel is predicted worse by as much as would count as better.
+    fn harms_nothing(&self) -> bool {
+        self.falls.values().all(|fall| *fall > -SMALLEST_FALL)
+    }
+
     pub(super) fn passes(&self, largest_p: f64) -> bool {
-        self.rival.is_none()
+        self.harms_nothing()
+            && self.rival.is_none()
             && self.excited
             && self.plausible
             && self.gain > 0.0
@@ -47,7 +53,7 @@ impl Scored<'_> {
         match () {
             () if !self.excited => Status::NotExcited,
             () if self.p_value > largest_p || self.gain <= 0.0 => Status::NotSignificant,
-            () if !self.plausible => Status::Implausible,
+            () if !self.plausible || !self.harms_nothing() => Status::Implausible,
             () if self.rival.is_some() && self.largest_fall() >= SMALLEST_FALL => Status::SamePhysics,
             () => Status::Negligible,
         }
