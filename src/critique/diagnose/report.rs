@@ -218,6 +218,16 @@ pub struct DependsOn {
     pub share: f64,
 }
 
+impl Diagnosis {
+    /// Whether the flights that no search has seen show a fall of the error, beyond its 95 % interval, in a channel in which an accepted
+    /// effect is worth while. Without such flights nothing is confirmed.
+    pub fn is_confirmed(&self) -> bool {
+        let Some(locked) = &self.locked else { return false };
+        let mut channels = self.steps.iter().flat_map(|step| &step.channels);
+        channels.any(|channel| locked.mse_fall.get(channel).is_some_and(|[_, low, _]| *low > 0.0))
+    }
+}
+
 impl Verdict {
     /// In words.
     pub const fn words(self) -> &'static str {

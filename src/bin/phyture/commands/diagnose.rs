@@ -238,10 +238,15 @@ pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -
     for round in 1..=MOST_ROUNDS {
         let outcome = task.diagnose(&model)?;
         context.say(format!("\nRound {round}\n{}", outcome.diagnosis));
-        let found = !outcome.diagnosis.accepted.is_empty();
-        append(ledger, round, &outcome.diagnosis)?;
+        let (found, confirmed) = (!outcome.diagnosis.accepted.is_empty(), outcome.diagnosis.is_confirmed());
+        if found && !confirmed {
+            context.say("\nNothing is added: flights that no search has seen do not confirm it.");
+        }
+        if confirmed {
+            append(ledger, round, &outcome.diagnosis)?;
+        }
         rounds.push(outcome.diagnosis);
-        if !found {
+        if !confirmed {
             break;
         }
         let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
@@ -301,7 +306,7 @@ pub fn run_loop(
     model.write(output)?;
     context.say(format!("\nmodel written to {}, ledger {}", output.display(), ledger.display()));
     if let (Some(paper), Some(before)) = (paper, before) {
-        let after = if rounds.iter().all(|round| round.accepted.is_empty()) { &before } else { &model };
+        let after = if rounds.iter().any(Diagnosis::is_confirmed) { &model } else { &before };
         paper.write(context, &rounds, &set.flights, &split, [&before, after])?;
     }
     context.json(&LoopOutput { rounds, model: output.into() })?;
