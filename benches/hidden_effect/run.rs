@@ -267,6 +267,17 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
             }
         }
     }
+    // Effects in time once more, on seeds of their own: their grids were extended to shorter times after the first run.
+    if parts.contains(&"dynamic") {
+        for seed in first + 10..first + 13 {
+            for single in SINGLES.iter().filter(|single| single.dynamic) {
+                for (size, share) in SIZES {
+                    let hidden = Hidden { mechanisms: vec![(single.id, scale(single, share))], alien: None };
+                    bench.case("dynamic", size, &hidden, level(seed), seed, Some(single))?;
+                }
+            }
+        }
+    }
     if asked("aliens") {
         for (index, (channel, formula, _)) in ALIENS.iter().enumerate() {
             let seed = first + 200 + index as u64;

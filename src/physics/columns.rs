@@ -1,12 +1,11 @@
 //! A model's regressors as formulas with every number in place, and their values on a flight. For whoever wants the columns of many
 //! models at once: equal formulas are equal columns. No fitting here.
 
-use super::evaluate::Program;
+use super::evaluate::{Program, Visit};
 use super::model::Model;
 use crate::error::Result;
 use crate::flight::{Column, Flight, derived::Derived};
 use crate::formula::Formula;
-use std::ops::Range;
 
 /// One summand of a predicted acceleration as it is evaluated: swaps and control delay applied, parameters and constants as numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,11 +58,6 @@ pub fn missing_input<'a>(formula: &'a Formula, flight: &Flight) -> Option<&'a st
 ///
 /// # Errors
 /// [`crate::Error::Formula`] at a name the flight does not carry; those of `visit`.
-pub fn evaluate_blocks(
-    formulas: &[Formula],
-    flight: &Flight,
-    end: usize,
-    visit: &mut dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()>,
-) -> Result<()> {
+pub fn evaluate_blocks(formulas: &[Formula], flight: &Flight, end: usize, visit: &mut Visit<'_>) -> Result<()> {
     Program::of_formulas(formulas, flight)?.run(flight, end, visit)
 }

@@ -57,7 +57,7 @@ fn state_columns(flight: &Flight, range: Range<usize>) -> [&[f64]; 16] {
 }
 
 /// What is done with a block: its range of samples, and one column a term.
-pub(super) type Visit<'a> = dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()> + 'a;
+pub type Visit<'a> = dyn FnMut(Range<usize>, &[Vec<f64>]) -> Result<()> + 'a;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Source {

@@ -28,6 +28,6 @@ pub use definition::{
     parameter,
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
-pub use evaluate::{StreamingModel, evaluate, quantity, quantity_at, standard_names};
+pub use evaluate::{StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};

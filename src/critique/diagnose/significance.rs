@@ -58,24 +58,19 @@ pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weigh
     let split = members.partition_point(|&member| member < known);
     let (size, new) = (members.len(), members.len() - split);
     let place = |free: usize| members.binary_search(&free).unwrap_or_default();
-    let each = |block: usize, visit: &mut dyn FnMut(f64, &[usize], &DMatrix<f64>)| {
-        for (&channel, reduced) in channels.iter().zip(&reduced) {
-            let places: Vec<usize> = reduced.free.iter().map(|&free| place(free)).collect();
-            visit(weights[channel][block], &places, &reduced.blocks[block]);
-        }
-    };
     // One square a block: `[X | y]ᵀ W [X | y]` over the channels.
     let blocks: Vec<DMatrix<f64>> = (0..grams.len())
         .map(|block| {
             let mut square = DMatrix::zeros(size + 1, size + 1);
-            each(block, &mut |weight, places, gram| {
+            for (&channel, reduced) in channels.iter().zip(&reduced) {
+                let places: Vec<usize> = reduced.free.iter().map(|&free| place(free)).collect();
                 let to = |index: usize| places.get(index).copied().unwrap_or(size);
                 for column in 0..=places.len() {
                     for row in 0..=places.len() {
-                        square[(to(row), to(column))] += weight * gram[(row, column)];
+                        square[(to(row), to(column))] += weights[channel][block] * reduced.blocks[block][(row, column)];
                     }
                 }
-            });
+            }
             square
         })
         .collect();

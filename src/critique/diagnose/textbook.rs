@@ -131,7 +131,7 @@ impl<'a> Problem<'a> {
     fn solve(&self, chosen: &[usize]) -> Option<(DVector<f64>, f64)> {
         let last = self.last();
         let scale: Vec<f64> = chosen.iter().map(|&column| self.learn[(column, column)].sqrt()).collect();
-        if scale.iter().any(|scale| !(*scale > 0.0)) {
+        if !scale.iter().all(|scale| *scale > 0.0) {
             return None;
         }
         let matrix = DMatrix::from_fn(chosen.len(), chosen.len(), |i, j| {
@@ -195,11 +195,11 @@ impl<'a> Problem<'a> {
                 let fewer: Vec<usize> = chosen.iter().copied().filter(|&other| other != column).collect();
                 self.solve(&fewer).map(|solved| (column, solved.1))
             });
-            if let Some((column, more)) = leave.min_by(|left, right| left.1.total_cmp(&right.1)) {
-                if (more - error) / (error / freedom) < LARGEST_F {
-                    chosen.retain(|&other| other != column);
-                    error = more;
-                }
+            if let Some((column, more)) = leave.min_by(|left, right| left.1.total_cmp(&right.1))
+                && (more - error) / (error / freedom) < LARGEST_F
+            {
+                chosen.retain(|&other| other != column);
+                error = more;
             }
         }
         self.named(&chosen)

@@ -13,7 +13,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[],
         parameters: &[parameter("delay_s", "s", "delay of all four controls")
             .starting(0.02)
-            .tried(&[0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1])
+            .tried(&[0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1])
             .within(0.0, 0.15)],
         terms: &[],
         swaps: &[
@@ -38,11 +38,11 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         parameters: &[
             parameter("tau_x_s", "s", "flapping time constant in roll")
                 .starting(0.05)
-                .tried(&[0.01, 0.03, 0.05, 0.085, 0.15])
+                .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
                 .within(0.0, 0.4),
             parameter("tau_y_s", "s", "flapping time constant in pitch")
                 .starting(0.05)
-                .tried(&[0.01, 0.03, 0.05, 0.085, 0.15])
+                .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
                 .within(0.0, 0.4)
                 .tied("tau_x_s"),
             parameter("share", "1", "share of the roll and pitch damping that comes through the disc")
@@ -72,7 +72,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[],
         parameters: &[parameter("tau_s", "s", "time constant")
             .starting(0.06)
-            .tried(&[0.01, 0.025, 0.06, 0.1, 0.15])
+            .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
             .within(0.0, 0.5)],
         terms: &[],
         swaps: &[SwapDefinition { name: "u3", with: "lag(u3, tau_s)", within: &[] }],
@@ -91,7 +91,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[],
         parameters: &[parameter("tau_s", "s", "time constant")
             .starting(0.06)
-            .tried(&[0.01, 0.025, 0.06, 0.1, 0.15])
+            .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
             .within(0.0, 0.5)],
         terms: &[],
         swaps: &[SwapDefinition { name: "u4", with: "lag(u4, tau_s)", within: &[] }],

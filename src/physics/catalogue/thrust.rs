@@ -174,7 +174,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .starting(0.06)
                 .tried(&[0.03, 0.06, 0.12, 0.25])
                 .within(0.005, 0.6),
-            parameter("overshoot", "1", "excess at once over the steady change").starting(0.4).tried(&[0.4, 1.0]).within(0.0, 2.0),
+            parameter("overshoot", "1", "excess at once over the steady change")
+                .starting(0.4)
+                .tried(&[0.15, 0.4, 1.0])
+                .within(0.0, 2.0),
         ],
         terms: &[],
         swaps: &[

@@ -32,6 +32,9 @@ const UNEVEN: f64 = 1.25;
 /// Share of a residual below which a variable is not shown, unless an added effect reads it.
 const SHARE_SHOWN: f64 = 0.01;
 
+/// A curve through bins: its name, the variable, the residual.
+type Curve = (String, Vec<f64>, Vec<f64>);
+
 /// One model on all flights.
 struct Side {
     name: &'static str,
@@ -263,7 +266,7 @@ impl Seen<'_> {
         windows: &[Window],
         before: &[(Variable, [Dependence; 6])],
         shown: &[usize],
-    ) -> Result<Vec<Option<(String, Vec<f64>, Vec<f64>)>>> {
+    ) -> Result<Vec<Option<Curve>>> {
         let mut curves = vec![None; shown.len()];
         for (index, effect) in self.added(channel) {
             let wanted: Vec<(usize, Variable)> = shown
