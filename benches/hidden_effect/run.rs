@@ -244,7 +244,7 @@ fn single(id: &str) -> Option<&'static Single> {
     SINGLES.iter().find(|single| single.id == id)
 }
 
-fn wanted<'a>(id: &'a str, share: f64) -> (&'a str, f64) {
+fn wanted(id: &str, share: f64) -> (&str, f64) {
     (id, single(id).map_or(1.0, |single| scale(single, share)))
 }
 
@@ -253,7 +253,7 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     let done = read(out)?.iter().map(Line::key).collect();
     let mut bench = Bench { out, done, floors: BTreeMap::new(), calm: false, minutes: 30.0 };
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
-    let level = |seed: u64| if seed % 2 == 0 { 1 } else { 2 };
+    let level = |seed: u64| if seed.is_multiple_of(2) { 1 } else { 2 };
     if asked("nulls") {
         for seed in first + 1000..first + 1000 + NULLS {
             bench.case("null", "", &Hidden { mechanisms: Vec::new(), alien: None }, level(seed), seed, None)?;
