@@ -155,6 +155,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 "tail_rotor_inflow",
                 "transl_lift",
                 "rotor_droop",
+                "vortex_ring",
             ],
             would_tell_apart: "slow ramps of each stick from end to end",
             source: "crank geometry of servo linkages; a transmitter's exponential curve",
