@@ -306,7 +306,7 @@ fn winds(seed: u64, minutes: f64) -> Result<Vec<(String, [f64; 2])>> {
     let one = |flight: &Flight| -> Result<(String, [f64; 2])> {
         let predicted = model.predict(flight)?;
         let mut sum = [0.0; 3];
-        for sample in 0..flight.len() {
+        for (sample, _) in flight.column(Column::Vx).iter().enumerate() {
             let at = |column: Column| flight.column(column)[sample];
             let air: [f64; 3] = std::array::from_fn(|axis| {
                 let target = [Column::VxDot, Column::VyDot, Column::VzDot][axis];
