@@ -137,7 +137,7 @@ pub struct Comparison {
     pub target: Targets,
     /// Where the windows come from.
     pub split: Part,
-    /// Who explains what, one entry a trained network; added by whoever has the network (see [`super::shares`]).
+    /// Who explains what, one entry a trained network; added by whoever has the network (see [`mod@super::shares`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<Shares>,
     /// What the uncertainty of the physical coefficients does, one entry a trained network, if it was asked for.

@@ -2,7 +2,7 @@
 //! whether sticks follow it.
 //!
 //! Descriptions with intervals from blocks; no figures are drawn and no effect is named here. All read a
-//! [`ResidualTable`](super::unknown::ResidualTable).
+//! [`ResidualTable`].
 
 pub mod regions;
 pub mod surface;
