@@ -57,8 +57,8 @@ pub struct Division {
 /// The commands.
 #[derive(Subcommand)]
 pub enum Command {
-    /// The whole story on built-in data: simulate, check, calibrate, train, compare on flights that nothing saw
-    #[command(after_help = "Example:\n  phyture demo --out demo\n  phyture demo --quick        # a minute, a smaller network")]
+    /// The whole story on built-in data: hidden effects found, added, the rest learned, judged on flights that nothing saw
+    #[command(after_help = "Example:\n  phyture demo --out demo\n  phyture demo --quick        # two minutes, a smaller network")]
     Demo {
         /// Folder for data, models and the report
         #[arg(long, default_value = "phyture-demo")]
