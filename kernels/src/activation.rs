@@ -106,17 +106,16 @@ fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
 /// y = f(x), both `[n, C]`.
 pub fn forward<T: Real>(level: Level, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
-    level.run(Forward { kind, x, y });
+    T::activation_forward(level, Forward { kind, x, y });
 }
 
-struct Forward<'a, T> {
+pub(crate) struct Forward<'a, T> {
     kind: Activation,
     x: Rows<'a, T>,
     y: RowsMut<'a, T>,
 }
 
 impl<T: Real> Kernel for Forward<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.x.rows() {
@@ -131,10 +130,10 @@ impl<T: Real> Kernel for Forward<'_, T> {
 pub fn backward<T: Real>(level: Level, kind: Activation, saved: Rows<'_, T>, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
     same_shape(&saved, &dy);
     same_shape(&dy, &dx.view());
-    level.run(Backward { kind, saved, dy, dx, write });
+    T::activation_backward(level, Backward { kind, saved, dy, dx, write });
 }
 
-struct Backward<'a, T> {
+pub(crate) struct Backward<'a, T> {
     kind: Activation,
     saved: Rows<'a, T>,
     dy: Rows<'a, T>,
@@ -143,7 +142,6 @@ struct Backward<'a, T> {
 }
 
 impl<T: Real> Kernel for Backward<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.dy.rows() {

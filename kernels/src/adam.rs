@@ -42,23 +42,26 @@ pub fn step<T: Real>(
     // powi takes i32; powf keeps every step number.
     let correction1 = 1.0 - adam.beta1.powf(step as f64);
     let correction2 = 1.0 - adam.beta2.powf(step as f64);
-    level.run(Step {
-        scale: T::of(scale),
-        beta1: T::of(adam.beta1),
-        beta2: T::of(adam.beta2),
-        rest1: T::of(1.0 - adam.beta1),
-        rest2: T::of(1.0 - adam.beta2),
-        rate: T::of(adam.learning_rate / correction1),
-        root: T::of(1.0 / correction2.sqrt()),
-        epsilon: T::of(adam.epsilon),
-        gradient,
-        parameters,
-        first,
-        second,
-    });
+    T::adam_step(
+        level,
+        Step {
+            scale: T::of(scale),
+            beta1: T::of(adam.beta1),
+            beta2: T::of(adam.beta2),
+            rest1: T::of(1.0 - adam.beta1),
+            rest2: T::of(1.0 - adam.beta2),
+            rate: T::of(adam.learning_rate / correction1),
+            root: T::of(1.0 / correction2.sqrt()),
+            epsilon: T::of(adam.epsilon),
+            gradient,
+            parameters,
+            first,
+            second,
+        },
+    );
 }
 
-struct Step<'a, T> {
+pub(crate) struct Step<'a, T> {
     scale: T,
     beta1: T,
     beta2: T,
@@ -74,7 +77,6 @@ struct Step<'a, T> {
 }
 
 impl<T: Real> Kernel for Step<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(self) {
         for (((theta, g), m), v) in self.parameters.iter_mut().zip(self.gradient).zip(self.first).zip(self.second) {

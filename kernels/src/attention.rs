@@ -17,7 +17,7 @@
 
 use crate::dropout::{Mask, MaskLanes};
 use crate::elementary::exp;
-use crate::level::{Isa, Kernel, Level, Tiled};
+use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -137,10 +137,10 @@ pub fn forward<T: Real>(
     scratch: &mut [T],
 ) {
     let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp.len());
-    level.run(Forward { shape, q, k, v, dropout, o, log_sum_exp, scratch });
+    T::attention_forward(level, Forward { shape, q, k, v, dropout, o, log_sum_exp, scratch });
 }
 
-struct Forward<'a, T> {
+pub(crate) struct Forward<'a, T> {
     shape: Shape,
     q: Rows<'a, T>,
     k: Rows<'a, T>,
@@ -149,14 +149,6 @@ struct Forward<'a, T> {
     o: RowsMut<'a, T>,
     log_sum_exp: &'a mut [T],
     scratch: &'a mut [T],
-}
-
-impl<T: Real> Kernel for Forward<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
@@ -289,10 +281,10 @@ pub fn backward<T: Real>(
     crate::rows::same_shape(&q, &gradients.dq.view());
     crate::rows::same_shape(&k, &gradients.dk.view());
     crate::rows::same_shape(&v, &gradients.dv.view());
-    level.run(Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
+    T::attention_backward(level, Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
 }
 
-struct Backward<'a, T> {
+pub(crate) struct Backward<'a, T> {
     shape: Shape,
     q: Rows<'a, T>,
     k: Rows<'a, T>,
@@ -303,14 +295,6 @@ struct Backward<'a, T> {
     d_o: Rows<'a, T>,
     gradients: Gradients<'a, T>,
     scratch: &'a mut [T],
-}
-
-impl<T: Real> Kernel for Backward<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for Backward<'_, T> {

@@ -100,10 +100,10 @@ pub fn forward<T: Real>(
     assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
     assert_eq!(weight.len(), geometry.taps * x.cols() * y.cols(), "conv1d: length of the weight");
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
-    level.run(Forward { geometry, x, weight, bias, epilogue, y, scratch });
+    T::conv1d_forward(level, Forward { geometry, x, weight, bias, epilogue, y, scratch });
 }
 
-struct Forward<'a, T> {
+pub(crate) struct Forward<'a, T> {
     geometry: Geometry,
     x: Rows<'a, T>,
     weight: &'a [T],
@@ -111,14 +111,6 @@ struct Forward<'a, T> {
     epilogue: Epilogue,
     y: RowsMut<'a, T>,
     scratch: &'a mut [T],
-}
-
-impl<T: Real> Kernel for Forward<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
@@ -223,10 +215,10 @@ pub fn backward_epilogue<T: Real>(level: Level, epilogue: Epilogue, y: Rows<'_, 
     rows::same_shape(&y, &dy);
     rows::same_shape(&y, &dz.view());
     assert!(epilogue.activation != Activation::Gelu, "conv1d: the derivative of gelu cannot be told from its output");
-    level.run(BackwardEpilogue { epilogue, y, dy, dz });
+    T::conv1d_backward_epilogue(level, BackwardEpilogue { epilogue, y, dy, dz });
 }
 
-struct BackwardEpilogue<'a, T> {
+pub(crate) struct BackwardEpilogue<'a, T> {
     epilogue: Epilogue,
     y: Rows<'a, T>,
     dy: Rows<'a, T>,
@@ -234,7 +226,6 @@ struct BackwardEpilogue<'a, T> {
 }
 
 impl<T: Real> Kernel for BackwardEpilogue<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         let scale = self.epilogue.dropout.map_or(1.0, Mask::scale);
@@ -286,24 +277,16 @@ pub fn backward_input<T: Real>(
 ) {
     assert_eq!(dz.rows(), geometry.output_rows(dx.rows()), "conv1d: rows of dz");
     assert_eq!(weight.len(), geometry.taps * dx.cols() * dz.cols(), "conv1d: length of the weight");
-    level.run(BackwardInput { geometry, dz, weight, dx, write, scratch });
+    T::conv1d_backward_input(level, BackwardInput { geometry, dz, weight, dx, write, scratch });
 }
 
-struct BackwardInput<'a, T> {
+pub(crate) struct BackwardInput<'a, T> {
     geometry: Geometry,
     dz: Rows<'a, T>,
     weight: &'a [T],
     dx: RowsMut<'a, T>,
     write: Write,
     scratch: &'a mut [T],
-}
-
-impl<T: Real> Kernel for BackwardInput<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
@@ -397,10 +380,10 @@ pub fn backward_weight<T: Real>(
     assert_eq!(dz.rows(), geometry.output_rows(x.rows()), "conv1d: rows of dz");
     assert_eq!(dweight.len(), taps * inputs * outputs, "conv1d: length of the weight's gradient");
     match geometry.layout {
-        WeightLayout::TapInOut => level.run(BackwardWeight { geometry, x, dz, dweight, write }),
+        WeightLayout::TapInOut => T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight, write }),
         WeightLayout::OutInTap => {
             let gradient = &mut scratch[..taps * inputs * outputs];
-            level.run(BackwardWeight { geometry, x, dz, dweight: gradient, write: Write::Set });
+            T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight: gradient, write: Write::Set });
             for (o, target) in dweight.chunks_exact_mut((inputs * taps).max(1)).enumerate() {
                 let source = |c: usize, j: usize| gradient[(j * inputs + c) * outputs + o];
                 let places = (0..inputs).flat_map(|c| (0..taps).map(move |j| (c, j)));
@@ -413,20 +396,12 @@ pub fn backward_weight<T: Real>(
     }
 }
 
-struct BackwardWeight<'a, T> {
+pub(crate) struct BackwardWeight<'a, T> {
     geometry: Geometry,
     x: Rows<'a, T>,
     dz: Rows<'a, T>,
     dweight: &'a mut [T],
     write: Write,
-}
-
-impl<T: Real> Kernel for BackwardWeight<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 /// Rows of x and dz that are summed for all taps before the next ones are read: they stay in the second-level cache.

@@ -84,7 +84,7 @@ impl MaskRow {
     }
 }
 
-struct Apply<'a, T> {
+pub(crate) struct Apply<'a, T> {
     mask: Mask,
     x: Rows<'a, T>,
     y: RowsMut<'a, T>,
@@ -92,7 +92,6 @@ struct Apply<'a, T> {
 }
 
 impl<T: Real> Kernel for Apply<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         let scale = T::of(self.mask.scale());
@@ -110,13 +109,13 @@ impl<T: Real> Kernel for Apply<'_, T> {
 /// y = m∘x / (1 − p), both `[n, C]`.
 pub fn forward<T: Real>(level: Level, mask: Mask, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
-    level.run(Apply { mask, x, y, write: Write::Set });
+    T::dropout_apply(level, Apply { mask, x, y, write: Write::Set });
 }
 
 /// dx {=, +=} m∘dy / (1 − p), both `[n, C]`, with the mask of the forward pass.
 pub fn backward<T: Real>(level: Level, mask: Mask, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
     same_shape(&dy, &dx.view());
-    level.run(Apply { mask, x: dy, y: dx, write });
+    T::dropout_apply(level, Apply { mask, x: dy, y: dx, write });
 }
 
 #[cfg(test)]

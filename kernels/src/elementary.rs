@@ -197,16 +197,15 @@ pub enum Function {
 
 /// Replaces every number by the function of it.
 pub fn apply<T: Real>(level: Level, function: Function, values: &mut [T]) {
-    level.run(Apply { function, values });
+    T::elementary_apply(level, Apply { function, values });
 }
 
-struct Apply<'a, T> {
+pub(crate) struct Apply<'a, T> {
     function: Function,
     values: &'a mut [T],
 }
 
 impl<T: Real> Kernel for Apply<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(self) {
         match self.function {

@@ -10,7 +10,7 @@
 //! stays in the first-level cache; a is read where it lies (tile.rs). Written for the sizes of this project: n from 6 to a few
 //! hundred, k up to a few thousand, any m.
 
-use crate::level::{Isa, Kernel, Level, Tiled};
+use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -33,7 +33,7 @@ pub fn scratch_len(m: usize, k: usize, n: usize) -> usize {
 /// c {=, +=} a·b; a `[m, k]`, b `[k, n]`, c `[m, n]`.
 pub fn ab<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.rows() == c.rows() && a.cols() == b.rows() && b.cols() == c.cols(), "a·b: shapes do not chain");
-    level.run(Product { a, b: Right::Plain(b), bias: None, c, write, scratch });
+    T::gemm_product(level, Product { a, b: Right::Plain(b), bias: None, c, write, scratch });
 }
 
 /// c {=, +=} a·bᵀ; a `[m, k]`, b `[n, k]`, c `[m, n]`.
@@ -53,14 +53,14 @@ pub(crate) fn abt_bias<T: Real>(
 ) {
     assert!(a.rows() == c.rows() && a.cols() == b.cols() && b.rows() == c.cols(), "a·bᵀ: shapes do not chain");
     assert!(bias.is_none_or(|bias| bias.len() == c.cols()), "a·bᵀ + bias: length of the bias");
-    level.run(Product { a, b: Right::Transposed(b), bias, c, write, scratch });
+    T::gemm_product(level, Product { a, b: Right::Transposed(b), bias, c, write, scratch });
 }
 
 /// c {=, +=} aᵀ·b; a `[k, m]`, b `[k, n]`, c `[m, n]`.
 pub fn atb<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.cols() == c.rows() && a.rows() == b.rows() && b.cols() == c.cols(), "aᵀ·b: shapes do not chain");
     let _ = scratch;
-    level.run(TransposedProduct { a, b, c, write });
+    T::gemm_transposed_product(level, TransposedProduct { a, b, c, write });
 }
 
 enum Right<'a, T> {
@@ -68,21 +68,13 @@ enum Right<'a, T> {
     Transposed(Rows<'a, T>),
 }
 
-struct Product<'a, T> {
+pub(crate) struct Product<'a, T> {
     a: Rows<'a, T>,
     b: Right<'a, T>,
     bias: Option<&'a [T]>,
     c: RowsMut<'a, T>,
     write: Write,
     scratch: &'a mut [T],
-}
-
-impl<T: Real> Kernel for Product<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for Product<'_, T> {
@@ -107,19 +99,11 @@ impl<T: Real> Tiled<T> for Product<'_, T> {
     }
 }
 
-struct TransposedProduct<'a, T> {
+pub(crate) struct TransposedProduct<'a, T> {
     a: Rows<'a, T>,
     b: Rows<'a, T>,
     c: RowsMut<'a, T>,
     write: Write,
-}
-
-impl<T: Real> Kernel for TransposedProduct<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<I: Isa>(self) {
-        I::tiled::<T, Self>(self);
-    }
 }
 
 impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {

@@ -28,10 +28,10 @@ pub fn forward<T: Real>(
     same_shape(&x, &y.view());
     assert!(gamma.len() == x.cols() && beta.len() == x.cols(), "layer norm: length of gamma or beta");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    level.run(Forward { x, gamma, beta, epsilon: T::of(epsilon), y, mean, rstd });
+    T::layer_norm_forward(level, Forward { x, gamma, beta, epsilon: T::of(epsilon), y, mean, rstd });
 }
 
-struct Forward<'a, T> {
+pub(crate) struct Forward<'a, T> {
     x: Rows<'a, T>,
     gamma: &'a [T],
     beta: &'a [T],
@@ -42,7 +42,6 @@ struct Forward<'a, T> {
 }
 
 impl<T: Real> Kernel for Forward<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         let share = T::ONE / T::of(self.x.cols() as f64);
@@ -77,10 +76,10 @@ pub fn backward_input<T: Real>(
     same_shape(&x, &dx.view());
     assert!(gamma.len() == x.cols(), "layer norm: length of gamma");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    level.run(BackwardInput { x, gamma, mean, rstd, dy, dx, write });
+    T::layer_norm_backward_input(level, BackwardInput { x, gamma, mean, rstd, dy, dx, write });
 }
 
-struct BackwardInput<'a, T> {
+pub(crate) struct BackwardInput<'a, T> {
     x: Rows<'a, T>,
     gamma: &'a [T],
     mean: &'a [T],
@@ -91,7 +90,6 @@ struct BackwardInput<'a, T> {
 }
 
 impl<T: Real> Kernel for BackwardInput<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         let share = T::ONE / T::of(self.x.cols() as f64);
@@ -136,10 +134,10 @@ pub fn backward_parameters<T: Real>(
     same_shape(&x, &dy);
     assert!(dgamma.len() == x.cols() && dbeta.len() == x.cols(), "layer norm: length of the gradients of gamma or beta");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    level.run(BackwardParameters { x, mean, rstd, dy, dgamma, dbeta, write });
+    T::layer_norm_backward_parameters(level, BackwardParameters { x, mean, rstd, dy, dgamma, dbeta, write });
 }
 
-struct BackwardParameters<'a, T> {
+pub(crate) struct BackwardParameters<'a, T> {
     x: Rows<'a, T>,
     mean: &'a [T],
     rstd: &'a [T],
@@ -150,7 +148,6 @@ struct BackwardParameters<'a, T> {
 }
 
 impl<T: Real> Kernel for BackwardParameters<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(self) {
         if self.write == Write::Set {

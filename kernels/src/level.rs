@@ -7,6 +7,7 @@
 //! Not here: any arithmetic.
 
 use std::fmt;
+use std::marker::PhantomData;
 use std::sync::OnceLock;
 
 use crate::Real;
@@ -96,7 +97,7 @@ impl Level {
 
     /// Runs a kernel compiled for this level.
     #[inline]
-    pub(crate) fn run<K: Kernel>(self, kernel: K) -> K::Output {
+    pub(crate) fn run<K: Kernel>(self, kernel: K) {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
             // SAFETY: a Level of this kind is made only by `named` and `available`, after the processor reported avx2 and fma.
@@ -109,6 +110,12 @@ impl Level {
             Kind::Neon => unsafe { neon(kernel) },
             _ => kernel.run::<Plain>(),
         }
+    }
+
+    /// Runs a kernel written for a tile of accumulators.
+    #[inline]
+    pub(crate) fn run_tiled<T: Real, K: Tiled<T>>(self, kernel: K) {
+        self.run(WithTile { kernel, number: PhantomData });
     }
 }
 
@@ -141,35 +148,46 @@ impl Kind {
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn avx2<K: Kernel>(kernel: K) -> K::Output {
+fn avx2<K: Kernel>(kernel: K) {
     kernel.run::<Avx2>()
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
-fn avx512<K: Kernel>(kernel: K) -> K::Output {
+fn avx512<K: Kernel>(kernel: K) {
     kernel.run::<Avx512>()
 }
 
 #[cfg(target_arch = "aarch64")]
 #[target_feature(enable = "neon")]
-fn neon<K: Kernel>(kernel: K) -> K::Output {
+fn neon<K: Kernel>(kernel: K) {
     kernel.run::<Neon>()
 }
 
 /// A kernel with its operands, ready to run. Implementations mark `run` and all they call `#[inline(always)]`: only then is the
 /// body compiled with the level's instructions.
 pub(crate) trait Kernel {
-    /// What it returns.
-    type Output;
     /// The one body.
-    fn run<I: Isa>(self) -> Self::Output;
+    fn run<I: Isa>(self);
 }
 
 /// A kernel whose body is written for a tile of MR x NR accumulators; see [`Isa::tiled`].
 pub(crate) trait Tiled<T> {
     /// The one body.
     fn run<I: Isa, const MR: usize, const NR: usize>(self);
+}
+
+/// A tiled kernel as one that takes its tile from the level.
+struct WithTile<T, K> {
+    kernel: K,
+    number: PhantomData<T>,
+}
+
+impl<T: Real, K: Tiled<T>> Kernel for WithTile<T, K> {
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        I::tiled::<T, K>(self.kernel);
+    }
 }
 
 /// What a body may know about the level it is compiled for.

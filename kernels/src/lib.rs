@@ -12,6 +12,7 @@
 pub mod activation;
 pub mod adam;
 pub mod attention;
+mod compiled;
 pub mod conv1d;
 pub mod dropout;
 pub mod elementary;

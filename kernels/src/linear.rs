@@ -35,17 +35,16 @@ pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, d
 /// db {=, +=} Σ_rows dy, `[out]`.
 pub fn backward_bias<T: Real>(level: Level, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     assert_eq!(dy.cols(), dbias.len(), "bias gradient");
-    level.run(SumRows { x: dy, total: dbias, write });
+    T::linear_sum_rows(level, SumRows { x: dy, total: dbias, write });
 }
 
-struct SumRows<'a, T> {
+pub(crate) struct SumRows<'a, T> {
     x: Rows<'a, T>,
     total: &'a mut [T],
     write: Write,
 }
 
 impl<T: Real> Kernel for SumRows<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(self) {
         if self.write == Write::Set {

@@ -25,10 +25,10 @@ pub fn squared_error_gradient<T: Real>(
 ) {
     same_shape(&y, &target);
     same_shape(&y, &dy.view());
-    level.run(Gradient { y, target, factor: T::of(2.0 * weight), dy, write });
+    T::loss_gradient(level, Gradient { y, target, factor: T::of(2.0 * weight), dy, write });
 }
 
-struct Gradient<'a, T> {
+pub(crate) struct Gradient<'a, T> {
     y: Rows<'a, T>,
     target: Rows<'a, T>,
     factor: T,
@@ -37,7 +37,6 @@ struct Gradient<'a, T> {
 }
 
 impl<T: Real> Kernel for Gradient<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.y.rows() {

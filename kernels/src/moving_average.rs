@@ -27,7 +27,10 @@ pub const fn scratch_len(rows: usize, channels: usize) -> usize {
 pub fn forward<T: Real>(level: Level, width: usize, x: Rows<'_, T>, y: RowsMut<'_, T>, scratch: &mut [T]) {
     assert!(width % 2 == 1, "a centred moving average has an odd width, not {width}");
     same_shape(&x, &y.view());
-    level.run(Average { half: width / 2, ends: Ends::Repeated, x, y, write: Write::Set, sum: &mut scratch[..x.cols()] });
+    T::moving_average(
+        level,
+        Average { half: width / 2, ends: Ends::Repeated, x, y, write: Write::Set, sum: &mut scratch[..x.cols()] },
+    );
 }
 
 /// dx {=, +=} adjoint of the moving average of dy.
@@ -37,7 +40,7 @@ pub fn forward<T: Real>(level: Level, width: usize, x: Rows<'_, T>, y: RowsMut<'
 pub fn backward<T: Real>(level: Level, width: usize, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(width % 2 == 1, "a centred moving average has an odd width, not {width}");
     same_shape(&dy, &dx.view());
-    level.run(Average { half: width / 2, ends: Ends::Folded, x: dy, y: dx, write, sum: &mut scratch[..dy.cols()] });
+    T::moving_average(level, Average { half: width / 2, ends: Ends::Folded, x: dy, y: dx, write, sum: &mut scratch[..dy.cols()] });
 }
 
 /// What lies beyond the ends.
@@ -49,7 +52,7 @@ enum Ends {
     Folded,
 }
 
-struct Average<'a, T> {
+pub(crate) struct Average<'a, T> {
     half: usize,
     ends: Ends,
     x: Rows<'a, T>,
@@ -65,7 +68,6 @@ fn add_scaled<T: Real, I: Isa>(y: &mut [T], factor: T, x: &[T]) {
 }
 
 impl<T: Real> Kernel for Average<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         let (n, half, sum) = (self.x.rows(), self.half, self.sum);

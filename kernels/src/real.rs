@@ -4,6 +4,7 @@ use std::fmt::{Debug, Display};
 use std::iter::Sum;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
+use crate::compiled::Compiled;
 use crate::elementary::Elementary;
 
 /// f32 or f64: one generic source, two instantiations.
@@ -11,7 +12,7 @@ use crate::elementary::Elementary;
 pub trait Real:
     Copy + Default + Debug + Display + PartialOrd + Send + Sync + 'static + Sum
     + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary
+    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary + Compiled
 {
     /// 0
     const ZERO: Self;

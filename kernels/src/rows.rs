@@ -192,7 +192,7 @@ pub(crate) fn same_shape<T, U>(x: &Rows<'_, T>, y: &Rows<'_, U>) {
 }
 
 /// y {=, +=} factor·x.
-struct Scale<'a, T> {
+pub(crate) struct Scale<'a, T> {
     factor: T,
     x: Rows<'a, T>,
     y: RowsMut<'a, T>,
@@ -200,7 +200,6 @@ struct Scale<'a, T> {
 }
 
 impl<T: Real> Kernel for Scale<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.x.rows {
@@ -221,11 +220,11 @@ pub fn copy<T: Real>(level: Level, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Wri
 /// y {=, +=} factor·x, both `[n, C]`.
 pub fn scale<T: Real>(level: Level, factor: T, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
     same_shape(&x, &y.view());
-    level.run(Scale { factor, x, y, write });
+    T::rows_scale(level, Scale { factor, x, y, write });
 }
 
 /// y = a + sign·b.
-struct Combine<'a, T> {
+pub(crate) struct Combine<'a, T> {
     a: Rows<'a, T>,
     b: Rows<'a, T>,
     sign: T,
@@ -233,7 +232,6 @@ struct Combine<'a, T> {
 }
 
 impl<T: Real> Kernel for Combine<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.a.rows {
@@ -248,14 +246,14 @@ impl<T: Real> Kernel for Combine<'_, T> {
 pub fn add<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
-    level.run(Combine { a, b, sign: T::ONE, y });
+    T::rows_combine(level, Combine { a, b, sign: T::ONE, y });
 }
 
 /// y = a − b, all `[n, C]`.
 pub fn subtract<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
-    level.run(Combine { a, b, sign: -T::ONE, y });
+    T::rows_combine(level, Combine { a, b, sign: -T::ONE, y });
 }
 
 /// Splits a sequence x `[n, C]` into its even rows `[⌈n/2⌉, C]` and odd rows `[⌊n/2⌋, C]`. Exact.

@@ -16,7 +16,7 @@ use crate::{Real, Rows, RowsMut, Write};
 pub fn scale<T: Real>(level: Level, x: Rows<'_, T>, s: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &s);
     same_shape(&x, &y.view());
-    level.run(Scale { x, s, y });
+    T::sci_scale(level, Scale { x, s, y });
 }
 
 /// dx {=, +=} dy∘eˢ and ds {=, +=} dy∘x∘eˢ.
@@ -34,17 +34,16 @@ pub fn scale_backward<T: Real>(
     same_shape(&x, &dy);
     same_shape(&x, &dx.view());
     same_shape(&x, &ds.view());
-    level.run(Backward { x, s, dy, dx, write_x, ds, write_s });
+    T::sci_backward(level, Backward { x, s, dy, dx, write_x, ds, write_s });
 }
 
-struct Scale<'a, T> {
+pub(crate) struct Scale<'a, T> {
     x: Rows<'a, T>,
     s: Rows<'a, T>,
     y: RowsMut<'a, T>,
 }
 
 impl<T: Real> Kernel for Scale<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.x.rows() {
@@ -55,7 +54,7 @@ impl<T: Real> Kernel for Scale<'_, T> {
     }
 }
 
-struct Backward<'a, T> {
+pub(crate) struct Backward<'a, T> {
     x: Rows<'a, T>,
     s: Rows<'a, T>,
     dy: Rows<'a, T>,
@@ -66,7 +65,6 @@ struct Backward<'a, T> {
 }
 
 impl<T: Real> Kernel for Backward<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for i in 0..self.x.rows() {

@@ -31,21 +31,20 @@ pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option
     }
     let weight = Rows::packed(weight, y.rows(), x.rows());
     if y.rows() < SMALL {
-        level.run(WeightedSum { x, weight, y });
+        T::temporal_weighted_sum(level, WeightedSum { x, weight, y });
     } else {
         gemm::ab(level, weight, x, y, Write::Add, scratch);
     }
 }
 
 /// y += W·x, row by row.
-struct WeightedSum<'a, T> {
+pub(crate) struct WeightedSum<'a, T> {
     x: Rows<'a, T>,
     weight: Rows<'a, T>,
     y: RowsMut<'a, T>,
 }
 
 impl<T: Real> Kernel for WeightedSum<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for p in 0..self.y.rows() {
@@ -74,14 +73,14 @@ pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, d
     assert!(x.cols() == dy.cols() && dweight.len() == dy.rows() * x.rows(), "temporal: shapes do not chain");
     let dweight = RowsMut::packed(dweight, dy.rows(), x.rows());
     if dy.rows() < SMALL {
-        level.run(RowDots { x, dy, dweight, write });
+        T::temporal_row_dots(level, RowDots { x, dy, dweight, write });
     } else {
         gemm::abt(level, dy, x, dweight, write, scratch);
     }
 }
 
 /// `dW[p, t] {=, +=} <dy[p], x[t]>`.
-struct RowDots<'a, T> {
+pub(crate) struct RowDots<'a, T> {
     x: Rows<'a, T>,
     dy: Rows<'a, T>,
     dweight: RowsMut<'a, T>,
@@ -89,7 +88,6 @@ struct RowDots<'a, T> {
 }
 
 impl<T: Real> Kernel for RowDots<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(mut self) {
         for p in 0..self.dy.rows() {
@@ -107,17 +105,16 @@ impl<T: Real> Kernel for RowDots<'_, T> {
 /// If lengths disagree.
 pub fn backward_bias<T: Real>(level: Level, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     assert_eq!(dy.rows(), dbias.len(), "temporal: length of the bias gradient");
-    level.run(RowSums { dy, dbias, write });
+    T::temporal_row_sums(level, RowSums { dy, dbias, write });
 }
 
-struct RowSums<'a, T> {
+pub(crate) struct RowSums<'a, T> {
     dy: Rows<'a, T>,
     dbias: &'a mut [T],
     write: Write,
 }
 
 impl<T: Real> Kernel for RowSums<'_, T> {
-    type Output = ();
     #[inline(always)]
     fn run<I: Isa>(self) {
         for (p, dbias) in self.dbias.iter_mut().enumerate() {

@@ -1,0 +1,65 @@
+//! Every kernel, compiled here: once for f32 and once for f64, at each instruction-set level.
+//!
+//! A generic function is compiled by the crate that calls it, and again by each crate that calls that one. The bodies of kernels
+//! are large loops, unrolled for each level; so they are made concrete in this one place, and the generic functions around them,
+//! which check shapes, are all that a caller compiles.
+//!
+//! To add a kernel: one line in the table below.
+
+use crate::level::Level;
+use crate::{
+    activation, adam, attention, conv1d, dropout, elementary, gemm, layer_norm, linear, loss, moving_average, rows, sci, temporal,
+};
+
+macro_rules! kernels {
+    (loops { $($loop:ident: $loop_module:ident::$loop_kernel:ident,)* } tiles { $($tile:ident: $tile_module:ident::$tile_kernel:ident,)* }) => {
+        /// The kernels of one float type. A supertrait of [`Real`](crate::Real); not for use outside this crate.
+        #[expect(private_interfaces, reason = "the kernels' types are this crate's own; nobody else can call these")]
+        pub trait Compiled: Sized {
+            $(#[doc(hidden)] fn $loop(level: Level, kernel: $loop_module::$loop_kernel<'_, Self>);)*
+            $(#[doc(hidden)] fn $tile(level: Level, kernel: $tile_module::$tile_kernel<'_, Self>);)*
+        }
+        kernels!(@for f32 loops { $($loop: $loop_module::$loop_kernel,)* } tiles { $($tile: $tile_module::$tile_kernel,)* });
+        kernels!(@for f64 loops { $($loop: $loop_module::$loop_kernel,)* } tiles { $($tile: $tile_module::$tile_kernel,)* });
+    };
+    (@for $t:ident loops { $($loop:ident: $loop_module:ident::$loop_kernel:ident,)* } tiles { $($tile:ident: $tile_module:ident::$tile_kernel:ident,)* }) => {
+        #[expect(private_interfaces, reason = "as above")]
+        impl Compiled for $t {
+            $(#[inline(never)] fn $loop(level: Level, kernel: $loop_module::$loop_kernel<'_, Self>) { level.run(kernel); })*
+            $(#[inline(never)] fn $tile(level: Level, kernel: $tile_module::$tile_kernel<'_, Self>) { level.run_tiled::<Self, _>(kernel); })*
+        }
+    };
+}
+
+kernels! {
+    loops {
+        activation_forward: activation::Forward,
+        activation_backward: activation::Backward,
+        adam_step: adam::Step,
+        conv1d_backward_epilogue: conv1d::BackwardEpilogue,
+        dropout_apply: dropout::Apply,
+        elementary_apply: elementary::Apply,
+        layer_norm_forward: layer_norm::Forward,
+        layer_norm_backward_input: layer_norm::BackwardInput,
+        layer_norm_backward_parameters: layer_norm::BackwardParameters,
+        linear_sum_rows: linear::SumRows,
+        loss_gradient: loss::Gradient,
+        moving_average: moving_average::Average,
+        rows_scale: rows::Scale,
+        rows_combine: rows::Combine,
+        sci_scale: sci::Scale,
+        sci_backward: sci::Backward,
+        temporal_weighted_sum: temporal::WeightedSum,
+        temporal_row_dots: temporal::RowDots,
+        temporal_row_sums: temporal::RowSums,
+    }
+    tiles {
+        attention_forward: attention::Forward,
+        attention_backward: attention::Backward,
+        conv1d_forward: conv1d::Forward,
+        conv1d_backward_input: conv1d::BackwardInput,
+        conv1d_backward_weight: conv1d::BackwardWeight,
+        gemm_product: gemm::Product,
+        gemm_transposed_product: gemm::TransposedProduct,
+    }
+}
