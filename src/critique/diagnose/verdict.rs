@@ -189,3 +189,46 @@ impl Search<'_> {
         Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gram::tests::{model, noise, whole};
+    use super::*;
+    use crate::flight::Column;
+    use crate::physics::calibrate;
+
+    /// Flights in which a stick rests but for one stretch of the first flight.
+    fn resting(stick: Column, moves: std::ops::Range<usize>) -> Result<Vec<Flight>> {
+        let one = |(index, flight): (usize, Flight)| {
+            let moved = |sample: usize| index == 0 && moves.contains(&sample);
+            let still = |(sample, value): (usize, &f64)| if moved(sample) { *value } else { 0.0 };
+            let column = |column: Column| match flight.column(column) {
+                values if column == stick => values.iter().enumerate().map(still).collect(),
+                values => values.to_vec(),
+            };
+            Flight::new(flight.name.clone(), "noise", 0.0, flight.step_s, Column::ALL.map(column), flight.targets)
+        };
+        noise(1, &[6000; 6]).into_iter().enumerate().map(one).collect()
+    }
+
+    fn refusal(flights: &[Flight]) -> String {
+        let found = diagnose(flights, &model(), &whole(flights), &[], "test", &Options::default());
+        found.map_or_else(|error| error.to_string(), |outcome| outcome.diagnosis.to_string())
+    }
+
+    #[test]
+    fn a_model_that_the_flights_do_not_determine_is_refused_as_calibration_does() -> Result<()> {
+        let flights = resting(Column::U3, 0..0)?;
+        let expected = calibrate(&model(), &flights, &whole(&flights)).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(expected.contains("`c_z` of effect `control_moment`"), "{expected}");
+        assert_eq!(refusal(&flights), expected);
+        Ok(())
+    }
+
+    #[test]
+    fn a_model_that_one_block_alone_determines_is_refused() -> Result<()> {
+        let found = refusal(&resting(Column::U3, 1000..1200)?);
+        assert!(found.contains("`c_z` of effect `control_moment`") && found.contains("one tenth of the blocks"), "{found}");
+        Ok(())
+    }
+}
