@@ -61,7 +61,7 @@ impl Found {
 
 pub(super) struct Search<'a> {
     pub engine: Engine<'a>,
-    pub flips: Option<Flips>,
+    pub flips: Flips,
     pub largest_p: f64,
     pub options: &'a Options,
 }

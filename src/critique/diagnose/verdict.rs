@@ -75,28 +75,29 @@ pub fn diagnose(
     let mut candidates = candidates(model, flights);
     candidates.retain(|candidate| !options.without.contains(&candidate.id));
     let in_play = candidates.iter().filter(|candidate| candidate.inapplicable.is_none()).count().max(1);
-    let search = Search { engine, flips: None, largest_p: FAMILY_WISE / in_play as f64, options };
+    let largest_p = FAMILY_WISE / in_play as f64;
+    let count = engine.blocks.len();
     let method = Method {
-        blocks: search.engine.blocks.len(),
+        blocks: count,
         block_s,
         correlation_s: CORRELATION_S,
-        searched_s: search.engine.rows() as f64 * step_s,
+        searched_s: engine.rows() as f64 * step_s,
         seed: options.seed,
         effects_in_play: in_play,
-        largest_p_value: search.largest_p,
+        largest_p_value: largest_p,
         smallest_fall: SMALLEST_FALL,
     };
-    let mut diagnosis = Diagnosis { method: Some(method), ..nothing(Verdict::TooLittleData, String::new()) };
-    let count = search.engine.blocks.len();
     if count < FEWEST_BLOCKS {
-        diagnosis.summary = format!(
+        let summary = format!(
             "{count} blocks of {block_s:.0} s are too few to tell a missing effect from chance; {FEWEST_BLOCKS} are needed, that is {:.0} s of flight.",
             FEWEST_BLOCKS as f64 * SHORTEST_BLOCK_S
         );
-        diagnosis.seconds = begun.elapsed().as_secs_f64();
+        let seconds = begun.elapsed().as_secs_f64();
+        let diagnosis = Diagnosis { method: Some(method), seconds, ..Diagnosis::nothing(Verdict::TooLittleData, summary) };
         return Ok(Outcome { diagnosis, model: base });
     }
-    let search = Search { flips: Some(Flips::new(count, options.seed)), ..search };
+    let mut diagnosis = Diagnosis { method: Some(method), ..Diagnosis::nothing(Verdict::Explained, String::new()) };
+    let search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
     let (before, held) = search.timing(&base)?;
     if let Some(delay_s) = held {
         diagnosis.notes.push(format!(
@@ -138,24 +139,6 @@ pub fn diagnose(
     diagnosis.summary = summary(&diagnosis);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
     Ok(Outcome { diagnosis, model: after })
-}
-
-/// A diagnosis that says nothing but its verdict.
-pub fn nothing(verdict: Verdict, summary: String) -> Diagnosis {
-    Diagnosis {
-        verdict,
-        summary,
-        accepted: Vec::new(),
-        steps: Vec::new(),
-        candidates: Vec::new(),
-        unknown: None,
-        locked: None,
-        method: None,
-        notes: Vec::new(),
-        seconds: 0.0,
-        version: env!("CARGO_PKG_VERSION").into(),
-        data_sha256: String::new(),
-    }
 }
 
 fn accepted(step: &Step) -> CandidateReport {
