@@ -2,11 +2,11 @@
 
 use super::candidate::candidates;
 use super::confirm::confirm;
-use super::describe::summary;
+use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, FOLDS};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
-use super::report::{CandidateReport, Diagnosis, Method, Status, Step, Verdict};
+use super::report::{Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
 use super::significance::Flips;
@@ -141,22 +141,6 @@ pub fn diagnose(
     Ok(Outcome { diagnosis, model: after })
 }
 
-fn accepted(step: &Step) -> CandidateReport {
-    CandidateReport {
-        effect: step.effect.clone(),
-        status: Status::Accepted,
-        held_out_mse_fall: step.held_out_mse_fall.clone(),
-        p_value: Some(step.p_value),
-        detection_limit_mse_fall: None,
-        note: None,
-    }
-}
-
-fn taken_back(found: &Found) -> CandidateReport {
-    let note = "stands in for a stronger dependence that is in no effect of the catalogue".into();
-    CandidateReport { status: Status::SamePhysics, note: Some(note), ..accepted(&found.step) }
-}
-
 impl Search<'_> {
     /// Effects that only stand in for a dependence outside the catalogue.
     fn stand_ins(&self, found: &[Found], before: &Model, unknown: &[Unknown]) -> Result<Vec<String>> {
@@ -176,9 +160,10 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::gram::tests::{model, noise, whole};
+    use super::super::report::{CandidateReport, Status};
     use super::*;
     use crate::flight::Column;
-    use crate::physics::calibrate;
+    use crate::physics::{Effect, calibrate, catalogue};
 
     /// Flights in which a stick rests but for one stretch of the first flight.
     fn resting(stick: Column, moves: std::ops::Range<usize>) -> Result<Vec<Flight>> {
@@ -205,6 +190,39 @@ mod tests {
         let expected = calibrate(&model(), &flights, &whole(&flights)).map_or_else(|error| error.to_string(), |_| String::new());
         assert!(expected.contains("`c_z` of effect `control_moment`"), "{expected}");
         assert_eq!(refusal(&flights), expected);
+        Ok(())
+    }
+
+    /// A sum of three signals is the best single guess at two of them, and needless once both have names.
+    #[test]
+    fn an_effect_that_later_ones_make_needless_stays_among_the_candidates() -> Result<()> {
+        let mut flights = noise(1, &[6000; 6]);
+        for flight in &mut flights {
+            let mut accelerations = model().predict(flight)?;
+            for ((sample, value), (one, other)) in
+                accelerations[0].iter_mut().enumerate().zip(flight.column(Column::U1).iter().zip(flight.column(Column::U2)))
+            {
+                *value += one + other + 0.1 * flight.column(Column::VyDot)[sample];
+            }
+            // What the model says of the others would leave no error at all.
+            for (channel, values) in accelerations.iter_mut().enumerate().skip(1) {
+                values.iter_mut().zip(flight.column(Column::TARGETS[channel])).for_each(|(value, noise)| *value += noise);
+            }
+            *flight = flight.with_accelerations(&accelerations)?;
+        }
+        let mut model = model();
+        for (name, formula) in [("sum", "u1 + u2 + u3"), ("one", "u1"), ("other", "u2")] {
+            model.effects.push(Effect { enabled: false, ..Effect::formula(name, 0, formula, 0.0)? });
+        }
+        let without = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
+        let options = Options { without, ..Options::default() };
+        let found = diagnose(&flights, &model, &whole(&flights), &[], "test", &options)?.diagnosis;
+        let mut accepted = found.accepted.clone();
+        accepted.sort();
+        assert_eq!(accepted, ["one", "other"], "{found}");
+        let sum: Vec<&CandidateReport> = found.candidates.iter().filter(|candidate| candidate.effect == "sum").collect();
+        assert!(matches!(sum.as_slice(), [sum] if sum.status == Status::Negligible && sum.note.is_some()), "{found}");
+        assert!(sum[0].held_out_mse_fall.values().all(|fall| fall.abs() < SMALLEST_FALL), "{found}");
         Ok(())
     }
 
