@@ -13,7 +13,7 @@ use super::significance::Flips;
 use crate::critique::unknown::Unknown;
 use crate::error::Result;
 use crate::flight::{Flight, Span};
-use crate::physics::Model;
+use crate::physics::{Effect, Model};
 use phyture_kernels::random::permutation;
 use std::time::Instant;
 
@@ -96,7 +96,8 @@ pub fn diagnose(
         let diagnosis = Diagnosis { method: Some(method), seconds, ..Diagnosis::nothing(Verdict::TooLittleData, summary) };
         return Ok(Outcome { diagnosis, model: base });
     }
-    let mut diagnosis = Diagnosis { method: Some(method), ..Diagnosis::nothing(Verdict::Explained, String::new()) };
+    let notes = model.effects.iter().filter_map(Effect::caution).collect();
+    let mut diagnosis = Diagnosis { method: Some(method), notes, ..Diagnosis::nothing(Verdict::Explained, String::new()) };
     let search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
     let (before, held) = search.timing(&base)?;
     if let Some(delay_s) = held {
@@ -163,7 +164,7 @@ mod tests {
     use super::super::report::{CandidateReport, Status};
     use super::*;
     use crate::flight::Column;
-    use crate::physics::{Effect, calibrate, catalogue};
+    use crate::physics::{calibrate, catalogue};
 
     /// Flights in which a stick rests but for one stretch of the first flight.
     fn resting(stick: Column, moves: std::ops::Range<usize>) -> Result<Vec<Flight>> {
