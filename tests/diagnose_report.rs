@@ -41,18 +41,9 @@ fn flight(name: &str, seconds: usize, phase: f64, model: &Model, absent: &[Colum
 
 fn diagnosis(verdict: Verdict) -> Diagnosis {
     Diagnosis {
-        verdict,
-        summary: format!("Said in words {EVIL}."),
-        accepted: Vec::new(),
-        steps: Vec::new(),
-        candidates: Vec::new(),
-        unknown: None,
-        locked: None,
-        method: None,
         notes: vec!["a note <i>".into()],
-        seconds: 1.5,
-        version: "0.0".into(),
         data_sha256: "4d1c".into(),
+        ..Diagnosis::nothing(verdict, format!("Said in words {EVIL}."))
     }
 }
 

@@ -30,7 +30,7 @@ fn session(minutes: f64, hidden: &[&str], level: Level, seed: u64) -> Result<Vec
     }
     for id in hidden {
         let single = SINGLES.iter().find(|single| single.id == *id && !single.dynamic);
-        let scale = single.map_or(1.0, |single| (SHARE / (1.0 - SHARE) / single.odds).sqrt().min(3.0));
+        let scale = single.map_or(1.0, |single| single.scale(SHARE));
         simulation = simulation.hide(id, scale)?;
     }
     Ok(simulate(&simulation)?.flights)

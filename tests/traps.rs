@@ -162,6 +162,9 @@ fn a_lag_with_a_free_coefficient_fits_the_pilot_and_a_swap_does_not() -> Result<
     assert!(bent > 10.0 * kept.max(0.0), "free {bent}, swap {kept}");
     assert!(kept < smallest_fall(swap), "{kept}");
     assert!(!free.diagnosis.accepted.contains(&"cyclic_lag".to_owned()), "{}", free.diagnosis);
+    for name in ["free_roll_lag", "free_pitch_lag"] {
+        assert!(free.diagnosis.notes.iter().any(|note| note.contains(name)), "{:?}", free.diagnosis.notes);
+    }
     assert!(!swap.diagnosis.accepted.contains(&"cyclic_lag".to_owned()), "{}", swap.diagnosis);
     Ok(())
 }

@@ -14,7 +14,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// First seed of the runs that are reported.
-pub const REPORTED: u64 = 30_000;
+pub const REPORTED: u64 = 40_000;
 /// First seed of development.
 pub const DEVELOPMENT: u64 = 40;
 /// Data sets without a hidden effect.
@@ -235,17 +235,12 @@ fn implant(flight: &Flight, channel: &str, formula: &Formula) -> Result<Flight> 
     Flight::new(flight.name.clone(), flight.manoeuvre.clone(), flight.start_s, flight.step_s, columns, flight.targets)
 }
 
-/// Scale at which a mechanism has this removable share, by the odds at scale 1, which grow with the square of the scale.
-fn scale(single: &Single, share: f64) -> f64 {
-    (share / (1.0 - share) / single.odds).sqrt().min(3.0)
-}
-
 fn single(id: &str) -> Option<&'static Single> {
     SINGLES.iter().find(|single| single.id == id)
 }
 
 fn wanted(id: &str, share: f64) -> (&str, f64) {
-    (id, single(id).map_or(1.0, |single| scale(single, share)))
+    (id, single(id).map_or(1.0, |single| single.scale(share)))
 }
 
 /// Everything, resumable.
@@ -262,19 +257,8 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     for seed in first..first + 3 {
         for single in SINGLES.iter().filter(|_| asked("singles")) {
             for (size, share) in SIZES {
-                let hidden = Hidden { mechanisms: vec![(single.id, scale(single, share))], alien: None };
+                let hidden = Hidden { mechanisms: vec![(single.id, single.scale(share))], alien: None };
                 bench.case("single", size, &hidden, level(seed), seed, Some(single))?;
-            }
-        }
-    }
-    // Effects in time once more, on seeds of their own: their grids were extended to shorter times after the first run.
-    if parts.contains(&"dynamic") {
-        for seed in first + 10..first + 13 {
-            for single in SINGLES.iter().filter(|single| single.dynamic) {
-                for (size, share) in SIZES {
-                    let hidden = Hidden { mechanisms: vec![(single.id, scale(single, share))], alien: None };
-                    bench.case("dynamic", size, &hidden, level(seed), seed, Some(single))?;
-                }
             }
         }
     }
@@ -319,7 +303,7 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     if asked("textbook") {
         for single in SINGLES {
             for (size, share) in SIZES {
-                let hidden = Hidden { mechanisms: vec![(single.id, scale(single, share))], alien: None };
+                let hidden = Hidden { mechanisms: vec![(single.id, single.scale(share))], alien: None };
                 bench.case("textbook", size, &hidden, 1, first, None)?;
             }
         }
@@ -337,7 +321,7 @@ pub fn few(out: &Path) -> Result<()> {
         bench.case("null", "", &Hidden { mechanisms: Vec::new(), alien: None }, 1 + (seed % 2) as u8, seed, None)?;
     }
     for single in SINGLES.iter().step_by(4) {
-        let hidden = Hidden { mechanisms: vec![(single.id, scale(single, 0.11))], alien: None };
+        let hidden = Hidden { mechanisms: vec![(single.id, single.scale(0.11))], alien: None };
         bench.case("single", "medium", &hidden, 1, 2, Some(single))?;
     }
     let (channel, formula, _) = ALIENS[0];

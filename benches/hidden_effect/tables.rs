@@ -28,12 +28,7 @@ fn named(line: &Line) -> Vec<&str> {
 pub fn print(path: &Path) -> Result<()> {
     let lines = read(path)?;
     let of = |part: &str| lines.iter().filter(|line| line.part == part).collect::<Vec<_>>();
-    // Effects in time count from their own run, where there is one.
-    let again = of("dynamic");
-    let dynamic = |line: &&Line| SINGLES.iter().any(|single| single.dynamic && single.id == line.hidden);
-    let mut singles = of("single");
-    singles.retain(|line| again.is_empty() || !dynamic(line));
-    singles.extend(&again);
+    let singles = of("single");
     let between =
         |low: f64, high: f64| singles.iter().copied().filter(|line| line.share >= low && line.share < high).collect::<Vec<_>>();
     let first = |line: &Line| named(line).first().copied() == Some(line.hidden.as_str());

@@ -133,6 +133,19 @@ impl Effect {
         self.coefficients.iter_mut().find(|coefficient| coefficient.name == name)
     }
 
+    /// What a person should know of a user's own formula that looks back: it has a coefficient of its own, and in closed loop what a pilot
+    /// or a controller did and felt a moment ago tells of the gust that still blows. The catalogue's lags and delays have none.
+    pub fn caution(&self) -> Option<String> {
+        let looks_back = self.kind == FORMULA_KIND && self.terms.iter().any(|term| term.regressor.remembers());
+        looks_back.then(|| {
+            format!(
+                "the formula of `{}` reads earlier samples and has a free coefficient: in closed loop such a term can explain gusts, whatever \
+                 the aircraft does; the effects of the catalogue that lag or delay a signal have no coefficient",
+                self.name
+            )
+        })
+    }
+
     /// Checks that the effect is whole: channels exist, terms name coefficients it has, every coefficient is used, values are
     /// finite, and no regressor reads an acceleration.
     ///

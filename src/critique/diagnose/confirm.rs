@@ -90,9 +90,32 @@ pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f6
             bound: vec![false; members.len()],
             by_flight: Vec::new(),
         };
-        for (channel, found) in component.errors_under(&solution, FOLDS, &|block| engine.fold[block]).unwrap_or_default() {
+        for (channel, found) in component.errors_under(&solution, FOLDS, &|block| engine.fold[block]) {
             errors[channel] = found;
         }
     }
     Ok(errors)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidate::with;
+    use super::super::gram::tests::{model, whole};
+    use super::*;
+    use crate::flight::Targets;
+    use crate::physics::catalogue;
+
+    /// At rest, and measured so: channels without any error have no weight that a computer can hold.
+    #[test]
+    fn flights_without_an_error_do_not_determine_biases_and_are_no_panic() -> Result<()> {
+        let still = std::array::from_fn(|_| vec![0.0; 6000]);
+        let flights = [Flight::new("still", "rest", 0.0, 0.01, still, Targets::Recorded)?];
+        let bias = catalogue::definition("sensor_bias").map(|definition| definition.effect(4.58, 0.8));
+        let models = [Some(model()), bias.map(|bias| with(&model(), &bias))];
+        let models: Vec<Model> = models.into_iter().flatten().collect();
+        let found = confirm(&flights, &models, &whole(&flights), "test", 5.0, 100.0)?;
+        let rmse = found.map(|found| [found.rmse_before, found.rmse_after].map(|rmse| rmse.channels()));
+        assert!(models.len() == 2 && rmse.is_some_and(|[before, after]| before == after && before[0] == Some(0.0)), "{rmse:?}");
+        Ok(())
+    }
 }

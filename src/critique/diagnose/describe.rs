@@ -5,7 +5,7 @@ use super::engine::Trial;
 use super::gates::SMALLEST_FALL;
 use super::report::{CandidateReport, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
 use super::score::Scored;
-use super::search::Search;
+use super::search::{Found, Search};
 use crate::flight::Column;
 use crate::physics::{Coefficient, Parameter};
 use std::collections::BTreeMap;
@@ -109,6 +109,39 @@ impl Search<'_> {
         let largest = |report: &CandidateReport| report.held_out_mse_fall.values().copied().fold(f64::NEG_INFINITY, f64::max);
         reports.sort_by(|left, right| largest(right).total_cmp(&largest(left)));
         reports
+    }
+}
+
+/// What is said of an accepted effect among the candidates.
+pub(super) fn accepted(step: &Step) -> CandidateReport {
+    CandidateReport {
+        effect: step.effect.clone(),
+        status: Status::Accepted,
+        held_out_mse_fall: step.held_out_mse_fall.clone(),
+        p_value: Some(step.p_value),
+        detection_limit_mse_fall: None,
+        note: None,
+    }
+}
+
+/// What is said of an effect that only stands in for something else.
+pub(super) fn taken_back(found: &Found) -> CandidateReport {
+    let note = "stands in for a stronger dependence that is in no effect of the catalogue".into();
+    CandidateReport { status: Status::SamePhysics, note: Some(note), ..accepted(&found.step) }
+}
+
+/// What is said of an effect that was accepted and is needless beside the later ones, with the shares that it still removes by channel.
+pub(super) fn dropped(found: &Found, falls: &[f64; 6]) -> CandidateReport {
+    let acts = |name: &str| found.step.held_out_mse_fall.contains_key(name);
+    let still = Column::TARGETS.into_iter().zip(falls).map(|(column, fall)| (column.name(), *fall));
+    CandidateReport {
+        status: Status::Negligible,
+        held_out_mse_fall: still.filter(|(name, _)| acts(name)).map(|(name, fall)| (name.to_owned(), fall)).collect(),
+        note: Some(format!(
+            "accepted at first and dropped: beside the effects accepted later it removes less than {:.0} % of any channel's error",
+            100.0 * SMALLEST_FALL
+        )),
+        ..accepted(&found.step)
     }
 }
 

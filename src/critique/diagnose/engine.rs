@@ -3,9 +3,9 @@
 use super::design::{Design, Layout, enlarged};
 use super::fit::{Component, Prior, Reduced, Solution, components};
 use super::gram::{Block, BlockGram, grams};
-use crate::error::Result;
-use crate::flight::Flight;
-use crate::physics::{Model, Regressor, catalogue};
+use crate::error::{Error, Result};
+use crate::flight::{Flight, Span};
+use crate::physics::{Model, Regressor, calibrate, catalogue};
 
 /// Folds over the blocks.
 pub(super) const FOLDS: usize = 10;
@@ -73,6 +73,9 @@ impl Engine<'_> {
     }
 
     /// Tries a model and others that have its effects and one more, or one less, or other numbers inside.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if the blocks, or those of nine of the ten folds, do not determine the coefficients of `base`.
     pub fn pass(&self, base: &Model, models: &[Model]) -> Result<Pass> {
         let mut design = Design::default();
         let regressors = base.regressors(|_| true)?;
@@ -82,7 +85,7 @@ impl Engine<'_> {
             layouts.push(design.add(&self.regressors_of(model, base, &regressors)?));
         }
         let grams = grams(self.flights, &self.blocks, &design)?;
-        let base = self.base(base, layout, &grams);
+        let base = self.base(base, &layout, &grams)?;
         let one = |(model, layout): (&Model, &Layout)| self.trial(model, layout, &base, &grams);
         #[cfg(feature = "rayon")]
         let trials = {
@@ -103,7 +106,7 @@ impl Engine<'_> {
     }
 
     /// A model by itself.
-    fn base(&self, model: &Model, layout: Layout, grams: &[BlockGram]) -> Trial {
+    fn base(&self, model: &Model, layout: &Layout, grams: &[BlockGram]) -> Result<Trial> {
         let nothing = Trial {
             model: model.clone(),
             layout: Layout::default(),
@@ -113,10 +116,33 @@ impl Engine<'_> {
             values: Vec::new(),
         };
         // Twice: channels that share coefficients are weighted by an error that is known only then.
-        let first = self.fit(model, &layout, &nothing, &[1.0; 6], grams);
-        let Some(first) = first else { return Trial { layout, ..nothing } };
+        let Some(first) = self.fit(model, layout, &nothing, &[1.0; 6], grams) else { return Err(self.undetermined(model)) };
         let weights = self.weights(&first);
-        self.fit(model, &layout, &nothing, &weights, grams).unwrap_or(first)
+        Ok(self.fit(model, layout, &nothing, &weights, grams).unwrap_or(first))
+    }
+
+    /// Why the blocks do not determine a model, in the words of a calibration on all of them or on those of all folds but one.
+    fn undetermined(&self, model: &Model) -> Error {
+        let failure = |held: Option<usize>| {
+            let kept = self.blocks.iter().zip(&self.fold).filter(|(_, fold)| Some(**fold) != held);
+            let spans: Vec<Span> =
+                kept.map(|(block, _)| Span { flight: block.flight, start: block.start, end: block.end }).collect();
+            calibrate(model, self.flights, &spans).err()
+        };
+        if let Some(error) = failure(None) {
+            return error;
+        }
+        match (0..FOLDS).find_map(|held| failure(Some(held))) {
+            Some(Error::Undetermined(message)) => {
+                Error::Undetermined(format!("a search needs more than one part of the flights to judge by: without one tenth of the blocks, {message}"))
+            }
+            Some(error) => error,
+            None => Error::Undetermined(
+                "the flights hardly determine the coefficients of the model: some of its regressors are nearly linearly dependent; \
+                 give flights that move them apart, or set `enabled = false` on one of the effects"
+                    .into(),
+            ),
+        }
     }
 
     /// Weight of each channel: the inverse of its mean squared error.

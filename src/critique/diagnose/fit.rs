@@ -300,8 +300,8 @@ impl Component<'_> {
     }
 
     /// Squared errors of the blocks under coefficients found elsewhere; the properties of a flight are found from its blocks of other
-    /// folds.
-    pub fn errors_under(&self, solution: &Solution, folds: usize, fold: &dyn Fn(usize) -> usize) -> Option<Vec<(usize, Vec<f64>)>> {
+    /// folds, and are zero where no number fits.
+    pub fn errors_under(&self, solution: &Solution, folds: usize, fold: &dyn Fn(usize) -> usize) -> Vec<(usize, Vec<f64>)> {
         let mut errors: Vec<(usize, Vec<f64>)> =
             self.channels.iter().map(|(channel, ..)| (*channel, vec![0.0; self.blocks.len()])).collect();
         let any_local = (0..self.members.len()).any(|member| self.is_local(member));
@@ -312,14 +312,14 @@ impl Component<'_> {
                 solution.by_flight = self
                     .flights()
                     .into_iter()
-                    .map(|flight| Some((flight, self.local(flight, &weight, &solution.values)?)))
-                    .collect::<Option<_>>()?;
+                    .filter_map(|flight| Some((flight, self.local(flight, &weight, &solution.values)?)))
+                    .collect();
             }
             for index in (0..self.blocks.len()).filter(|&index| fold(index) == held) {
                 self.block_errors(&solution, index, &mut errors);
             }
         }
-        Some(errors)
+        errors
     }
 
     fn block_errors(&self, solution: &Solution, index: usize, errors: &mut [(usize, Vec<f64>)]) {

@@ -28,4 +28,4 @@ pub use report::{
     CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
 };
 pub use textbook::{Named, textbook};
-pub use verdict::{Options, Outcome, diagnose, nothing};
+pub use verdict::{Options, Outcome, diagnose};

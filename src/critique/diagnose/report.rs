@@ -27,7 +27,8 @@ pub enum Verdict {
 pub enum Status {
     /// Found missing.
     Accepted,
-    /// As good as certain to be there, but it would remove less than what is worth while.
+    /// As good as certain to be there, but it would remove less than what is worth while. Also an effect that was accepted and is no longer
+    /// worth while beside those accepted later.
     Negligible,
     /// Could be chance.
     NotSignificant,
@@ -219,6 +220,24 @@ pub struct DependsOn {
 }
 
 impl Diagnosis {
+    /// One that says nothing but its verdict, by this version of the program.
+    pub fn nothing(verdict: Verdict, summary: String) -> Self {
+        Self {
+            verdict,
+            summary,
+            accepted: Vec::new(),
+            steps: Vec::new(),
+            candidates: Vec::new(),
+            unknown: None,
+            locked: None,
+            method: None,
+            notes: Vec::new(),
+            seconds: 0.0,
+            version: env!("CARGO_PKG_VERSION").into(),
+            data_sha256: String::new(),
+        }
+    }
+
     /// Whether the flights that no search has seen show a fall of the error, beyond its 95 % interval, in a channel in which an accepted
     /// effect is worth while. Without such flights nothing is confirmed.
     pub fn is_confirmed(&self) -> bool {

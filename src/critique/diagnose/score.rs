@@ -115,15 +115,14 @@ impl Search<'_> {
         let gains: Vec<Vec<f64>> = trials.iter().map(|trial| gains(&pass.base, trial)).collect();
         let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
         let best = (0..trials.len()).max_by(|&left, &right| total(&gains[left]).total_cmp(&total(&gains[right])))?;
-        let flips = self.flips.as_ref()?;
         let raw: Vec<Option<Raw>> = trials.iter().map(|trial| raw_scores(&pass.base, trial, &pass.grams, weights)).collect();
         let p_value = if candidate.is_by_flight() {
             // The blocks of a flight share its numbers: a flight is flipped as a whole.
             let by_flight: Vec<Vec<f64>> = gains.iter().map(|gains| self.by_flight(gains)).collect();
-            flips.p_value_of_sums(&by_flight)
+            self.flips.p_value_of_sums(&by_flight)
         } else {
             let whitened: Vec<_> = raw.iter().flatten().filter_map(Raw::whitened).collect();
-            if whitened.is_empty() { 1.0 } else { flips.p_value(&whitened) }
+            if whitened.is_empty() { 1.0 } else { self.flips.p_value(&whitened) }
         };
         let movement = trials.iter().filter_map(|trial| {
             let raw = raw_scores(&pass.base, trial, &pass.grams, even)?;

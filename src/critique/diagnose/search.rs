@@ -1,7 +1,7 @@
 //! The search itself: forward steps, the gates each must pass, the backward check.
 
 use super::candidate::{Candidate, with};
-use super::describe::stability;
+use super::describe::{dropped, stability};
 use super::engine::{Engine, Trial};
 use super::gates::{CONTENDER, MOST_CONTENDERS, SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
 use super::report::{CandidateReport, Step};
@@ -61,7 +61,7 @@ impl Found {
 
 pub(super) struct Search<'a> {
     pub engine: Engine<'a>,
-    pub flips: Option<Flips>,
+    pub flips: Flips,
     pub largest_p: f64,
     pub options: &'a Options,
 }
@@ -114,8 +114,8 @@ impl Search<'_> {
             let passing: Vec<&Scored<'_>> = scored.iter().filter(|scored| scored.passes(self.largest_p)).collect();
             let best = passing.iter().max_by(|left, right| left.gain.total_cmp(&right.gain));
             let Some(best) = best.filter(|_| found.len() < self.options.max_effects) else {
-                let reports = self.reports(&open, &scored);
-                self.backward(&mut found, before)?;
+                let mut reports = self.reports(&open, &scored);
+                reports.splice(0..0, self.backward(&mut found, before)?);
                 return Ok((found, reports));
             };
             // The simplest of those that are as good to within one standard error.
@@ -180,10 +180,11 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// Drops accepted effects that the later ones have made needless, and refits.
-    pub(super) fn backward(&self, found: &mut Vec<Found>, before: &Model) -> Result<()> {
+    /// Drops accepted effects that the later ones have made needless, and refits; says which.
+    fn backward(&self, found: &mut Vec<Found>, before: &Model) -> Result<Vec<CandidateReport>> {
+        let mut reports = Vec::new();
         while found.len() > 1 {
-            let Some(last) = found.last() else { return Ok(()) };
+            let Some(last) = found.last() else { break };
             let without: Vec<Model> = found
                 .iter()
                 .map(|found| {
@@ -194,22 +195,20 @@ impl Search<'_> {
                 .collect();
             let pass = self.engine.pass(&last.model, &without)?;
             let whole = self.engine.mse(&pass.base);
-            let cost = |trial: &Option<Trial>| {
-                let Some(trial) = trial else { return f64::INFINITY };
+            // What it removes beside the others, by channel.
+            let falls = |trial: &Trial| {
                 let mse = self.engine.mse(trial);
-                (0..6).map(|channel| 1.0 - whole[channel] / mse[channel]).fold(f64::NEG_INFINITY, f64::max)
+                std::array::from_fn::<f64, 6, _>(|channel| 1.0 - whole[channel] / mse[channel])
             };
-            let costs: Vec<f64> = pass.trials.iter().map(cost).collect();
-            let Some(needless) = (0..costs.len()).min_by(|&left, &right| costs[left].total_cmp(&costs[right])) else {
-                return Ok(());
-            };
-            if costs[needless] >= SMALLEST_FALL {
-                return Ok(());
-            }
-            let needless = found[needless].step.effect.clone();
+            let cost = |falls: &[f64; 6]| falls.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let costs = found.iter().zip(&pass.trials).filter_map(|(found, trial)| Some((found, falls(trial.as_ref()?))));
+            let least = costs.min_by(|left, right| cost(&left.1).total_cmp(&cost(&right.1)));
+            let Some((needless, falls)) = least.filter(|least| cost(&least.1) < SMALLEST_FALL) else { break };
+            reports.push(dropped(needless, &falls));
+            let needless = needless.step.effect.clone();
             self.without(found, &[needless], before)?;
         }
-        Ok(())
+        Ok(reports)
     }
 
     /// Takes effects back and fits the models of all steps again.

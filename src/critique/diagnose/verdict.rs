@@ -2,18 +2,18 @@
 
 use super::candidate::candidates;
 use super::confirm::confirm;
-use super::describe::summary;
+use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, FOLDS};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
-use super::report::{CandidateReport, Diagnosis, Method, Status, Step, Verdict};
+use super::report::{Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
 use super::significance::Flips;
 use crate::critique::unknown::Unknown;
 use crate::error::Result;
 use crate::flight::{Flight, Span};
-use crate::physics::Model;
+use crate::physics::{Effect, Model};
 use phyture_kernels::random::permutation;
 use std::time::Instant;
 
@@ -75,28 +75,30 @@ pub fn diagnose(
     let mut candidates = candidates(model, flights);
     candidates.retain(|candidate| !options.without.contains(&candidate.id));
     let in_play = candidates.iter().filter(|candidate| candidate.inapplicable.is_none()).count().max(1);
-    let search = Search { engine, flips: None, largest_p: FAMILY_WISE / in_play as f64, options };
+    let largest_p = FAMILY_WISE / in_play as f64;
+    let count = engine.blocks.len();
     let method = Method {
-        blocks: search.engine.blocks.len(),
+        blocks: count,
         block_s,
         correlation_s: CORRELATION_S,
-        searched_s: search.engine.rows() as f64 * step_s,
+        searched_s: engine.rows() as f64 * step_s,
         seed: options.seed,
         effects_in_play: in_play,
-        largest_p_value: search.largest_p,
+        largest_p_value: largest_p,
         smallest_fall: SMALLEST_FALL,
     };
-    let mut diagnosis = Diagnosis { method: Some(method), ..nothing(Verdict::TooLittleData, String::new()) };
-    let count = search.engine.blocks.len();
     if count < FEWEST_BLOCKS {
-        diagnosis.summary = format!(
+        let summary = format!(
             "{count} blocks of {block_s:.0} s are too few to tell a missing effect from chance; {FEWEST_BLOCKS} are needed, that is {:.0} s of flight.",
             FEWEST_BLOCKS as f64 * SHORTEST_BLOCK_S
         );
-        diagnosis.seconds = begun.elapsed().as_secs_f64();
+        let seconds = begun.elapsed().as_secs_f64();
+        let diagnosis = Diagnosis { method: Some(method), seconds, ..Diagnosis::nothing(Verdict::TooLittleData, summary) };
         return Ok(Outcome { diagnosis, model: base });
     }
-    let search = Search { flips: Some(Flips::new(count, options.seed)), ..search };
+    let notes = model.effects.iter().filter_map(Effect::caution).collect();
+    let mut diagnosis = Diagnosis { method: Some(method), notes, ..Diagnosis::nothing(Verdict::Explained, String::new()) };
+    let search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
     let (before, held) = search.timing(&base)?;
     if let Some(delay_s) = held {
         diagnosis.notes.push(format!(
@@ -140,40 +142,6 @@ pub fn diagnose(
     Ok(Outcome { diagnosis, model: after })
 }
 
-/// A diagnosis that says nothing but its verdict.
-pub fn nothing(verdict: Verdict, summary: String) -> Diagnosis {
-    Diagnosis {
-        verdict,
-        summary,
-        accepted: Vec::new(),
-        steps: Vec::new(),
-        candidates: Vec::new(),
-        unknown: None,
-        locked: None,
-        method: None,
-        notes: Vec::new(),
-        seconds: 0.0,
-        version: env!("CARGO_PKG_VERSION").into(),
-        data_sha256: String::new(),
-    }
-}
-
-fn accepted(step: &Step) -> CandidateReport {
-    CandidateReport {
-        effect: step.effect.clone(),
-        status: Status::Accepted,
-        held_out_mse_fall: step.held_out_mse_fall.clone(),
-        p_value: Some(step.p_value),
-        detection_limit_mse_fall: None,
-        note: None,
-    }
-}
-
-fn taken_back(found: &Found) -> CandidateReport {
-    let note = "stands in for a stronger dependence that is in no effect of the catalogue".into();
-    CandidateReport { status: Status::SamePhysics, note: Some(note), ..accepted(&found.step) }
-}
-
 impl Search<'_> {
     /// Effects that only stand in for a dependence outside the catalogue.
     fn stand_ins(&self, found: &[Found], before: &Model, unknown: &[Unknown]) -> Result<Vec<String>> {
@@ -187,5 +155,82 @@ impl Search<'_> {
             effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
         };
         Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gram::tests::{model, noise, whole};
+    use super::super::report::{CandidateReport, Status};
+    use super::*;
+    use crate::flight::Column;
+    use crate::physics::{calibrate, catalogue};
+
+    /// Flights in which a stick rests but for one stretch of the first flight.
+    fn resting(stick: Column, moves: std::ops::Range<usize>) -> Result<Vec<Flight>> {
+        let one = |(index, flight): (usize, Flight)| {
+            let moved = |sample: usize| index == 0 && moves.contains(&sample);
+            let still = |(sample, value): (usize, &f64)| if moved(sample) { *value } else { 0.0 };
+            let column = |column: Column| match flight.column(column) {
+                values if column == stick => values.iter().enumerate().map(still).collect(),
+                values => values.to_vec(),
+            };
+            Flight::new(flight.name.clone(), "noise", 0.0, flight.step_s, Column::ALL.map(column), flight.targets)
+        };
+        noise(1, &[6000; 6]).into_iter().enumerate().map(one).collect()
+    }
+
+    fn refusal(flights: &[Flight]) -> String {
+        let found = diagnose(flights, &model(), &whole(flights), &[], "test", &Options::default());
+        found.map_or_else(|error| error.to_string(), |outcome| outcome.diagnosis.to_string())
+    }
+
+    #[test]
+    fn a_model_that_the_flights_do_not_determine_is_refused_as_calibration_does() -> Result<()> {
+        let flights = resting(Column::U3, 0..0)?;
+        let expected = calibrate(&model(), &flights, &whole(&flights)).map_or_else(|error| error.to_string(), |_| String::new());
+        assert!(expected.contains("`c_z` of effect `control_moment`"), "{expected}");
+        assert_eq!(refusal(&flights), expected);
+        Ok(())
+    }
+
+    /// A sum of three signals is the best single guess at two of them, and needless once both have names.
+    #[test]
+    fn an_effect_that_later_ones_make_needless_stays_among_the_candidates() -> Result<()> {
+        let mut flights = noise(1, &[6000; 6]);
+        for flight in &mut flights {
+            let mut accelerations = model().predict(flight)?;
+            for ((sample, value), (one, other)) in
+                accelerations[0].iter_mut().enumerate().zip(flight.column(Column::U1).iter().zip(flight.column(Column::U2)))
+            {
+                *value += one + other + 0.1 * flight.column(Column::VyDot)[sample];
+            }
+            // What the model says of the others would leave no error at all.
+            for (channel, values) in accelerations.iter_mut().enumerate().skip(1) {
+                values.iter_mut().zip(flight.column(Column::TARGETS[channel])).for_each(|(value, noise)| *value += noise);
+            }
+            *flight = flight.with_accelerations(&accelerations)?;
+        }
+        let mut model = model();
+        for (name, formula) in [("sum", "u1 + u2 + u3"), ("one", "u1"), ("other", "u2")] {
+            model.effects.push(Effect { enabled: false, ..Effect::formula(name, 0, formula, 0.0)? });
+        }
+        let without = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
+        let options = Options { without, ..Options::default() };
+        let found = diagnose(&flights, &model, &whole(&flights), &[], "test", &options)?.diagnosis;
+        let mut accepted = found.accepted.clone();
+        accepted.sort();
+        assert_eq!(accepted, ["one", "other"], "{found}");
+        let sum: Vec<&CandidateReport> = found.candidates.iter().filter(|candidate| candidate.effect == "sum").collect();
+        assert!(matches!(sum.as_slice(), [sum] if sum.status == Status::Negligible && sum.note.is_some()), "{found}");
+        assert!(sum[0].held_out_mse_fall.values().all(|fall| fall.abs() < SMALLEST_FALL), "{found}");
+        Ok(())
+    }
+
+    #[test]
+    fn a_model_that_one_block_alone_determines_is_refused() -> Result<()> {
+        let found = refusal(&resting(Column::U3, 1000..1200)?);
+        assert!(found.contains("`c_z` of effect `control_moment`") && found.contains("one tenth of the blocks"), "{found}");
+        Ok(())
     }
 }

@@ -4,7 +4,7 @@ use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet};
-use phyture::physics::{Calibration, Entry, Model, calibrate};
+use phyture::physics::{Calibration, Effect, Entry, Model, calibrate};
 use phyture::{Error, Result};
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -46,6 +46,8 @@ fn spans_s(set: &DataSet, spans: &[phyture::flight::Span]) -> f64 {
 pub fn fit(context: &Context, set: &DataSet, model: &Model, split: &Split) -> Result<(Model, Calibration, Map<String, Value>)> {
     let (calibrated, calibration) = calibrate(model, &set.flights, &split.training)?;
     context.say(format!("\n{calibration}"));
+    let cautions = calibrated.effects.iter().filter(|effect| effect.enabled).filter_map(Effect::caution);
+    cautions.for_each(|caution| context.say(format!("note: {caution}")));
     let parts = [
         ("train", &split.training),
         ("validation", &split.validation),

@@ -5,7 +5,7 @@ use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
-use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose, nothing};
+use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
@@ -48,7 +48,7 @@ impl Task<'_> {
 
 /// The verdict where the log is not what the program takes it for.
 fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
-    Diagnosis { data_sha256, ..nothing(Verdict::ConventionFault, summary) }
+    Diagnosis { data_sha256, ..Diagnosis::nothing(Verdict::ConventionFault, summary) }
 }
 
 /// A folder for a page and what stands in it besides the diagnosis.
