@@ -16,7 +16,7 @@
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
 use crate::dropout::{Mask, MaskLanes};
-use crate::elementary::exp;
+use crate::elementary::exp_negative;
 use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
@@ -118,7 +118,7 @@ fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>,
 #[inline(always)]
 fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(s: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>) {
     let mut sink = Store { c, bias: None, write: Write::Add };
-    tile::columns::<T, I, _, MR, NR>((s.rows(), s.cols(), b.cols()), |p| s.row(p), |p| b.row(p), &mut sink);
+    tile::columns::<T, I, _, MR, NR>(&s, &b, &mut sink);
 }
 
 /// o and `log_sum_exp` `[heads, queries]` from q, k, v.
@@ -184,12 +184,9 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
                         RowsMut::packed(scores, key_end - key, block),
                         Write::Set,
                     );
-                    softmax_block::<T, I, NR>(block, scores, largest, total, factor);
+                    softmax_block::<T, I, NR>(block, key, mask.as_ref(), scores, largest, total, factor);
                     for (row, factor) in sums.chunks_exact_mut(wide).zip(factor.iter()) {
                         row.iter_mut().for_each(|x| *x *= *factor);
-                    }
-                    if let Some(mask) = &mask {
-                        scores.chunks_exact_mut(block).enumerate().for_each(|(j, row)| mask.drop(key + j, row));
                     }
                     let (scores, values) = (Rows::packed(scores, key_end - key, block), Rows::packed(values, keys, wide));
                     transposed_product::<T, I, MR, NR>(scores, values.range(key, key_end), RowsMut::packed(sums, block, wide));
@@ -205,11 +202,14 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     }
 }
 
-/// One step of the online softmax over a block of scores `[keys, lanes]`: scores become e^(s − m) with the new largest score m of
-/// each lane; `total` and what else was summed so far is to be multiplied with `factor` = e^(m_old − m).
+/// One step of the online softmax over a block of scores `[keys, lanes]`, from key `first_key`, which is even. Scores become
+/// m∘e^(s − largest) with the new largest score of each lane and the dropout mask m; `total`, of e^(s − largest), and what else was
+/// summed so far is to be multiplied with `factor` = e^(old − new).
 #[inline(always)]
 fn softmax_block<T: Real, I: Isa, const NR: usize>(
     block: usize,
+    first_key: usize,
+    mask: Option<&MaskLanes<QUERIES>>,
     scores: &mut [T],
     largest: &mut [T],
     total: &mut [T],
@@ -225,14 +225,20 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
             }
         }
         for ((factor, old), new) in factor.iter_mut().zip(*largest).zip(m) {
-            *factor = exp::<T, I>(old - new);
+            *factor = exp_negative::<T, I>(old - new);
         }
         let mut sum = [T::ZERO; NR];
-        for row in scores.chunks_exact_mut(block) {
-            let row = &mut row.as_chunks_mut::<NR>().0[chunk];
-            for ((s, m), sum) in row.iter_mut().zip(&m).zip(&mut sum) {
-                *s = exp::<T, I>(*s - *m);
-                *sum += *s;
+        for (rows, key) in scores.chunks_mut(2 * block).zip((first_key..).step_by(2)) {
+            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
+            for (i, row) in rows.chunks_exact_mut(block).enumerate() {
+                let row = &mut row.as_chunks_mut::<NR>().0[chunk];
+                for ((s, m), sum) in row.iter_mut().zip(&m).zip(&mut sum) {
+                    *s = exp_negative::<T, I>(*s - *m);
+                    *sum += *s;
+                }
+                if let Some(keeps) = &keeps {
+                    row.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
+                }
             }
         }
         for ((total, factor), sum) in total.iter_mut().zip(factor).zip(sum) {
@@ -345,18 +351,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
                         RowsMut::packed(d_scores, count, block),
                         Write::Set,
                     );
-                    for (j, (s, ds)) in scores.chunks_exact_mut(block).zip(d_scores.chunks_exact_mut(block)).enumerate() {
-                        if let Some(mask) = &mask {
-                            mask.drop(key + j, ds);
-                        }
-                        for (((s, ds), l), mean) in s.iter_mut().zip(ds.iter_mut()).zip(log_sum_exp.iter()).zip(means.iter()) {
-                            *s = exp::<T, I>(*s - *l);
-                            *ds = *s * (*ds - *mean);
-                        }
-                        if let Some(mask) = &mask {
-                            mask.drop(key + j, s);
-                        }
-                    }
+                    gradient_block::<T, I, NR>(block, key, mask.as_ref(), scores, d_scores, log_sum_exp, means);
                     let target = |sums| RowsMut::packed(sums, count, wide);
                     let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
                     product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
@@ -368,6 +363,42 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
             }
             emit(key_sums, wide, keys, dk.reborrow().columns(h * size, size), write_k);
             emit(value_sums, wide, keys, dv.reborrow().columns(h * size, size), write_v);
+        }
+    }
+}
+
+/// Over a block `[keys, lanes]` from key `first_key`, which is even: scores become m∘p, and the gradients of m∘p become those of the
+/// scores, p∘(m∘dp − D).
+#[inline(always)]
+fn gradient_block<T: Real, I: Isa, const NR: usize>(
+    block: usize,
+    first_key: usize,
+    mask: Option<&MaskLanes<QUERIES>>,
+    scores: &mut [T],
+    d_scores: &mut [T],
+    log_sum_exp: &[T],
+    means: &[T],
+) {
+    let lanes = log_sum_exp.as_chunks::<NR>().0.iter().zip(means.as_chunks::<NR>().0);
+    for (chunk, (log_sum_exp, means)) in lanes.enumerate() {
+        let pairs = scores.chunks_mut(2 * block).zip(d_scores.chunks_mut(2 * block));
+        for ((rows, d_rows), key) in pairs.zip((first_key..).step_by(2)) {
+            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
+            for (i, (row, d_row)) in rows.chunks_exact_mut(block).zip(d_rows.chunks_exact_mut(block)).enumerate() {
+                let (row, d_row) = (&mut row.as_chunks_mut::<NR>().0[chunk], &mut d_row.as_chunks_mut::<NR>().0[chunk]);
+                for (p, l) in row.iter_mut().zip(log_sum_exp) {
+                    *p = exp_negative::<T, I>(*p - *l);
+                }
+                if let Some(keeps) = &keeps {
+                    d_row.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
+                }
+                for ((ds, p), mean) in d_row.iter_mut().zip(&*row).zip(means) {
+                    *ds = *p * (*ds - *mean);
+                }
+                if let Some(keeps) = &keeps {
+                    row.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
+                }
+            }
         }
     }
 }

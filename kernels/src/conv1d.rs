@@ -404,21 +404,38 @@ pub(crate) struct BackwardWeight<'a, T> {
     write: Write,
 }
 
-/// Rows of x and dz that are summed for all taps before the next ones are read: they stay in the second-level cache.
-const TIME_BLOCK: usize = 256;
+/// Rows of dz, and of x for all taps, that are summed before the next ones are read. The x of a block stays in the first-level
+/// cache while every tile of the weight passes over it.
+const TIME_BLOCK: usize = 96;
 
 impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         let (n, inputs, outputs) = (self.dz.rows(), self.x.cols(), self.dz.cols());
-        let shifted = Shifted { x: self.x, taps: self.geometry.taps, left: self.geometry.left, rows: n };
-        for start in (0..n.max(1)).step_by(TIME_BLOCK) {
-            let depth = TIME_BLOCK.min(n - start);
+        let Geometry { left, .. } = self.geometry;
+        if n == 0 && self.write == Write::Set {
+            self.dweight.fill(T::ZERO);
+        }
+        for start in (0..n).step_by(TIME_BLOCK) {
+            let end = n.min(start + TIME_BLOCK);
             let write = if start == 0 { self.write } else { Write::Add };
             for (j, dw) in self.dweight.chunks_exact_mut((inputs * outputs).max(1)).enumerate() {
-                let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
-                let (left, right) = (|p| self.x.row(shifted.source(start + p, j)), |p| self.dz.row(start + p));
-                tile::columns::<T, I, _, MR, NR>((depth, inputs, outputs), left, right, &mut sink);
+                // Output rows up to `inner` read the first row of x, from `behind` on the last one.
+                let inner = left.saturating_sub(j).clamp(start, end);
+                let behind = (self.x.rows() + left).saturating_sub(j).clamp(inner, end);
+                let parts = [
+                    (start, inner, Rows::repeated(self.x.row(0), inner - start)),
+                    (inner, behind, self.x.range((inner + j).saturating_sub(left).min(self.x.rows()), self.x.rows())),
+                    (behind, end, Rows::repeated(self.x.row(self.x.rows() - 1), end - behind)),
+                ];
+                let mut write = write;
+                for (first, last, x) in parts {
+                    if first < last {
+                        let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
+                        tile::columns::<T, I, _, MR, NR>(&x.range(0, last - first), &self.dz.range(first, last), &mut sink);
+                        write = Write::Add;
+                    }
+                }
             }
         }
     }

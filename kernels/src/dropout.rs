@@ -4,8 +4,9 @@
 //! y = m∘x / (1 − p),  m_ij = 0 with probability p;   dx = m∘dy / (1 − p)
 //! ```
 //!
-//! Element (i, j) is dropped when word j of the mask's sub-stream i lies below ⌊p·2³²⌉. The scale is the reciprocal of the keep
-//! probability that this threshold realises, so that the mean of y over masks is exactly x.
+//! A word of the mask's sub-stream i serves two neighbouring columns: its low half column 2w, its high half column 2w + 1. An
+//! element is dropped when its half, as a signed number, lies below a bound chosen so that the share is ⌊p·2¹⁶⌉/2¹⁶. The scale is
+//! the reciprocal of the keep probability that this bound realises, so that the mean of y over masks is exactly x.
 
 use crate::level::{Isa, Kernel, Level};
 use crate::random::{Stream, word};
@@ -16,20 +17,21 @@ use crate::{Real, Rows, RowsMut, Write};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mask {
     stream: Stream,
-    threshold: u32,
+    /// Of 2¹⁶ halves, how many are dropped.
+    dropped: u16,
 }
 
 impl Mask {
     /// Drops each element with probability `rate`, 0 ≤ rate < 1 (other values are clamped into that range; NaN is 0).
     pub fn new(stream: Stream, rate: f64) -> Self {
         // A float-to-integer cast saturates, and so does the rate.
-        Self { stream, threshold: (rate * TWO_POW_32).round() as u32 }
+        Self { stream, dropped: (rate * HALVES).round() as u16 }
     }
 
     /// The mask's words for one row.
     #[inline(always)]
     pub(crate) const fn row(self, row: usize) -> MaskRow {
-        MaskRow { stream: self.stream.sub(row as u64), threshold: self.threshold }
+        MaskRow { stream: self.stream.sub(row as u64), bound: self.bound() }
     }
 
     /// Whether element (row, column) is kept.
@@ -39,48 +41,83 @@ impl Mask {
 
     /// What a kept element is multiplied with: 1 / (1 − p).
     pub fn scale(self) -> f64 {
-        1.0 / (1.0 - f64::from(self.threshold) / TWO_POW_32)
+        1.0 / (1.0 - f64::from(self.dropped) / HALVES)
+    }
+
+    /// Halves, moved to the upper half of a signed word, are kept from here on: one comparison a register, where an unsigned one
+    /// takes two.
+    const fn bound(self) -> i32 {
+        ((self.dropped as i32) << 16).wrapping_add(i32::MIN)
     }
 }
 
-const TWO_POW_32: f64 = 4_294_967_296.0;
+/// 2¹⁶: values of half a word.
+const HALVES: f64 = 65_536.0;
 
 /// The mask's words for up to N neighbouring rows, one row a lane.
 pub(crate) struct MaskLanes<const N: usize> {
     low: [u32; N],
     high: [u32; N],
-    threshold: u32,
+    bound: i32,
 }
 
 impl<const N: usize> MaskLanes<N> {
     #[inline(always)]
     pub(crate) fn new(mask: Mask, first_row: usize) -> Self {
-        let mut lanes = Self { low: [0; N], high: [0; N], threshold: mask.threshold };
+        let mut lanes = Self { low: [0; N], high: [0; N], bound: mask.bound() };
         for (i, (low, high)) in lanes.low.iter_mut().zip(&mut lanes.high).enumerate() {
             (*low, *high) = mask.stream.sub((first_row + i) as u64).halves();
         }
         lanes
     }
 
-    /// Makes the values of dropped elements 0: lane i of `values` is element (first row + i, column).
+    /// Lanes `chunk·NR…`, as arrays of NR.
     #[inline(always)]
-    pub(crate) fn drop<T: Real>(&self, column: usize, values: &mut [T]) {
-        for ((x, low), high) in values.iter_mut().zip(&self.low).zip(&self.high) {
-            *x = if word(*low, *high, column as u32) >= self.threshold { *x } else { T::ZERO };
+    pub(crate) fn chunk<const NR: usize>(&self, chunk: usize) -> MaskChunk<'_, NR> {
+        MaskChunk { low: &self.low.as_chunks::<NR>().0[chunk], high: &self.high.as_chunks::<NR>().0[chunk], bound: self.bound }
+    }
+}
+
+/// NR rows of a mask, one row a lane.
+#[derive(Clone, Copy)]
+pub(crate) struct MaskChunk<'a, const NR: usize> {
+    low: &'a [u32; NR],
+    high: &'a [u32; NR],
+    bound: i32,
+}
+
+impl<const NR: usize> MaskChunk<'_, NR> {
+    /// For an even column and the next one, 1 where an element is kept and 0 where it is dropped, lane by lane. Factors and not
+    /// conditions: what follows is then arithmetic on floats alone, which vectorises whatever it is.
+    #[inline(always)]
+    pub(crate) fn pair<T: Real>(self, even_column: usize) -> [[T; NR]; 2] {
+        let mut words = [0; NR];
+        for ((to, low), high) in words.iter_mut().zip(self.low).zip(self.high) {
+            *to = word(*low, *high, even_column as u32 >> 1);
         }
+        let mut factors = [[T::ZERO; NR]; 2];
+        for (to, word) in factors[0].iter_mut().zip(&words) {
+            *to = if (*word << 16) as i32 >= self.bound { T::ONE } else { T::ZERO };
+        }
+        for (to, word) in factors[1].iter_mut().zip(&words) {
+            *to = if *word as i32 >= self.bound { T::ONE } else { T::ZERO };
+        }
+        factors
     }
 }
 
 #[derive(Clone, Copy)]
 pub(crate) struct MaskRow {
     stream: Stream,
-    threshold: u32,
+    bound: i32,
 }
 
 impl MaskRow {
     #[inline(always)]
     pub(crate) const fn keeps(self, column: usize) -> bool {
-        self.stream.word(column as u32) >= self.threshold
+        // An even column's half is moved up; an odd column's is there already.
+        let up = 16 & !(column as u32).wrapping_mul(16);
+        (self.stream.word(column as u32 >> 1) << up) as i32 >= self.bound
     }
 }
 
@@ -147,10 +184,11 @@ mod tests {
         #[test]
         fn lanes_are_the_rows(row in 0_usize..10_000, column in 0_usize..10_000, seed: u64) {
             let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.5);
-            let mut values = [1.0_f32; 8];
-            MaskLanes::<8>::new(mask, row).drop(column, &mut values);
-            let expected: Vec<f32> = (row..row + 8).map(|i| f32::from(u8::from(mask.keeps(i, column)))).collect();
-            assert_eq!(values.to_vec(), expected);
+            let (lanes, even) = (MaskLanes::<8>::new(mask, row), 2 * (column / 2));
+            let chunk = lanes.chunk::<8>(0);
+            for (column, factors) in (even..).zip(chunk.pair::<f32>(even)) {
+                assert_eq!(factors.map(|factor| factor == 1.0).to_vec(), (row..row + 8).map(|i| mask.keeps(i, column)).collect::<Vec<_>>());
+            }
         }
 
         #[test]

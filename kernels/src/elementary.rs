@@ -35,6 +35,10 @@ pub trait Elementary: Sized + 'static {
     const ROUNDER: Self;
     /// self·2ᵏ, where `rounded` = k + [`Self::ROUNDER`]; in two steps, so that k may leave the range of exponents.
     fn times_power_of_two(self, rounded: Self) -> Self;
+    /// The same where self·2ᵏ is neither subnormal nor infinite: one addition of integers.
+    fn times_normal_power_of_two(self, rounded: Self) -> Self;
+    /// Below this eˣ is subnormal, or 0.
+    const EXP_SUBNORMAL: Self;
 }
 
 #[expect(clippy::excessive_precision, reason = "decimal digits enough for the exact binary value")]
@@ -49,6 +53,12 @@ impl Elementary for f32 {
     const LOG2_E: Self = std::f32::consts::LOG2_E;
     const EXP_RANGE: [Self; 2] = [-104.0, 89.0];
     const ROUNDER: Self = 12_582_912.0;
+    const EXP_SUBNORMAL: Self = -87.0;
+    #[inline(always)]
+    fn times_normal_power_of_two(self, rounded: Self) -> Self {
+        // The low bits of the rounder are 0: what is shifted out of `rounded` is the rounder, what remains is k.
+        Self::from_bits(self.to_bits().wrapping_add(rounded.to_bits() << 23))
+    }
     #[inline(always)]
     fn times_power_of_two(self, rounded: Self) -> Self {
         let k = (rounded.to_bits() as i32).wrapping_sub(Self::ROUNDER.to_bits() as i32);
@@ -123,6 +133,11 @@ impl Elementary for f64 {
     const LOG2_E: Self = std::f64::consts::LOG2_E;
     const EXP_RANGE: [Self; 2] = [-746.0, 710.0];
     const ROUNDER: Self = 6_755_399_441_055_744.0;
+    const EXP_SUBNORMAL: Self = -708.0;
+    #[inline(always)]
+    fn times_normal_power_of_two(self, rounded: Self) -> Self {
+        Self::from_bits(self.to_bits().wrapping_add(rounded.to_bits() << 52))
+    }
     #[inline(always)]
     fn times_power_of_two(self, rounded: Self) -> Self {
         // The difference of the bit patterns fits 32 bits, which every level can shift arithmetically.
@@ -150,6 +165,17 @@ pub(crate) fn exp<T: Real, I: Isa>(x: T) -> T {
     let r = I::mul_add(-k, T::LN_2[1], I::mul_add(-k, T::LN_2[0], x));
     let power = I::mul_add(polynomial::<T, I>(T::EXP, r), r * r, r) + T::ONE;
     power.times_power_of_two(rounded)
+}
+
+/// eˣ for x ≤ 0, and 0 in the place of subnormal numbers: two thirds of the instructions of [`exp`]. The
+/// processor's own NaN gives NaN.
+#[inline(always)]
+pub(crate) fn exp_negative<T: Real, I: Isa>(x: T) -> T {
+    let rounded = I::mul_add(x, T::LOG2_E, T::ROUNDER);
+    let k = rounded - T::ROUNDER;
+    let r = I::mul_add(-k, T::LN_2[1], I::mul_add(-k, T::LN_2[0], x));
+    let power = I::mul_add(polynomial::<T, I>(T::EXP, r), r * r, r) + T::ONE;
+    if x < T::EXP_SUBNORMAL { T::ZERO } else { power.times_normal_power_of_two(rounded) }
 }
 
 /// tanh x

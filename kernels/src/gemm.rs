@@ -112,8 +112,7 @@ impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
         for (start, end) in blocks(self.a.rows()) {
             let write = if start == 0 { self.write } else { Write::Add };
             let mut sink = Store { c: self.c.reborrow(), bias: None, write };
-            let shape = (end - start, self.a.cols(), self.b.cols());
-            tile::columns::<T, I, _, MR, NR>(shape, |p| self.a.row(start + p), |p| self.b.row(start + p), &mut sink);
+            tile::columns::<T, I, _, MR, NR>(&self.a.range(start, end), &self.b.range(start, end), &mut sink);
         }
     }
 }

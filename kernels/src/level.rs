@@ -11,6 +11,7 @@ use std::marker::PhantomData;
 use std::sync::OnceLock;
 
 use crate::Real;
+use crate::vector::{Array, Vector};
 
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
 pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
@@ -195,6 +196,9 @@ pub(crate) trait Isa {
     /// Multiply-add is one instruction; where it is not, `mul_add` would be a call of the maths library.
     const FMA: bool;
 
+    /// One register of numbers.
+    type Vector<T: Real>: Vector<T>;
+
     /// Runs a body with the accumulator tile that fills this level's registers: two registers wide, as tall as leaves room for
     /// two of the right operand and one of the left.
     fn tiled<T: Real, K: Tiled<T>>(kernel: K);
@@ -209,42 +213,46 @@ pub(crate) trait Isa {
 pub(crate) struct Plain;
 impl Isa for Plain {
     const FMA: bool = false;
+    type Vector<T: Real> = Array<T, 4, false>;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
-        if size_of::<T>() == 4 { kernel.run::<Self, 4, 8>() } else { kernel.run::<Self, 4, 4>() }
+        T::plain_tile(kernel);
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-struct Avx2;
+pub(crate) struct Avx2;
 #[cfg(target_arch = "x86_64")]
 impl Isa for Avx2 {
     const FMA: bool = true;
+    type Vector<T: Real> = T::Avx2;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
-        if size_of::<T>() == 4 { kernel.run::<Self, 6, 16>() } else { kernel.run::<Self, 6, 8>() }
+        T::avx2_tile(kernel);
     }
 }
 
 #[cfg(target_arch = "x86_64")]
-struct Avx512;
+pub(crate) struct Avx512;
 #[cfg(target_arch = "x86_64")]
 impl Isa for Avx512 {
     const FMA: bool = true;
+    type Vector<T: Real> = T::Avx512;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
-        if size_of::<T>() == 4 { kernel.run::<Self, 12, 32>() } else { kernel.run::<Self, 12, 16>() }
+        T::avx512_tile(kernel);
     }
 }
 
 #[cfg(target_arch = "aarch64")]
-struct Neon;
+pub(crate) struct Neon;
 #[cfg(target_arch = "aarch64")]
 impl Isa for Neon {
     const FMA: bool = true;
+    type Vector<T: Real> = Array<T, 4, true>;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
-        if size_of::<T>() == 4 { kernel.run::<Self, 8, 8>() } else { kernel.run::<Self, 8, 4>() }
+        T::neon_tile(kernel);
     }
 }
 

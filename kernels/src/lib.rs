@@ -34,6 +34,7 @@ pub mod temporal;
 mod testing;
 mod tile;
 pub mod tolerance;
+mod vector;
 
 pub use level::Level;
 pub use real::Real;

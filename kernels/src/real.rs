@@ -6,13 +6,14 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 use crate::compiled::Compiled;
 use crate::elementary::Elementary;
+use crate::vector::Registers;
 
 /// f32 or f64: one generic source, two instantiations.
 #[rustfmt::skip]
 pub trait Real:
     Copy + Default + Debug + Display + PartialOrd + Send + Sync + 'static + Sum
     + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
-    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary + Compiled
+    + AddAssign + SubAssign + MulAssign + DivAssign + Elementary + Compiled + Registers
 {
     /// 0
     const ZERO: Self;

@@ -48,6 +48,21 @@ impl<'a, T> Rows<'a, T> {
         Self::new(data, rows, cols, cols)
     }
 
+    /// The same row `rows` times.
+    pub fn repeated(row: &'a [T], rows: usize) -> Self {
+        Self { data: row, rows, cols: row.len(), stride: 0 }
+    }
+
+    /// Columns `j…j + N` of row `i`.
+    ///
+    /// # Safety
+    /// `i` must be less than the number of rows, and `j + N` no more than the number of columns.
+    #[inline(always)]
+    pub(crate) unsafe fn chunk_unchecked<const N: usize>(&self, i: usize, j: usize) -> &'a [T; N] {
+        // SAFETY: every constructor checks that the slice holds (rows − 1)·stride + cols numbers, unless the view is empty.
+        unsafe { &*self.data.as_ptr().add(i * self.stride + j).cast::<[T; N]>() }
+    }
+
     /// Number of rows.
     pub const fn rows(&self) -> usize {
         self.rows

@@ -11,6 +11,7 @@
 //! Not here: blocking for the caches (gemm.rs), shapes, dispatch.
 
 use crate::level::Isa;
+use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Widest panel of any level, in numbers.
@@ -55,10 +56,42 @@ impl<T> LeftRows<T> for Rows<'_, T> {
     }
 }
 
+/// A row of a tile in registers: NR numbers, whatever the level.
+type Pair<T, I> = [<I as Isa>::Vector<T>; 2];
+
 /// Where finished sums go.
-pub(crate) trait Sink<T> {
+pub(crate) trait Sink<T: Real> {
     /// `sums` belong to row `i`, columns `j…`.
     fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]);
+
+    /// The same for a whole row of a tile, still in its registers.
+    #[inline(always)]
+    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: Pair<T, I>) {
+        self.store::<I>(i, j, &unload::<T, I, NR>(sums));
+    }
+}
+
+/// Registers as numbers in memory.
+#[inline(always)]
+fn unload<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>) -> [T; NR] {
+    assert_eq!(NR, 2 * I::Vector::<T>::LANES, "a panel is two registers wide");
+    let mut numbers = [T::ZERO; NR];
+    let to = numbers.as_mut_ptr();
+    // SAFETY: the array holds two registers.
+    unsafe {
+        pair[0].store(to);
+        pair[1].store(to.add(I::Vector::<T>::LANES));
+    }
+    numbers
+}
+
+/// NR numbers as registers.
+#[inline(always)]
+fn load<T: Real, I: Isa, const NR: usize>(numbers: &[T; NR]) -> Pair<T, I> {
+    assert_eq!(NR, 2 * I::Vector::<T>::LANES, "a panel is two registers wide");
+    let from = numbers.as_ptr();
+    // SAFETY: the array holds two registers.
+    unsafe { [I::Vector::load(from), I::Vector::load(from.add(I::Vector::<T>::LANES))] }
 }
 
 /// Overwrites or adds, after adding a bias a column if there is one.
@@ -77,6 +110,30 @@ impl<T: Real> Sink<T> for Store<'_, T> {
             (Write::Add, None) => c.iter_mut().zip(sums).for_each(|(c, s)| *c += *s),
             (Write::Set, Some(b)) => c.iter_mut().zip(sums).zip(&b[j..]).for_each(|((c, s), b)| *c = *s + *b),
             (Write::Add, Some(b)) => c.iter_mut().zip(sums).zip(&b[j..]).for_each(|((c, s), b)| *c += *s + *b),
+        }
+    }
+
+    #[inline(always)]
+    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: Pair<T, I>) {
+        let mut sums = sums;
+        let add = |sums: &mut Pair<T, I>, numbers: &[T]| {
+            if let Some(numbers) = numbers.first_chunk::<NR>() {
+                let more = load::<T, I, NR>(numbers);
+                sums.iter_mut().zip(more).for_each(|(sum, more)| *sum = sum.add(more));
+            }
+        };
+        if let Some(bias) = self.bias {
+            add(&mut sums, &bias[j..]);
+        }
+        let c = &mut self.c.row_mut(i)[j..][..NR];
+        if self.write == Write::Add {
+            add(&mut sums, c);
+        }
+        let to = c.as_mut_ptr();
+        // SAFETY: c was cut to NR numbers, which are two registers.
+        unsafe {
+            sums[0].store(to);
+            sums[1].store(to.add(I::Vector::<T>::LANES));
         }
     }
 }
@@ -121,13 +178,33 @@ pub(crate) fn pack_transposed<'b, T: Real, const NR: usize>(
     }
 }
 
-/// The accumulators in memory, where variables may index them. The originals are touched at fixed places only: otherwise the
-/// compiler would keep them in memory all through the inner loop.
+/// Stores the rows of a whole tile. Written out, so that no variable indexes the accumulators: otherwise the compiler would keep
+/// them in memory, all through the inner loop.
+macro_rules! store_rows {
+    ($acc:ident, |$i:ident, $sums:ident| $store:expr) => {
+        store_rows!(@ $acc, |$i, $sums| $store, 0 1 2 3 4 5 6 7 8 9 10 11)
+    };
+    (@ $acc:ident, |$i:ident, $sums:ident| $store:expr, $($row:literal)*) => {
+        $(if $row < MR {
+            let ($i, $sums) = ($row, $acc[$row]);
+            $store;
+        })*
+    };
+}
+
+/// The accumulators in memory, where variables may index them, for the tiles at the edges.
 #[inline(always)]
-fn spill<T: Real, const MR: usize, const NR: usize>(acc: &[[T; NR]; MR]) -> [[T; NR]; MR] {
-    let mut copy = [[T::ZERO; NR]; MR];
-    copy.iter_mut().zip(acc).for_each(|(copy, acc)| *copy = *acc);
-    copy
+fn spill<T: Real, I: Isa, const MR: usize, const NR: usize>(acc: [Pair<T, I>; MR]) -> [[T; NR]; MR] {
+    let mut rows = [[T::ZERO; NR]; MR];
+    rows.iter_mut().zip(acc).for_each(|(row, pair)| *row = unload::<T, I, NR>(pair));
+    rows
+}
+
+/// `acc[i] += a·b` for both registers of a row.
+#[inline(always)]
+fn accumulate<T: Real, I: Isa>(acc: &mut Pair<T, I>, a: T, b: Pair<T, I>) {
+    let a = I::Vector::splat(a);
+    *acc = [a.mul_add(b[0], acc[0]), a.mul_add(b[1], acc[1])];
 }
 
 /// One tile of the row form: rows `first…first + MR` (the last row again beyond the end), one panel.
@@ -136,25 +213,25 @@ fn row_tile<T: Real, I: Isa, L: LeftRows<T>, const MR: usize, const NR: usize>(
     left: &L,
     first: usize,
     panel: &[[T; NR]],
-) -> [[T; NR]; MR] {
+) -> [Pair<T, I>; MR] {
     let (depth, last) = (left.depth(), left.rows() - 1);
-    let mut acc = [[T::ZERO; NR]; MR];
+    let mut acc = [[I::Vector::splat(T::ZERO); 2]; MR];
     for (tap, lines) in panel.chunks_exact(depth).enumerate() {
         // Not array::from_fn: its closure is not always inlined, and then the lengths are lost.
         let mut pieces: [&[T]; MR] = [&[]; MR];
         for (i, piece) in pieces.iter_mut().enumerate() {
             *piece = &left.piece((first + i).min(last), tap)[..depth];
         }
-        for (p, line) in lines.iter().enumerate().take(depth) {
+        for (p, line) in lines.iter().enumerate() {
+            let b = load::<T, I, NR>(line);
             for i in 0..MR {
-                let a = pieces[i][p];
-                for j in 0..NR {
-                    acc[i][j] = I::mul_add(a, line[j], acc[i][j]);
-                }
+                // SAFETY: a chunk has `depth` lines, and each piece was cut to `depth` above.
+                let a = unsafe { *pieces[i].get_unchecked(p) };
+                accumulate::<T, I>(&mut acc[i], a, b);
             }
         }
     }
-    spill(&acc)
+    acc
 }
 
 /// sink ← left·right for a right operand of `n` columns in panels of depth taps·depth.
@@ -178,13 +255,11 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
             let panel = panel.as_chunks::<NR>().0;
             let width = NR.min(n - j);
             for first in (block..block_end).step_by(MR) {
-                let acc: [[T; NR]; MR] = row_tile::<T, I, L, MR, NR>(left, first, panel);
+                let acc = row_tile::<T, I, L, MR, NR>(left, first, panel);
                 if width == NR && first + MR <= block_end {
-                    for (i, sums) in acc.iter().enumerate() {
-                        sink.store::<I>(first + i, j, sums);
-                    }
+                    store_rows!(acc, |i, sums| sink.store_whole::<I, NR>(first + i, j, sums));
                 } else {
-                    for (i, sums) in acc.iter().enumerate().take(block_end - first) {
+                    for (i, sums) in spill::<T, I, MR, NR>(acc).iter().enumerate().take(block_end - first) {
                         sink.store::<I>(first + i, j, &sums[..width]);
                     }
                 }
@@ -193,81 +268,77 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     }
 }
 
-/// One tile of the column form: `acc[i][j] = Σ_p left(p)[i]·right(p)[j]`.
+/// One tile of the column form: `acc[i][j] = Σ_p left[p][i₀ + i]·right[p][j₀ + j]`.
 #[inline(always)]
-fn column_tile<'a, T: Real, I: Isa, const MR: usize, const NR: usize>(
-    depth: usize,
-    left: impl Fn(usize) -> &'a [T],
-    right: impl Fn(usize) -> &'a [T],
-) -> [[T; NR]; MR] {
-    let mut acc = [[T::ZERO; NR]; MR];
-    for p in 0..depth {
-        let (a, b) = (&left(p)[..MR], &right(p)[..NR]);
+fn column_tile<T: Real, I: Isa, const MR: usize, const NR: usize>(
+    (left, i_first): (&Rows<'_, T>, usize),
+    (right, j_first): (&Rows<'_, T>, usize),
+) -> [Pair<T, I>; MR] {
+    assert!(
+        i_first + MR <= left.cols() && j_first + NR <= right.cols() && left.rows() <= right.rows(),
+        "a tile beyond its operands"
+    );
+    let mut acc = [[I::Vector::splat(T::ZERO); 2]; MR];
+    for p in 0..left.rows() {
+        // SAFETY: p is a row of both operands, whose columns were checked above.
+        let b = load::<T, I, NR>(unsafe { right.chunk_unchecked(p, j_first) });
+        // SAFETY: as above.
+        let a: &[T; MR] = unsafe { left.chunk_unchecked(p, i_first) };
         for i in 0..MR {
-            for j in 0..NR {
-                acc[i][j] = I::mul_add(a[i], b[j], acc[i][j]);
-            }
+            accumulate::<T, I>(&mut acc[i], a[i], b);
         }
     }
-    spill(&acc)
+    acc
 }
 
-/// sink ← leftᵀ·right: row p of the left operand is `left(p)` `[m]`, of the right one `right(p)` `[n]`; p < depth.
+/// sink ← leftᵀ·right, left `[depth, m]`, right `[depth, n]`.
 #[inline(always)]
-pub(crate) fn columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
-    (depth, m, n): (usize, usize, usize),
-    left: impl Fn(usize) -> &'a [T],
-    right: impl Fn(usize) -> &'a [T],
+pub(crate) fn columns<T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
+    left: &Rows<'_, T>,
+    right: &Rows<'_, T>,
     sink: &mut S,
 ) {
+    let (m, n) = (left.cols(), right.cols());
     // The last tile starts early enough to be whole; what it repeats is not stored again.
     for j_wanted in (0..n).step_by(NR) {
         let j = j_wanted.min(n.saturating_sub(NR));
         for i_wanted in (0..m).step_by(MR) {
             let i = i_wanted.min(m.saturating_sub(MR));
-            if m >= MR && n >= NR {
-                let acc: [[T; NR]; MR] = column_tile::<T, I, MR, NR>(depth, |p| &left(p)[i..], |p| &right(p)[j..]);
-                if i == i_wanted && j == j_wanted {
-                    for (row, sums) in acc.iter().enumerate() {
-                        sink.store::<I>(i + row, j, sums);
-                    }
-                } else {
-                    for (row, sums) in acc.iter().enumerate().skip(i_wanted - i) {
-                        sink.store::<I>(i + row, j_wanted, &sums[j_wanted - j..]);
-                    }
-                }
-            } else {
-                narrow_columns::<T, I, S, MR, NR>(
-                    depth,
-                    (i_wanted, MR.min(m - i_wanted)),
-                    (j_wanted, NR.min(n - j_wanted)),
-                    &left,
-                    &right,
+            if m < MR || n < NR {
+                narrow_columns::<T, I, S, NR>(
+                    (left, i_wanted, MR.min(m - i_wanted)),
+                    (right, j_wanted, NR.min(n - j_wanted)),
                     sink,
                 );
+                continue;
+            }
+            let acc = column_tile::<T, I, MR, NR>((left, i), (right, j));
+            if i == i_wanted && j == j_wanted {
+                store_rows!(acc, |row, sums| sink.store_whole::<I, NR>(i + row, j, sums));
+            } else {
+                for (row, sums) in spill::<T, I, MR, NR>(acc).iter().enumerate().skip(i_wanted - i) {
+                    sink.store::<I>(i + row, j_wanted, &sums[j_wanted - j..]);
+                }
             }
         }
     }
 }
 
-/// A tile of [`columns`] for operands narrower than a tile.
+/// A tile of [`columns`] for operands narrower than a tile, each given with its first column and their number.
 #[inline(always)]
-fn narrow_columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
-    depth: usize,
-    (i, height): (usize, usize),
-    (j, width): (usize, usize),
-    left: &impl Fn(usize) -> &'a [T],
-    right: &impl Fn(usize) -> &'a [T],
+fn narrow_columns<T: Real, I: Isa, S: Sink<T>, const NR: usize>(
+    (left, i, height): (&Rows<'_, T>, usize, usize),
+    (right, j, width): (&Rows<'_, T>, usize, usize),
     sink: &mut S,
 ) {
-    let mut acc = [[T::ZERO; NR]; MR];
-    for p in 0..depth {
-        let b = &right(p)[j..][..width];
-        for (acc, a) in acc.iter_mut().zip(&left(p)[i..][..height]) {
-            acc.iter_mut().zip(b).for_each(|(acc, b)| *acc = I::mul_add(*a, *b, *acc));
+    let mut sums = [T::ZERO; NR];
+    for row in i..i + height {
+        let sums = &mut sums[..width];
+        sums.fill(T::ZERO);
+        for p in 0..left.rows() {
+            let a = left.row(p)[row];
+            sums.iter_mut().zip(&right.row(p)[j..]).for_each(|(sum, b)| *sum = I::mul_add(a, *b, *sum));
         }
-    }
-    for (row, sums) in acc.iter().enumerate().take(height) {
-        sink.store::<I>(i + row, j, &sums[..width]);
+        sink.store::<I>(row, j, sums);
     }
 }

@@ -1,0 +1,172 @@
+//! One register of floats: what the innermost loops of tile.rs are written in.
+//!
+//! Loops over whole rows vectorise by themselves. A tile of accumulators does not reliably: the compiler splits registers or moves
+//! accumulators to memory when code around the loop changes. So the tile names its registers. Five operations are all it needs;
+//! an instruction set is one short block below. Where there is none, an array does the same arithmetic.
+//!
+//! Not here: exp, masks and other element-wise arithmetic, which stay plain loops.
+
+use crate::Real;
+use crate::level::{Plain, Tiled};
+
+/// `LANES` numbers that are worked on at once.
+pub(crate) trait Vector<T>: Copy {
+    /// Numbers in a register.
+    const LANES: usize;
+
+    /// The same number in every lane.
+    fn splat(x: T) -> Self;
+
+    /// Reads `LANES` numbers.
+    ///
+    /// # Safety
+    /// `from` must be the start of `LANES` readable numbers; no alignment is needed.
+    unsafe fn load(from: *const T) -> Self;
+
+    /// Writes `LANES` numbers.
+    ///
+    /// # Safety
+    /// `to` must be the start of `LANES` writable numbers; no alignment is needed.
+    unsafe fn store(self, to: *mut T);
+
+    /// self + other
+    fn add(self, other: Self) -> Self;
+
+    /// self·a + b, rounded once where the level can.
+    fn mul_add(self, a: Self, b: Self) -> Self;
+}
+
+/// An array in the place of a register; `FMA` says whether a multiply-add is one instruction.
+#[derive(Clone, Copy)]
+pub(crate) struct Array<T, const N: usize, const FMA: bool>([T; N]);
+
+impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
+    const LANES: usize = N;
+    #[inline(always)]
+    fn splat(x: T) -> Self {
+        Self([x; N])
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const T) -> Self {
+        // SAFETY: the caller vouches for N readable numbers.
+        Self(unsafe { from.cast::<[T; N]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut T) {
+        // SAFETY: the caller vouches for N writable numbers.
+        unsafe { to.cast::<[T; N]>().write_unaligned(self.0) }
+    }
+    #[inline(always)]
+    fn add(mut self, other: Self) -> Self {
+        self.0.iter_mut().zip(other.0).for_each(|(x, y)| *x += y);
+        self
+    }
+    #[inline(always)]
+    fn mul_add(mut self, a: Self, b: Self) -> Self {
+        for (x, (a, b)) in self.0.iter_mut().zip(a.0.into_iter().zip(b.0)) {
+            *x = if FMA { x.mul_add(a, b) } else { *x * a + b };
+        }
+        self
+    }
+}
+
+/// Registers and accumulator tiles of one float type at each level: two registers wide, as tall as leaves room for two of the right
+/// operand and one of the left. A supertrait of [`Real`]; not for use outside this crate.
+#[expect(private_bounds, reason = "registers are this crate's own")]
+pub trait Registers: Sized {
+    /// 256 bits.
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    type Avx2: Vector<Self>;
+    /// 512 bits.
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    type Avx512: Vector<Self>;
+    #[doc(hidden)]
+    fn plain_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    fn avx2_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    fn avx512_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "aarch64")]
+    #[doc(hidden)]
+    fn neon_tile<K: Tiled<Self>>(kernel: K);
+}
+
+macro_rules! registers {
+    ($t:ident: plain $plain:tt avx2 $avx2:ident $avx2_tile:tt avx512 $avx512:ident $avx512_tile:tt neon $neon:tt) => {
+        #[expect(private_bounds, reason = "as above")]
+        impl Registers for $t {
+            #[cfg(target_arch = "x86_64")]
+            type Avx2 = std::arch::x86_64::$avx2;
+            #[cfg(target_arch = "x86_64")]
+            type Avx512 = std::arch::x86_64::$avx512;
+            registers!(@tile plain_tile Plain $plain);
+            #[cfg(target_arch = "x86_64")]
+            registers!(@tile avx2_tile crate::level::Avx2 $avx2_tile);
+            #[cfg(target_arch = "x86_64")]
+            registers!(@tile avx512_tile crate::level::Avx512 $avx512_tile);
+            #[cfg(target_arch = "aarch64")]
+            registers!(@tile neon_tile crate::level::Neon $neon);
+        }
+    };
+    (@tile $name:ident $level:path [$rows:literal x $columns:literal]) => {
+        #[inline(always)]
+        fn $name<K: Tiled<Self>>(kernel: K) {
+            kernel.run::<$level, $rows, $columns>();
+        }
+    };
+}
+
+registers!(f32: plain [4 x 8] avx2 __m256 [6 x 16] avx512 __m512 [12 x 32] neon [8 x 8]);
+registers!(f64: plain [2 x 8] avx2 __m256d [6 x 8] avx512 __m512d [12 x 16] neon [4 x 8]);
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64 as arch;
+
+    use super::Vector;
+
+    macro_rules! register {
+        ($register:ident of $lanes:literal $t:ident: $splat:ident $load:ident $store:ident $add:ident $mul_add:ident) => {
+            // SAFETY, of every block here: the instructions exist. A kernel meets this type only as the register of its level, and a
+            // level's kernel runs only inside the function of level.rs that enables the level's instructions, after the processor
+            // reported them. Pointers are the caller's to vouch for.
+            impl Vector<$t> for arch::$register {
+                const LANES: usize = $lanes;
+                #[inline(always)]
+                fn splat(x: $t) -> Self {
+                    // SAFETY: as said above.
+                    unsafe { arch::$splat(x) }
+                }
+                #[inline(always)]
+                unsafe fn load(from: *const $t) -> Self {
+                    // SAFETY: as said above.
+                    unsafe { arch::$load(from) }
+                }
+                #[inline(always)]
+                unsafe fn store(self, to: *mut $t) {
+                    // SAFETY: as said above.
+                    unsafe { arch::$store(to, self) }
+                }
+                #[inline(always)]
+                fn add(self, other: Self) -> Self {
+                    // SAFETY: as said above.
+                    unsafe { arch::$add(self, other) }
+                }
+                #[inline(always)]
+                fn mul_add(self, a: Self, b: Self) -> Self {
+                    // SAFETY: as said above.
+                    unsafe { arch::$mul_add(self, a, b) }
+                }
+            }
+        };
+    }
+
+    register!(__m256 of 8 f32: _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_fmadd_ps);
+    register!(__m256d of 4 f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_fmadd_pd);
+    register!(__m512 of 16 f32: _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_fmadd_ps);
+    register!(__m512d of 8 f64: _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_fmadd_pd);
+}
