@@ -7,7 +7,7 @@ use std::time::Duration;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use phyture_kernels::activation::{self, Activation};
 use phyture_kernels::attention::{self, Gradients};
-use phyture_kernels::conv1d::{self, Epilogue, Geometry, WeightLayout};
+use phyture_kernels::conv1d::{self, Epilogue, Geometry, Weight};
 use phyture_kernels::dropout::{self, Mask};
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Level, Rows, RowsMut, Write, adam, gemm, layer_norm, moving_average, reference, sci, temporal};
@@ -105,24 +105,28 @@ fn convolution(criterion: &mut Criterion) {
     let epilogue =
         Epilogue { activation: Activation::LeakyRelu { slope: 0.01 }, dropout: Some(Mask::new(Stream::new(1, 2, 3, 4), 0.2)) };
     for rows in [500, 125] {
-        let geometry = Geometry { taps: 5, left: 3, right: 3, layout: WeightLayout::TapInOut };
+        let geometry = Geometry { taps: 5, left: 3, right: 3 };
         let after = geometry.output_rows(rows);
         let (x, weight, dz) = (numbers(1, rows * WIDTH), numbers(2, 5 * WIDTH * WIDTH), numbers(3, after * WIDTH));
         let (x, weight, dz) = (Rows::packed(&x, rows, WIDTH), &weight[..], Rows::packed(&dz, after, WIDTH));
         let (shape, operations) = (format!("{rows}x{WIDTH}x5"), (2 * after * 5 * WIDTH * WIDTH) as u64);
-        let scratch = || vec![0.0; conv1d::scratch_len(geometry, rows, WIDTH, WIDTH)];
+        let packed = |level, pack: fn(Level, Geometry, (usize, usize), &[f32], &mut [f32])| {
+            let mut packed = vec![0.0; conv1d::packed_len(geometry, WIDTH, WIDTH)];
+            pack(level, geometry, (WIDTH, WIDTH), weight, &mut packed);
+            packed
+        };
         let mut contenders = each_level(|level| {
-            let (mut y, mut scratch) = (vec![0.0; after * WIDTH], scratch());
+            let (mut y, packed) = (vec![0.0; after * WIDTH], packed(level, conv1d::pack));
             Box::new(move || {
                 conv1d::forward(
                     level,
                     geometry,
                     x,
-                    weight,
+                    Weight::Packed(&packed),
                     None,
                     epilogue,
                     RowsMut::packed(black_box(&mut y), after, WIDTH),
-                    &mut scratch,
+                    &mut [],
                 );
             })
         });
@@ -133,13 +137,14 @@ fn convolution(criterion: &mut Criterion) {
         ));
         compare(criterion, "conv1d_forward", &shape, operations, contenders);
         let mut contenders = each_level(|level| {
-            let (mut dx, mut scratch) = (vec![0.0; rows * WIDTH], scratch());
+            let packed = packed(level, conv1d::pack_transposed);
+            let (mut dx, mut scratch) = (vec![0.0; rows * WIDTH], vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)]);
             Box::new(move || {
                 conv1d::backward_input(
                     level,
                     geometry,
                     dz,
-                    weight,
+                    Weight::Packed(&packed),
                     RowsMut::packed(black_box(&mut dx), rows, WIDTH),
                     Write::Set,
                     &mut scratch,
@@ -155,8 +160,8 @@ fn convolution(criterion: &mut Criterion) {
         ));
         compare(criterion, "conv1d_backward_input", &shape, operations, contenders);
         let mut contenders = each_level(|level| {
-            let (mut dw, mut scratch) = (vec![0.0; 5 * WIDTH * WIDTH], scratch());
-            Box::new(move || conv1d::backward_weight(level, geometry, x, dz, black_box(&mut dw), Write::Set, &mut scratch))
+            let mut dw = vec![0.0; 5 * WIDTH * WIDTH];
+            Box::new(move || conv1d::backward_weight(level, geometry, x, dz, black_box(&mut dw), Write::Set))
         });
         let mut dw = vec![0.0_f32; 5 * WIDTH * WIDTH];
         contenders.push(("reference", Box::new(move || reference::conv1d_backward_weight(geometry, x, dz, black_box(&mut dw)))));

@@ -232,13 +232,19 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
             let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
             for (i, row) in rows.chunks_exact_mut(block).enumerate() {
                 let row = &mut row.as_chunks_mut::<NR>().0[chunk];
-                for ((s, m), sum) in row.iter_mut().zip(&m).zip(&mut sum) {
-                    *s = exp_negative::<T, I>(*s - *m);
-                    *sum += *s;
+                let mut p = *row;
+                for (p, m) in p.iter_mut().zip(&m) {
+                    *p = exp_negative::<T, I>(*p - *m);
+                }
+                for (sum, p) in sum.iter_mut().zip(&p) {
+                    *sum += *p;
                 }
                 if let Some(keeps) = &keeps {
-                    row.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
+                    for (p, keep) in p.iter_mut().zip(&keeps[i]) {
+                        *p *= *keep;
+                    }
                 }
+                *row = p;
             }
         }
         for ((total, factor), sum) in total.iter_mut().zip(factor).zip(sum) {
@@ -380,24 +386,27 @@ fn gradient_block<T: Real, I: Isa, const NR: usize>(
     means: &[T],
 ) {
     let lanes = log_sum_exp.as_chunks::<NR>().0.iter().zip(means.as_chunks::<NR>().0);
-    for (chunk, (log_sum_exp, means)) in lanes.enumerate() {
+    for (chunk, (&log_sum_exp, &means)) in lanes.enumerate() {
         let pairs = scores.chunks_mut(2 * block).zip(d_scores.chunks_mut(2 * block));
         for ((rows, d_rows), key) in pairs.zip((first_key..).step_by(2)) {
             let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
             for (i, (row, d_row)) in rows.chunks_exact_mut(block).zip(d_rows.chunks_exact_mut(block)).enumerate() {
                 let (row, d_row) = (&mut row.as_chunks_mut::<NR>().0[chunk], &mut d_row.as_chunks_mut::<NR>().0[chunk]);
-                for (p, l) in row.iter_mut().zip(log_sum_exp) {
+                // In variables of their own, which nothing else can point to.
+                let (mut p, mut ds) = (*row, *d_row);
+                for (p, l) in p.iter_mut().zip(&log_sum_exp) {
                     *p = exp_negative::<T, I>(*p - *l);
                 }
                 if let Some(keeps) = &keeps {
-                    d_row.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
+                    ds.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
                 }
-                for ((ds, p), mean) in d_row.iter_mut().zip(&*row).zip(means) {
+                for ((ds, p), mean) in ds.iter_mut().zip(&p).zip(&means) {
                     *ds = *p * (*ds - *mean);
                 }
                 if let Some(keeps) = &keeps {
-                    row.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
+                    p.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
                 }
+                (*row, *d_row) = (p, ds);
             }
         }
     }

@@ -56,6 +56,7 @@ kernels! {
     tiles {
         attention_forward: attention::Forward,
         attention_backward: attention::Backward,
+        conv1d_pack: conv1d::Pack,
         conv1d_forward: conv1d::Forward,
         conv1d_backward_input: conv1d::BackwardInput,
         conv1d_backward_weight: conv1d::BackwardWeight,

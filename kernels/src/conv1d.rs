@@ -1,18 +1,19 @@
 //! One-dimensional convolution of a channels-last sequence, stride 1, ends padded by repeating the first and the last row.
 //!
 //! ```text
-//! z[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[clamp(t + j − left, 0, n − 1), c],   t = 0 … n + left + right − taps
+//! z[t, o] = b[o] + Σ_{c,j} W[j, c, o]·x[clamp(t + j − left, 0, n − 1), c],   t = 0 … n + left + right − taps
 //! y = dropout(f(z))
 //! ```
 //!
-//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x `[n, in]`, y `[n′, out]`. The padded sequence is never made:
+//! (cross-correlation, as PyTorch's Conv1d after a replication pad). x `[n, in]`, y `[n′, out]`, W `[taps, in, out]`: the matrix of the
+//! product, so that neither it nor its gradient is ever transposed (PyTorch keeps `[out, in, taps]`). The padded sequence is never made:
 //! the product reads shifted rows of x where they lie. Only y is kept: for the leaky relu its sign tells the branch, and a
 //! dropped element is told from a kept zero by the zero's sign (dropped +0, kept −0), so the backward pass of the epilogue
 //! needs neither z nor a mask.
 //!
 //! ```text
-//! dx̃[s, c] = Σ_{o,j} dz[s − j, o]·W[o, c, j] on the padded rows s, of which the ends fold into dx[0] and dx[n − 1]
-//! dW[o, c, j] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
+//! dx̃[s, c] = Σ_{o,j} dz[s − j, o]·W[j, c, o] on the padded rows s, of which the ends fold into dx[0] and dx[n − 1]
+//! dW[j, c, o] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
 //! ```
 
 use crate::activation::{self, Activation};
@@ -21,16 +22,7 @@ use crate::level::{Isa, Kernel, Level, Tiled};
 use crate::tile::{self, LeftRows, Sink, Store};
 use crate::{Real, Rows, RowsMut, Write, linear, rows};
 
-/// How the weight lies in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WeightLayout {
-    /// `[out, in, taps]`, as PyTorch stores it.
-    OutInTap,
-    /// `[taps, in, out]`: the matrix `[taps·in, out]` of the product; no transposition on the way in or out.
-    TapInOut,
-}
-
-/// Kernel length, padding and weight layout.
+/// Kernel length and padding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Geometry {
     /// Kernel length.
@@ -39,23 +31,12 @@ pub struct Geometry {
     pub left: usize,
     /// Times the last row is repeated behind.
     pub right: usize,
-    /// How the weight and its gradient lie in memory.
-    pub layout: WeightLayout,
 }
 
 impl Geometry {
     /// Rows of y for `rows` rows of x; 0 if the kernel is longer than the padded sequence, or there is nothing to repeat.
     pub const fn output_rows(self, rows: usize) -> usize {
         if rows == 0 { 0 } else { (rows + self.left + self.right + 1).saturating_sub(self.taps) }
-    }
-
-    /// Place of `W[o, c, j]` in the weight slice.
-    #[inline(always)]
-    pub const fn index(self, inputs: usize, outputs: usize, o: usize, c: usize, j: usize) -> usize {
-        match self.layout {
-            WeightLayout::OutInTap => (o * inputs + c) * self.taps + j,
-            WeightLayout::TapInOut => (j * inputs + c) * outputs + o,
-        }
     }
 }
 
@@ -73,14 +54,77 @@ impl Epilogue {
     pub const NONE: Self = Self { activation: Activation::Identity, dropout: None };
 }
 
-/// Scratch, in numbers, that any function of this file needs for n = `rows`.
-pub fn scratch_len(geometry: Geometry, rows: usize, inputs: usize, outputs: usize) -> usize {
-    let Geometry { taps, left, right, .. } = geometry;
-    let _ = rows;
-    let forward = tile::panels_len(taps * inputs, outputs);
-    let input = tile::panels_len(taps * outputs, inputs) + outputs + (left + right) * inputs;
-    let weight = taps * inputs * outputs;
-    forward.max(input).max(weight)
+/// Scratch, in numbers, that any function of this file needs.
+pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    let Geometry { left, right, .. } = geometry;
+    let input = packed_len(geometry, outputs, inputs) + outputs + (left + right) * inputs;
+    packed_len(geometry, inputs, outputs).max(input)
+}
+
+/// Numbers of a weight packed by [`pack`]; by [`pack_transposed`] with inputs and outputs exchanged.
+pub const fn packed_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    tile::panels_len(geometry.taps * inputs, outputs)
+}
+
+/// A weight `[taps, in, out]`, as it is or as packed once for many calls.
+#[derive(Clone, Copy, Debug)]
+pub enum Weight<'a, T> {
+    /// Packed by the call, in its scratch.
+    Plain(&'a [T]),
+    /// By [`pack`] for [`forward`], by [`pack_transposed`] for [`backward_input`], at the same level.
+    Packed(&'a [T]),
+}
+
+/// Packs a weight for [`forward`].
+///
+/// # Panics
+/// If lengths disagree.
+pub fn pack<T: Real>(level: Level, geometry: Geometry, (inputs, outputs): (usize, usize), weight: &[T], packed: &mut [T]) {
+    assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
+    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: false });
+}
+
+/// Packs a weight for [`backward_input`].
+///
+/// # Panics
+/// If lengths disagree.
+pub fn pack_transposed<T: Real>(
+    level: Level,
+    geometry: Geometry,
+    (inputs, outputs): (usize, usize),
+    weight: &[T],
+    packed: &mut [T],
+) {
+    assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
+    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
+}
+
+pub(crate) struct Pack<'a, T> {
+    geometry: Geometry,
+    inputs: usize,
+    outputs: usize,
+    weight: &'a [T],
+    packed: &'a mut [T],
+    transposed: bool,
+}
+
+impl<T: Real> Tiled<T> for Pack<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Self { geometry: Geometry { taps, .. }, inputs, outputs, weight, packed, transposed } = self;
+        if weight.is_empty() {
+            return;
+        }
+        if !transposed {
+            let panels = &mut packed[..taps * inputs * outputs.next_multiple_of(NR)];
+            return tile::pack::<T, NR>(Rows::packed(weight, taps * inputs, outputs), panels);
+        }
+        let panels = &mut packed[..taps * outputs * inputs.next_multiple_of(NR)];
+        for j in 0..taps {
+            let row = |c: usize| &weight[(j * inputs + c) * outputs..][..outputs];
+            tile::pack_transposed::<T, NR>(outputs, inputs, 1, row, taps * outputs * NR, &mut panels[j * outputs * NR..]);
+        }
+    }
 }
 
 /// y = dropout(f(conv(x) + b)).
@@ -91,52 +135,39 @@ pub fn forward<T: Real>(
     level: Level,
     geometry: Geometry,
     x: Rows<'_, T>,
-    weight: &[T],
+    weight: Weight<'_, T>,
     bias: Option<&[T]>,
     epilogue: Epilogue,
     y: RowsMut<'_, T>,
     scratch: &mut [T],
 ) {
     assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
-    assert_eq!(weight.len(), geometry.taps * x.cols() * y.cols(), "conv1d: length of the weight");
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
-    T::conv1d_forward(level, Forward { geometry, x, weight, bias, epilogue, y, scratch });
+    let packed = match weight {
+        Weight::Packed(packed) => packed,
+        Weight::Plain(weight) => {
+            pack(level, geometry, (x.cols(), y.cols()), weight, scratch);
+            scratch
+        }
+    };
+    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, y });
 }
 
 pub(crate) struct Forward<'a, T> {
     geometry: Geometry,
     x: Rows<'a, T>,
-    weight: &'a [T],
+    packed: &'a [T],
     bias: Option<&'a [T]>,
     epilogue: Epilogue,
     y: RowsMut<'a, T>,
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let Geometry { taps, left, layout, .. } = self.geometry;
+        let Geometry { taps, left, .. } = self.geometry;
         let (inputs, outputs) = (self.x.cols(), self.y.cols());
-        let panels = &mut self.scratch[..taps * inputs * outputs.next_multiple_of(NR)];
-        if !panels.is_empty() {
-            match layout {
-                WeightLayout::TapInOut => tile::pack::<T, NR>(Rows::packed(self.weight, taps * inputs, outputs), panels),
-                WeightLayout::OutInTap => {
-                    for j in 0..taps {
-                        let row = |o: usize| &self.weight[o * inputs * taps + j..(o + 1) * inputs * taps];
-                        tile::pack_transposed::<T, NR>(
-                            inputs,
-                            outputs,
-                            taps,
-                            row,
-                            taps * inputs * NR,
-                            &mut panels[j * inputs * NR..],
-                        );
-                    }
-                }
-            }
-        }
+        let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
         let shifted = Shifted { x: self.x, taps, left, rows: self.y.rows() };
         let scale = T::of(self.epilogue.dropout.map_or(1.0, Mask::scale));
         let mut sink = Finish { y: self.y, bias: self.bias, epilogue: self.epilogue, scale };
@@ -186,24 +217,42 @@ struct Finish<'a, T> {
     scale: T,
 }
 
-impl<T: Real> Sink<T> for Finish<'_, T> {
+impl<T: Real> Finish<'_, T> {
+    /// Row `i`, columns `j…` of z without its bias becomes y. The numbers are a variable of the caller's own, which nothing else can
+    /// point to: only then do these loops become one pass over registers.
     #[inline(always)]
-    fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]) {
-        let y = &mut self.y.row_mut(i)[j..][..sums.len()];
-        match self.bias {
-            Some(bias) => y.iter_mut().zip(sums).zip(&bias[j..]).for_each(|((y, s), b)| *y = *s + *b),
-            None => y.copy_from_slice(sums),
+    fn apply<I: Isa>(&self, i: usize, j: usize, z: &mut [T]) {
+        if let Some(bias) = self.bias {
+            z.iter_mut().zip(&bias[j..]).for_each(|(z, b)| *z += *b);
         }
         if let Activation::LeakyRelu { slope } = self.epilogue.activation {
             let slope = T::of(slope);
-            y.iter_mut().for_each(|y| *y = if *y > T::ZERO { *y } else { -(slope * y.abs()) });
+            z.iter_mut().for_each(|z| *z = if *z > T::ZERO { *z } else { -(slope * z.abs()) });
         } else {
-            activation::map::<T, I>(self.epilogue.activation, y);
+            activation::map::<T, I>(self.epilogue.activation, z);
         }
         if let Some(mask) = self.epilogue.dropout {
             let mask = mask.row(i);
-            y.iter_mut().enumerate().for_each(|(c, y)| *y = if mask.keeps(j + c) { *y * self.scale } else { T::ZERO });
+            z.iter_mut().enumerate().for_each(|(c, z)| *z = if mask.keeps(j + c) { *z * self.scale } else { T::ZERO });
         }
+    }
+}
+
+impl<T: Real> Sink<T> for Finish<'_, T> {
+    #[inline(always)]
+    fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]) {
+        let mut z = [T::ZERO; tile::WIDEST];
+        let z = &mut z[..sums.len()];
+        z.copy_from_slice(sums);
+        self.apply::<I>(i, j, z);
+        self.y.row_mut(i)[j..][..z.len()].copy_from_slice(z);
+    }
+
+    #[inline(always)]
+    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: tile::Pair<T, I>) {
+        let mut z = tile::unload::<T, I, NR>(sums);
+        self.apply::<I>(i, j, &mut z);
+        self.y.row_mut(i)[j..][..NR].copy_from_slice(&z);
     }
 }
 
@@ -270,53 +319,45 @@ pub fn backward_input<T: Real>(
     level: Level,
     geometry: Geometry,
     dz: Rows<'_, T>,
-    weight: &[T],
+    weight: Weight<'_, T>,
     dx: RowsMut<'_, T>,
     write: Write,
     scratch: &mut [T],
 ) {
     assert_eq!(dz.rows(), geometry.output_rows(dx.rows()), "conv1d: rows of dz");
-    assert_eq!(weight.len(), geometry.taps * dx.cols() * dz.cols(), "conv1d: length of the weight");
-    T::conv1d_backward_input(level, BackwardInput { geometry, dz, weight, dx, write, scratch });
+    let (inputs, outputs) = (dx.cols(), dz.cols());
+    let (ends, rest) = scratch.split_at_mut(outputs + (geometry.left + geometry.right) * inputs);
+    let packed = match weight {
+        Weight::Packed(packed) => packed,
+        Weight::Plain(weight) => {
+            pack_transposed(level, geometry, (inputs, outputs), weight, rest);
+            rest
+        }
+    };
+    T::conv1d_backward_input(level, BackwardInput { geometry, dz, packed, dx, write, ends });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
     geometry: Geometry,
     dz: Rows<'a, T>,
-    weight: &'a [T],
+    packed: &'a [T],
     dx: RowsMut<'a, T>,
     write: Write,
-    scratch: &'a mut [T],
+    /// A row of zeros, and the gradients of the padded rows.
+    ends: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
-        let Geometry { taps, left, right, layout } = self.geometry;
+        let Geometry { taps, left, right } = self.geometry;
         let (n, inputs, outputs) = (self.dx.rows(), self.dx.cols(), self.dz.cols());
         if n == 0 {
             return;
         }
-        let (zeros, rest) = self.scratch.split_at_mut(outputs);
-        let (ends, rest) = rest.split_at_mut((left + right) * inputs);
-        let panels = &mut rest[..taps * outputs * inputs.next_multiple_of(NR)];
+        let (zeros, ends) = self.ends.split_at_mut(outputs);
+        let panels = &self.packed[..taps * outputs * inputs.next_multiple_of(NR)];
         zeros.fill(T::ZERO);
-        if !panels.is_empty() {
-            let stride = taps * outputs * NR;
-            for j in 0..taps {
-                let panels = &mut panels[j * outputs * NR..];
-                match layout {
-                    WeightLayout::TapInOut => {
-                        let row = |c: usize| &self.weight[(j * inputs + c) * outputs..][..outputs];
-                        tile::pack_transposed::<T, NR>(outputs, inputs, 1, row, stride, panels);
-                    }
-                    WeightLayout::OutInTap => {
-                        let row = |c: usize| &self.weight[c * taps + j..];
-                        tile::pack_transposed::<T, NR>(outputs, inputs, inputs * taps, row, stride, panels);
-                    }
-                }
-            }
-        }
         let part = |first, jump_at, jump, rows| Reversed { dz: self.dz, zeros, taps, first, jump_at, jump, rows };
         let mut sink = Store { c: self.dx.reborrow(), bias: None, write: self.write };
         tile::rows::<T, I, _, _, MR, NR>(&part(left, n, 0, n), inputs, panels, &mut sink);
@@ -363,7 +404,7 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
     }
 }
 
-/// dW {=, +=} `Σ_t dz[t, o]·x[clamp(t + j − left), c]`, in the layout of the geometry.
+/// dW {=, +=} `Σ_t dz[t, o]·x[clamp(t + j − left), c]`.
 ///
 /// # Panics
 /// If shapes disagree.
@@ -374,26 +415,10 @@ pub fn backward_weight<T: Real>(
     dz: Rows<'_, T>,
     dweight: &mut [T],
     write: Write,
-    scratch: &mut [T],
 ) {
-    let (taps, inputs, outputs) = (geometry.taps, x.cols(), dz.cols());
     assert_eq!(dz.rows(), geometry.output_rows(x.rows()), "conv1d: rows of dz");
-    assert_eq!(dweight.len(), taps * inputs * outputs, "conv1d: length of the weight's gradient");
-    match geometry.layout {
-        WeightLayout::TapInOut => T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight, write }),
-        WeightLayout::OutInTap => {
-            let gradient = &mut scratch[..taps * inputs * outputs];
-            T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight: gradient, write: Write::Set });
-            for (o, target) in dweight.chunks_exact_mut((inputs * taps).max(1)).enumerate() {
-                let source = |c: usize, j: usize| gradient[(j * inputs + c) * outputs + o];
-                let places = (0..inputs).flat_map(|c| (0..taps).map(move |j| (c, j)));
-                match write {
-                    Write::Set => target.iter_mut().zip(places).for_each(|(d, (c, j))| *d = source(c, j)),
-                    Write::Add => target.iter_mut().zip(places).for_each(|(d, (c, j))| *d += source(c, j)),
-                }
-            }
-        }
-    }
+    assert_eq!(dweight.len(), geometry.taps * x.cols() * dz.cols(), "conv1d: length of the weight's gradient");
+    T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight, write });
 }
 
 pub(crate) struct BackwardWeight<'a, T> {
@@ -468,10 +493,9 @@ mod tests {
     }
 
     fn problem() -> impl Strategy<Value = Problem> {
-        let layout = prop_oneof![Just(WeightLayout::OutInTap), Just(WeightLayout::TapInOut)];
-        (1_usize..6, 0_usize..5, 0_usize..5, layout, 0_usize..40, 1_usize..35, 1_usize..35, 0_u64..1000).prop_map(
-            |(taps, left, right, layout, rows, inputs, outputs, seed)| Problem {
-                geometry: Geometry { taps, left, right, layout },
+        (1_usize..6, 0_usize..5, 0_usize..5, 0_usize..200, 1_usize..35, 1_usize..35, 0_u64..1000).prop_map(
+            |(taps, left, right, rows, inputs, outputs, seed)| Problem {
+                geometry: Geometry { taps, left, right },
                 rows,
                 inputs,
                 outputs,
@@ -494,16 +518,24 @@ mod tests {
         let mut dw = Matrix::<T>::poisoned(0, (1, weight.len()));
         reference::conv1d_backward_weight(geometry, x.view(), dz.view(), dw.view_mut().row_mut(0));
         for level in Level::available() {
-            let mut scratch = vec![T::NAN; scratch_len(geometry, rows, inputs, outputs)];
+            let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (after, outputs));
-            forward(level, geometry, x.view(), &weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
-            y.check_gaps();
-            assert_near(&format!("forward at {level}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
-            check_writes(&format!("dx at {level}"), &dx, Tolerance::Close, |dx, write| {
-                backward_input(level, geometry, dz.view(), &weight, dx, write, &mut scratch);
-            });
+            let mut packed = vec![T::NAN; packed_len(geometry, inputs, outputs)];
+            pack(level, geometry, (inputs, outputs), &weight, &mut packed);
+            for weight in [Weight::Plain(&weight), Weight::Packed(&packed)] {
+                forward(level, geometry, x.view(), weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+                y.check_gaps();
+                assert_near(&format!("forward at {level}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
+            }
+            let mut packed = vec![T::NAN; packed_len(geometry, outputs, inputs)];
+            pack_transposed(level, geometry, (inputs, outputs), &weight, &mut packed);
+            for weight in [Weight::Plain(&weight), Weight::Packed(&packed)] {
+                check_writes(&format!("dx at {level}"), &dx, Tolerance::Close, |dx, write| {
+                    backward_input(level, geometry, dz.view(), weight, dx, write, &mut scratch);
+                });
+            }
             check_writes(&format!("dW at {level}"), &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
+                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write);
             });
         }
     }
@@ -523,12 +555,12 @@ mod tests {
             let (x, dz) = (numbers::<f64>(seed, rows * inputs), numbers::<f64>(seed + 1, after * outputs));
             let weight = numbers::<f64>(seed + 2, geometry.taps * inputs * outputs);
             for level in Level::available() {
-                let mut scratch = vec![f64::NAN; scratch_len(geometry, rows, inputs, outputs)];
+                let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dx) = (vec![f64::NAN; dz.len()], vec![f64::NAN; x.len()]);
                 let x_view = Rows::packed(&x, rows, inputs);
-                forward(level, geometry, x_view, &weight, None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
+                forward(level, geometry, x_view, Weight::Plain(&weight), None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
                 let dx_view = RowsMut::packed(&mut dx, rows, inputs);
-                backward_input(level, geometry, Rows::packed(&dz, after, outputs), &weight, dx_view, Write::Set, &mut scratch);
+                backward_input(level, geometry, Rows::packed(&dz, after, outputs), Weight::Plain(&weight), dx_view, Write::Set, &mut scratch);
                 assert_near("<Ax, y> and <x, A'y>", &[inner(&y, &dz)], &[inner(&x, &dx)], Tolerance::Close);
             }
         }
@@ -552,9 +584,9 @@ mod tests {
             let y_expected = expected(&|z| reference::activation(activation, z), &|_, _| 1.0);
             let dz_expected = expected(&|z| reference::activation_derivative(activation, z), &|t, o| dy.view().row(t)[o]);
             for level in Level::available() {
-                let mut scratch = vec![f64::NAN; scratch_len(geometry, rows, inputs, outputs)];
+                let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dz) = (Matrix::<f64>::poisoned(seed, (after, outputs)), Matrix::<f64>::poisoned(seed, (after, outputs)));
-                forward(level, geometry, x.view(), &weight, None, epilogue, y.view_mut(), &mut scratch);
+                forward(level, geometry, x.view(), Weight::Plain(&weight), None, epilogue, y.view_mut(), &mut scratch);
                 assert_near("y", &y.to_vec(), &y_expected, Tolerance::Close);
                 backward_epilogue(level, epilogue, y.view(), dy.view(), dz.view_mut());
                 assert_near("dz", &dz.to_vec(), &dz_expected, Tolerance::Close);
@@ -564,34 +596,43 @@ mod tests {
 
     #[test]
     fn sizes_of_the_network() {
-        for layout in [WeightLayout::OutInTap, WeightLayout::TapInOut] {
-            for (rows, taps, pad) in [(500, 5, 3), (502, 3, 0), (125, 5, 3)] {
-                let geometry = Geometry { taps, left: pad, right: pad, layout };
-                check::<f32>(Problem { geometry, rows, inputs: 64, outputs: 64, seed: 1 });
-            }
+        for (rows, taps, pad) in [(500, 5, 3), (502, 3, 0), (125, 5, 3)] {
+            let geometry = Geometry { taps, left: pad, right: pad };
+            check::<f32>(Problem { geometry, rows, inputs: 64, outputs: 64, seed: 1 });
         }
     }
 
     #[test]
     fn one_tap_is_a_linear_map() {
-        let geometry = Geometry { taps: 1, left: 0, right: 0, layout: WeightLayout::OutInTap };
+        let geometry = Geometry { taps: 1, left: 0, right: 0 };
         let (x, weight) = (Matrix::<f64>::random(1, (30, 7)), numbers::<f64>(2, 7 * 9));
         let (mut conv, mut map) = (Matrix::<f64>::poisoned(1, (30, 9)), Matrix::<f64>::poisoned(2, (30, 9)));
-        let mut scratch = vec![0.0; scratch_len(geometry, 30, 7, 9).max(linear::scratch_len(30, 7, 9))];
-        forward(Level::PLAIN, geometry, x.view(), &weight, None, Epilogue::NONE, conv.view_mut(), &mut scratch);
+        let mut scratch = vec![0.0; scratch_len(geometry, 7, 9).max(linear::scratch_len(30, 7, 9))];
+        // The linear map keeps its weight the other way round.
+        let turned: Vec<f64> = (0..7 * 9).map(|at| weight[at % 9 * 7 + at / 9]).collect();
+        forward(Level::PLAIN, geometry, x.view(), Weight::Plain(&turned), None, Epilogue::NONE, conv.view_mut(), &mut scratch);
         linear::forward(Level::PLAIN, x.view(), &weight, None, map.view_mut(), &mut scratch);
         assert_near("conv1d with one tap", &conv.to_vec(), &map.to_vec(), Tolerance::Exact);
     }
 
     #[test]
     fn a_kept_zero_still_passes_its_gradient() {
-        let geometry = Geometry { taps: 1, left: 0, right: 0, layout: WeightLayout::OutInTap };
+        let geometry = Geometry { taps: 1, left: 0, right: 0 };
         let mask = Mask::new(Stream::new(5, 0, 0, 0), 0.5);
         let epilogue = Epilogue { activation: LEAKY, dropout: Some(mask) };
         for level in Level::available() {
             let (x, dy) = (vec![1.0_f32; 64], vec![1.0_f32; 64]);
             let (mut y, mut dz, mut scratch) = (vec![f32::NAN; 64], vec![f32::NAN; 64], vec![0.0; 64]);
-            forward(level, geometry, Rows::packed(&x, 64, 1), &[0.0], None, epilogue, RowsMut::packed(&mut y, 64, 1), &mut scratch);
+            forward(
+                level,
+                geometry,
+                Rows::packed(&x, 64, 1),
+                Weight::Plain(&[0.0]),
+                None,
+                epilogue,
+                RowsMut::packed(&mut y, 64, 1),
+                &mut scratch,
+            );
             backward_epilogue(level, epilogue, Rows::packed(&y, 64, 1), Rows::packed(&dy, 64, 1), RowsMut::packed(&mut dz, 64, 1));
             let expected: Vec<f32> = (0..64).map(|t| if mask.keeps(t, 0) { 0.01 * mask.scale() as f32 } else { 0.0 }).collect();
             assert!(y.iter().all(|y| *y == 0.0));

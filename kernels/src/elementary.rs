@@ -3,7 +3,7 @@
 //! | function | how | largest error found, f32 / f64 |
 //! | --- | --- | --- |
 //! | eˣ | x = k·ln 2 + r with |r| ≤ ln 2/2 (Cody & Waite 1980), eʳ = 1 + r + r²·q(r), scaled by 2ᵏ | 1.1 / 2 ULP |
-//! | tanh x | x + x³·q(x²) below 5/8, else 1 − 2/(e²ˣ + 1) | 1.4 / 2 ULP |
+//! | tanh x | x + x³·q(x²) below 5/8, else 1 − 2e⁻²ˣ/(1 + e⁻²ˣ) | 1.4 / 2 ULP |
 //! | 1/(1 + e⁻ˣ) | as written | 2.3 / 4 ULP |
 //! | erf x | x + x·q(x²) below 1, else 1 − e^(−x²)·q(2/(2 + x)), as for 6 beyond 6 | 1.3 / 8 ULP |
 //!
@@ -184,7 +184,8 @@ pub(crate) fn tanh<T: Real, I: Isa>(x: T) -> T {
     let magnitude = x.abs();
     let u = x * x;
     let small = I::mul_add(polynomial::<T, I>(T::TANH, u), u * magnitude, magnitude);
-    let large = T::ONE - (T::ONE + T::ONE) / (exp::<T, I>(magnitude + magnitude) + T::ONE);
+    let e = exp_negative::<T, I>(-(magnitude + magnitude));
+    let large = T::ONE - (e + e) / (T::ONE + e);
     let y = if magnitude < T::of(0.625) { small } else { large };
     if x < T::ZERO { -y } else { y }
 }

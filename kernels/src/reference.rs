@@ -194,7 +194,7 @@ pub fn conv1d<T: Real>(geometry: Geometry, x: Rows<'_, T>, weight: &[T], bias: O
     for t in 0..y.rows() {
         for o in 0..outputs {
             let product = |c: usize, j: usize| {
-                weight[geometry.index(inputs, outputs, o, c, j)].f64() * x.row(tap_row(geometry, x.rows(), t, j))[c].f64()
+                weight[(j * inputs + c) * outputs + o].f64() * x.row(tap_row(geometry, x.rows(), t, j))[c].f64()
             };
             let start = bias.map_or(0.0, |b| b[o].f64());
             y.row_mut(t)[o] = T::of(start + (0..inputs).flat_map(|c| (0..geometry.taps).map(move |j| product(c, j))).sum::<f64>());
@@ -210,7 +210,7 @@ pub fn conv1d_backward_input<T: Real>(geometry: Geometry, dz: Rows<'_, T>, weigh
         for j in 0..geometry.taps {
             for c in 0..inputs {
                 total[tap_row(geometry, rows, t, j) * inputs + c] +=
-                    (0..outputs).map(|o| dz.row(t)[o].f64() * weight[geometry.index(inputs, outputs, o, c, j)].f64()).sum::<f64>();
+                    (0..outputs).map(|o| dz.row(t)[o].f64() * weight[(j * inputs + c) * outputs + o].f64()).sum::<f64>();
             }
         }
     }
@@ -225,7 +225,7 @@ pub fn conv1d_backward_weight<T: Real>(geometry: Geometry, x: Rows<'_, T>, dz: R
     for o in 0..outputs {
         for c in 0..inputs {
             for j in 0..geometry.taps {
-                dweight[geometry.index(inputs, outputs, o, c, j)] =
+                dweight[(j * inputs + c) * outputs + o] =
                     sum((0..dz.rows()).map(|t| dz.row(t)[o].f64() * x.row(tap_row(geometry, x.rows(), t, j))[c].f64()));
             }
         }

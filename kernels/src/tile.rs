@@ -15,7 +15,7 @@ use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Widest panel of any level, in numbers.
-const WIDEST: usize = 32;
+pub(crate) const WIDEST: usize = 32;
 
 /// Rows of the left operand that pass over one panel before the next panel is taken: they stay in the second-level cache.
 const ROW_BLOCK: usize = 240;
@@ -57,7 +57,7 @@ impl<T> LeftRows<T> for Rows<'_, T> {
 }
 
 /// A row of a tile in registers: NR numbers, whatever the level.
-type Pair<T, I> = [<I as Isa>::Vector<T>; 2];
+pub(crate) type Pair<T, I> = [<I as Isa>::Vector<T>; 2];
 
 /// Where finished sums go.
 pub(crate) trait Sink<T: Real> {
@@ -73,7 +73,7 @@ pub(crate) trait Sink<T: Real> {
 
 /// Registers as numbers in memory.
 #[inline(always)]
-fn unload<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>) -> [T; NR] {
+pub(crate) fn unload<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>) -> [T; NR] {
     assert_eq!(NR, 2 * I::Vector::<T>::LANES, "a panel is two registers wide");
     let mut numbers = [T::ZERO; NR];
     let to = numbers.as_mut_ptr();

@@ -177,8 +177,8 @@ impl Hybrid {
         let text = serde_json::to_string(&self.description)
             .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
         let tensor = |parameter: &crate::tape::Parameter| {
-            let numbers = Numbers::F32(self.parameters[parameter.range()].to_vec());
-            (parameter.name.clone(), Tensor { shape: parameter.shape.lengths().to_vec(), numbers })
+            let numbers = Numbers::F32(parameter.to_file_order(&self.parameters));
+            (parameter.name.clone(), Tensor { shape: parameter.file_lengths(), numbers })
         };
         let tensors = self.network.parameters().iter().map(tensor).collect();
         SafeTensors { metadata: [(METADATA.to_owned(), text)].into(), tensors }.write(path)
@@ -202,15 +202,15 @@ impl Hybrid {
                 file.tensors.get(&parameter.name).ok_or_else(|| fault(format!("lacks the tensor `{}`", parameter.name)))?;
             match &tensor.numbers {
                 Numbers::F32(numbers)
-                    if tensor.shape == parameter.shape.lengths() && numbers.iter().all(|number| number.is_finite()) =>
+                    if tensor.shape == parameter.file_lengths() && numbers.iter().all(|number| number.is_finite()) =>
                 {
-                    parameters[parameter.range()].copy_from_slice(numbers);
+                    parameter.put_file_order(numbers, &mut parameters);
                 }
                 _ => {
                     return Err(fault(format!(
                         "tensor `{}` is not finite f32 of shape {:?}",
                         parameter.name,
-                        parameter.shape.lengths()
+                        parameter.file_lengths()
                     )));
                 }
             }

@@ -116,7 +116,8 @@ impl<T: Real> Recorder<T> {
     ) -> Result<Var> {
         let inputs = self.graph.shape(x).rows().1;
         let init = Init::fan_in(inputs * kernel);
-        let weight = self.parameter(&format!("{name}.weight"), &[outputs, inputs, kernel], init)?;
+        let weight = self.graph.convolution_weight(&format!("{name}.weight"), [kernel, inputs, outputs])?;
+        self.inits.push(init);
         let bias = self.parameter(&format!("{name}.bias"), &[outputs], init)?;
         self.graph.apply(Conv1d { padding, epilogue }, &[x, weight, bias])
     }

@@ -135,9 +135,10 @@ fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Thread
     ];
     let [state, physics, target] = inputs.map(|(name, shape)| tensor::<T>(file, name, &shape));
     let given = [state?, physics?, target?];
-    let mut parameters = Vec::with_capacity(network.graph().parameter_count());
+    let mut parameters = vec![T::ZERO; network.graph().parameter_count()];
     for parameter in network.parameters() {
-        parameters.extend_from_slice(tensor::<T>(file, &format!("param.{}", parameter.name), parameter.shape.lengths())?);
+        let numbers = tensor::<T>(file, &format!("param.{}", parameter.name), &parameter.file_lengths())?;
+        parameter.put_file_order(numbers, &mut parameters);
     }
     let known = |name: &str| network.parameters().iter().any(|parameter| parameter.name == name);
     if let Some(name) = file.tensors.keys().filter_map(|name| name.strip_prefix("param.")).find(|name| !known(name)) {
@@ -167,8 +168,8 @@ fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Thread
     let with_gradient = network.parameters().iter().filter(|parameter| parameter.name != WITHOUT_GRADIENT);
     for parameter in with_gradient.clone() {
         let name = format!("grad.param.{}", parameter.name);
-        let reference = tensor(file, &name, parameter.shape.lengths())?;
-        compared.insert(name, (session.gradients()[parameter.range()].to_vec(), reference));
+        let reference = tensor(file, &name, &parameter.file_lengths())?;
+        compared.insert(name, (parameter.to_file_order(session.gradients()), reference));
     }
     if file.tensors.keys().any(|name| name.starts_with("adam1.")) {
         let level = Level::detect().unwrap_or(Level::PLAIN);
@@ -176,8 +177,8 @@ fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Thread
         adam::step(level, &Adam::default(), 1, 1.0, session.gradients(), &mut parameters, &mut first, &mut second);
         for parameter in with_gradient {
             let name = format!("adam1.param.{}", parameter.name);
-            let reference = tensor(file, &name, parameter.shape.lengths())?;
-            compared.insert(name, (parameters[parameter.range()].to_vec(), reference));
+            let reference = tensor(file, &name, &parameter.file_lengths())?;
+            compared.insert(name, (parameter.to_file_order(&parameters), reference));
         }
     }
     let relative_error: BTreeMap<String, f64> =
@@ -245,9 +246,9 @@ mod tests {
             put(&format!("grad.{name}"), &shape, gradient);
         }
         for parameter in network.parameters() {
-            let shape = parameter.shape.lengths();
-            put(&format!("param.{}", parameter.name), shape, parameters[parameter.range()].to_vec());
-            put(&format!("grad.param.{}", parameter.name), shape, session.gradients()[parameter.range()].to_vec());
+            let shape = parameter.file_lengths();
+            put(&format!("param.{}", parameter.name), &shape, parameter.to_file_order(&parameters));
+            put(&format!("grad.param.{}", parameter.name), &shape, parameter.to_file_order(session.gradients()));
         }
         let config = serde_json::to_string(&config).map_err(|error| Error::Undetermined(error.to_string()))?;
         file.metadata.insert("config".into(), config);

@@ -134,9 +134,10 @@ impl<T: Real> Network<T> {
     pub fn initial(&self, seed: u64) -> Vec<T> {
         let mut slab = vec![T::ZERO; self.graph.parameter_count()];
         for (index, (parameter, init)) in self.graph.parameters().iter().zip(&self.inits).enumerate() {
-            if let Some(values) = slab.get_mut(parameter.range()) {
-                init.fill(Stream::new(seed, 0, index as u64, 0), values);
-            }
+            // Drawn in the order of files, so that a seed's start does not depend on how a tensor lies in memory.
+            let mut values = vec![T::ZERO; parameter.shape.len()];
+            init.fill(Stream::new(seed, 0, index as u64, 0), &mut values);
+            parameter.put_file_order(&values, &mut slab);
         }
         slab
     }

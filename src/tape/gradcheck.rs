@@ -121,6 +121,8 @@ impl<'a, T: Real> Trial<'a, T> {
             y: &mut y,
             workspace: &mut workspace,
             scratch: &mut scratch,
+            // Networks' own checks run with packed weights.
+            packed: &[],
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
@@ -148,6 +150,8 @@ impl<'a, T: Real> Trial<'a, T> {
             workspace: &workspace,
             dx: slots,
             scratch: &mut scratch,
+            // Networks' own checks run with packed weights.
+            packed: &[],
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
@@ -417,7 +421,7 @@ mod tests {
             self.op.differentiable().map(|inner| inner.reads()).unwrap_or_default()
         }
         fn backward(&self, io: Backward<'_, T>) {
-            let Backward { x, y, dy, workspace, mut dx, scratch, shapes, level, stream } = io;
+            let Backward { x, y, dy, workspace, mut dx, scratch, packed, shapes, level, stream } = io;
             let Some(inner) = self.op.differentiable() else { return };
             let (Fault::Scaled(at)
             | Fault::Dropped(at)
@@ -429,7 +433,7 @@ mod tests {
             let mut own = vec![T::ZERO; target.values.len()];
             let mut slots: [Option<Gradient<'_, T>>; MAX_OPERANDS] = dx;
             slots[at] = Some(Gradient { values: &mut own, write: Write::Set });
-            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, shapes, level, stream });
+            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, packed, shapes, level, stream });
             let write = match self.fault {
                 Fault::Dropped(_) => return,
                 Fault::NeverSets(_) => Write::Add,

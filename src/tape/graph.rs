@@ -5,10 +5,10 @@
 
 use super::op::{MAX_OPERANDS, Op};
 use super::ops::Copy;
+use super::parameter::{Parameter, Storage};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::Real;
-use std::ops::Range;
 use std::sync::Arc;
 
 /// Largest number of inputs of one graph.
@@ -17,24 +17,6 @@ pub const MAX_INPUTS: usize = 8;
 /// Handle to a value of the graph it was recorded on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Var(pub(crate) usize);
-
-/// A parameter tensor and its place in the flat slab of all parameters.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parameter {
-    /// Unique name, dotted.
-    pub name: String,
-    /// Shape, row-major.
-    pub shape: Shape,
-    /// First element in the flat slab.
-    pub offset: usize,
-}
-
-impl Parameter {
-    /// Its elements in the flat slab.
-    pub fn range(&self) -> Range<usize> {
-        self.offset..self.offset + self.shape.len()
-    }
-}
 
 pub(crate) enum Source<T> {
     /// Filled by the caller for each sample; `gradient` tells whether its gradient is wanted.
@@ -113,6 +95,18 @@ impl<T: Real> Graph<T> {
     /// # Errors
     /// [`Error::Shape`] for an empty shape or a name already taken.
     pub fn parameter(&mut self, name: &str, lengths: &[usize]) -> Result<Var> {
+        self.record_parameter(name, lengths, Storage::AsInFiles)
+    }
+
+    /// The trainable weight `[taps, inputs, outputs]` of a convolution; files hold it as `[outputs, inputs, taps]`.
+    ///
+    /// # Errors
+    /// As [`Graph::parameter`].
+    pub fn convolution_weight(&mut self, name: &str, [taps, inputs, outputs]: [usize; 3]) -> Result<Var> {
+        self.record_parameter(name, &[taps, inputs, outputs], Storage::Convolution)
+    }
+
+    fn record_parameter(&mut self, name: &str, lengths: &[usize], storage: Storage) -> Result<Var> {
         let shape = Shape::new("parameter", lengths)?;
         if self.parameters.iter().any(|taken| taken.name == name) {
             return Err(Error::Shape {
@@ -121,7 +115,7 @@ impl<T: Real> Graph<T> {
             });
         }
         let offset = self.parameter_count();
-        self.parameters.push(Parameter { name: name.to_owned(), shape, offset });
+        self.parameters.push(Parameter { name: name.to_owned(), shape, storage, offset });
         Ok(self.push(Node { source: Source::Parameter(self.parameters.len() - 1), shape }))
     }
 

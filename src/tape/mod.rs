@@ -9,10 +9,12 @@ pub mod op;
 pub mod ops;
 
 mod graph;
+mod parameter;
 mod plan;
 mod session;
 mod shape;
 
-pub use graph::{Graph, MAX_INPUTS, Parameter, Var};
+pub use graph::{Graph, MAX_INPUTS, Var};
+pub use parameter::{Parameter, Storage};
 pub use session::{DropoutKey, Fill, SHARDS, Session, Threads};
 pub use shape::{MAX_RANK, Shape};

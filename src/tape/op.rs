@@ -13,7 +13,7 @@ pub const MAX_OPERANDS: usize = 4;
 /// Buffers of one operation for one sample, in elements.
 ///
 /// *Workspace* is written by the forward pass and read by the backward pass (means of a layer norm, the log-sum-exp of an
-/// attention); *scratch* is dead when the call returns.
+/// attention); *scratch* is dead when the call returns; *packed* is made once a step from a weight, for all samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Memory {
     /// Kept from the forward to the backward pass.
@@ -22,6 +22,10 @@ pub struct Memory {
     pub forward_scratch: usize,
     /// For the backward call alone.
     pub backward_scratch: usize,
+    /// Of the weight as the forward calls of a step want it; see [`Op::pack`].
+    pub forward_packed: usize,
+    /// Of the weight as the backward calls of a step want it.
+    pub backward_packed: usize,
 }
 
 /// What a backward pass reads besides dy: all that is not named here is freed, or reused, after its last forward use.
@@ -64,6 +68,8 @@ pub struct Forward<'a, T> {
     pub workspace: &'a mut [T],
     /// Scratch; holds anything before.
     pub scratch: &'a mut [T],
+    /// What [`Op::pack`] made of the weight for the forward pass; empty if the weight is no parameter.
+    pub packed: &'a [T],
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
@@ -95,12 +101,40 @@ pub struct Backward<'a, T> {
     pub dx: [Option<Gradient<'a, T>>; MAX_OPERANDS],
     /// Scratch; holds anything before.
     pub scratch: &'a mut [T],
+    /// What [`Op::pack`] made of the weight for the backward pass; empty if the weight is no parameter.
+    pub packed: &'a [T],
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
     pub level: Level,
     /// The random stream of the forward pass.
     pub stream: Option<Stream>,
+}
+
+/// The operand that may be packed once a step.
+pub const WEIGHT: usize = 1;
+
+/// Which of the two packed forms of a weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// For [`Op::forward`].
+    Forward,
+    /// For [`Differentiable::backward`].
+    Backward,
+}
+
+/// What packing is given.
+pub struct Pack<'a, T> {
+    /// Which form is wanted.
+    pub pass: Pass,
+    /// Operand [`WEIGHT`].
+    pub weight: &'a [T],
+    /// To be written completely; holds anything before.
+    pub packed: &'a mut [T],
+    /// Shapes of the operands.
+    pub shapes: &'a [Shape],
+    /// Instruction-set level for the kernels.
+    pub level: Level,
 }
 
 /// An operation: numbers in, numbers out, for one sample.
@@ -118,6 +152,10 @@ pub trait Op<T: Real>: Send + Sync {
     fn memory(&self, _operands: &[Shape]) -> Memory {
         Memory::default()
     }
+
+    /// Turns operand [`WEIGHT`] into the form the kernels want, once a step for all its samples. Called if [`Memory`] asks for it
+    /// and the operand is a parameter.
+    fn pack(&self, _io: Pack<'_, T>) {}
 
     /// Writes the result and the workspace.
     fn forward(&self, io: Forward<'_, T>);

@@ -9,7 +9,7 @@
 //! A plan holds no numbers; `session` replays it.
 
 use super::graph::{Graph, Source, Var};
-use super::op::{Memory, Op};
+use super::op::{Memory, Op, WEIGHT};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::{Real, Write};
@@ -55,6 +55,8 @@ pub(crate) struct Step<T> {
     pub parameters: Vec<(usize, Range<usize>)>,
     /// Parameter gradients to write; disjoint, sorted by start. `Write::Set` means: set for the first sample of a shard.
     pub parameter_gradients: Vec<Piece>,
+    /// The weight's place in the flat slab, and its packed form's place in that of the pass; `None` if nothing is packed.
+    pub packed: Option<(Range<usize>, Range<usize>)>,
 }
 
 /// A stretch of the slab and the times in which it is in use, both ends included.
@@ -78,6 +80,8 @@ pub(crate) struct Plan<T> {
     /// Value and gradient of the loss in the slab.
     pub loss: Option<(usize, usize)>,
     pub slab_len: usize,
+    /// Packed weights of the forward and of the backward list, one after another in the order of the list.
+    pub packed_len: [usize; 2],
     pub parameter_len: usize,
     /// Parameters that no path joins to the loss: their gradient is zero.
     pub unreached: Vec<Range<usize>>,
@@ -224,7 +228,7 @@ impl<T: Real> Plan<T> {
             Source::Parameter(index) => graph.parameters().get(index).map(|parameter| parameter.range()),
             _ => None,
         };
-        let step = |node: usize, backward: bool, written: &mut [bool]| -> Option<Step<T>> {
+        let step = |node: usize, backward: bool, written: &mut [bool], packed_len: &mut usize| -> Option<Step<T>> {
             let Source::Op { op, operands } = &nodes[node].source else { return None };
             let reads = if backward { Some(op.differentiable()?.reads()) } else { None };
             let mut pieces = Vec::new();
@@ -260,11 +264,21 @@ impl<T: Real> Plan<T> {
             pieces.sort_by_key(|piece| piece.start);
             parameter_gradients.sort_by_key(|piece| piece.start);
             let (op, shapes) = (Arc::clone(op), shapes_of(graph, operands));
-            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients })
+            let memory: Memory = op.memory(&shapes);
+            let len = if backward { memory.backward_packed } else { memory.forward_packed };
+            let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var)).filter(|_| len > 0);
+            let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
+            *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
+            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed })
         };
         let mut written = vec![false; nodes.len()];
-        let forward_steps: Vec<Step<T>> = forward_order.iter().filter_map(|&node| step(node, false, &mut written)).collect();
-        let backward_steps: Vec<Step<T>> = backward_order.iter().filter_map(|&node| step(node, true, &mut written)).collect();
+        let mut packed_len = [0; 2];
+        let mut steps = |order: &[usize], backward: bool| -> Vec<Step<T>> {
+            let packed_len = &mut packed_len[usize::from(backward)];
+            order.iter().filter_map(|&node| step(node, backward, &mut written, packed_len)).collect()
+        };
+        let forward_steps = steps(&forward_order, false);
+        let backward_steps = steps(&backward_order, true);
         // Every step borrows only buffers opened above.
         debug_assert_eq!((forward_steps.len(), backward_steps.len()), (forward_order.len(), backward_order.len()));
 
@@ -283,6 +297,7 @@ impl<T: Real> Plan<T> {
                 .collect(),
             loss: loss.and_then(|loss| Some((lifetimes.range(values[loss.0]?).start, lifetimes.range(gradients[loss.0]?).start))),
             slab_len,
+            packed_len,
             parameter_len: graph.parameter_count(),
             unreached,
             #[cfg(test)]

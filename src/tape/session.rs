@@ -7,7 +7,7 @@
 //! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic but the sum over shards.
 
 use super::graph::{Graph, MAX_INPUTS, Var};
-use super::op::{Backward, Forward, Gradient, MAX_OPERANDS};
+use super::op::{Backward, Forward, Gradient, MAX_OPERANDS, Pack, Pass};
 use super::plan::{ALIGNMENT_BYTES, Piece, Plan, Role, Step, alignment};
 use crate::error::{Error, Result};
 use phyture_kernels::level::Level;
@@ -66,6 +66,8 @@ pub struct Session<T> {
     level: Level,
     poison: bool,
     slabs: Mutex<Vec<Slab<T>>>,
+    /// Weights as the forward and the backward calls of a step want them.
+    packed: [Slab<T>; 2],
     shards: Vec<Shard<T>>,
     gradients: Vec<T>,
     losses: Vec<f64>,
@@ -109,6 +111,7 @@ impl<T: Real> Session<T> {
         Ok(Self {
             level,
             poison: false,
+            packed: plan.packed_len.map(Slab::new),
             slabs: Mutex::new((0..count.min(shards)).map(|_| Slab::new(plan.slab_len)).collect()),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
@@ -152,12 +155,19 @@ impl<T: Real> Session<T> {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
-        let Self { plan, level, poison, slabs, shards, gradients, losses, results, .. } = self;
+        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, .. } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
-        let replay = Replay { plan, level, poison, slabs, parameters, dropout, fill, samples, result_len, shards: count };
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
         let mut work = || {
+            let [forward, backward] = packed.each_mut().map(Slab::aligned);
+            join(
+                || pack(&plan.forward, Pass::Forward, level, parameters, 0, forward),
+                || pack(&plan.backward, Pass::Backward, level, parameters, 0, backward),
+            );
+            let packed = [&*forward, &*backward];
+            let replay =
+                Replay { plan, level, poison, slabs, packed, parameters, dropout, fill, samples, result_len, shards: count };
             replay.work(shards, 0, losses_mut, results);
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
@@ -257,6 +267,28 @@ fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
     b();
 }
 
+/// Packs the weights of a list of steps, whose packed forms lie one after another from `start` on.
+fn pack<T: Real>(steps: &[Step<T>], pass: Pass, level: Level, parameters: &[T], start: usize, packed: &mut [T]) {
+    match steps {
+        [] => {}
+        [step] => {
+            if let Some((weight, range)) = &step.packed {
+                let (weight, packed) = (&parameters[weight.clone()], &mut packed[range.start - start..range.end - start]);
+                step.op.pack(Pack { pass, weight, packed, shapes: &step.shapes, level });
+            }
+        }
+        _ => {
+            let (low, high) = steps.split_at(steps.len() / 2);
+            let middle = low.iter().rev().find_map(|step| step.packed.as_ref()).map_or(start, |(_, range)| range.end);
+            let (low_packed, high_packed) = packed.split_at_mut(middle - start);
+            join(
+                || pack(low, pass, level, parameters, start, low_packed),
+                || pack(high, pass, level, parameters, middle, high_packed),
+            );
+        }
+    }
+}
+
 /// gradients = Σ shards, element by element in the order of the shards.
 fn reduce<T: Real>(gradients: &mut [T], shards: &[Shard<T>], used: &(dyn Fn(usize) -> bool + Sync), start: usize) {
     if gradients.len() > REDUCE_BLOCK {
@@ -277,6 +309,7 @@ struct Replay<'a, T> {
     level: Level,
     poison: bool,
     slabs: &'a Mutex<Vec<Slab<T>>>,
+    packed: [&'a [T]; 2],
     parameters: &'a [T],
     dropout: Option<DropoutKey>,
     fill: Fill<'a, T>,
@@ -362,6 +395,7 @@ impl<T: Real> Replay<'_, T> {
             y: Default::default(),
             workspace: Default::default(),
             scratch: Default::default(),
+            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[0][range.clone()]),
             shapes: &step.shapes,
             level: self.level,
             stream: self.stream(step, sample),
@@ -387,6 +421,7 @@ impl<T: Real> Replay<'_, T> {
             workspace: &[],
             dx: [const { None }; MAX_OPERANDS],
             scratch: Default::default(),
+            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[1][range.clone()]),
             shapes: &step.shapes,
             level: self.level,
             stream: self.stream(step, sample),

@@ -45,7 +45,8 @@ impl<T: Real> Op<T> for Attention {
         let ((queries, d), (keys, _)) = (q.rows(), k.rows());
         let scratch = attention::scratch_len(self.heads, queries, keys, d / self.heads);
         // The kernel makes all three gradients; those nobody asks for go to scratch.
-        Memory { workspace: self.heads * queries, forward_scratch: scratch, backward_scratch: scratch + q.len() + 2 * k.len() }
+        let backward_scratch = scratch + q.len() + 2 * k.len();
+        Memory { workspace: self.heads * queries, forward_scratch: scratch, backward_scratch, ..Memory::default() }
     }
 
     fn forward(&self, io: Forward<'_, T>) {

@@ -1,14 +1,14 @@
 //! Convolution along time with replicate padding, bias, and what follows it in the same pass.
-//!   z[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[clamp(t + j − left), c],   y = dropout(f(z))
-//! x [n, in], W [out, in, k] as PyTorch stores it, b [out] or absent, y [n + left + right − k + 1, out]. The backward pass reads
+//!   z[t, o] = b[o] + Σ_{c,j} W[j, c, o]·x[clamp(t + j − left), c],   y = dropout(f(z))
+//! x [n, in], W [k, in, out] (files: [out, in, k]), b [out] or absent, y [n + left + right − k + 1, out]. The backward pass reads
 //! x, W, and y instead of z; a dropout mask is drawn again.
 
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
-use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, misfit};
+use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Pack, Pass, Reads, misfit};
 use phyture_kernels::activation::Activation;
-use phyture_kernels::conv1d::{self, Geometry, WeightLayout};
+use phyture_kernels::conv1d::{self, Geometry, Weight};
 use phyture_kernels::dropout::Mask;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Rows, RowsMut};
@@ -49,6 +49,11 @@ pub struct Conv1d {
     pub epilogue: Epilogue,
 }
 
+/// The weight as it was packed once a step, or as it is.
+fn weight<'a, T>(plain: &'a [T], packed: &'a [T]) -> Weight<'a, T> {
+    if packed.is_empty() { Weight::Plain(plain) } else { Weight::Packed(packed) }
+}
+
 /// Lengths of one convolution.
 struct Sizes {
     geometry: Geometry,
@@ -60,8 +65,8 @@ struct Sizes {
 impl Conv1d {
     fn sizes(&self, operands: &[Shape]) -> Option<Sizes> {
         let [x, weight, ..] = operands else { return None };
-        let ([rows, inputs], [outputs, reads, taps]) = (x.lengths(), weight.lengths()) else { return None };
-        let geometry = Geometry { taps: *taps, left: self.padding.0, right: self.padding.1, layout: WeightLayout::OutInTap };
+        let ([rows, inputs], [taps, reads, outputs]) = (x.lengths(), weight.lengths()) else { return None };
+        let geometry = Geometry { taps: *taps, left: self.padding.0, right: self.padding.1 };
         (inputs == reads).then_some(Sizes { geometry, rows: *rows, inputs: *inputs, outputs: *outputs })
     }
 }
@@ -82,7 +87,7 @@ impl<T: Real> Op<T> for Conv1d {
                 Shape::new("conv1d", &[sizes.geometry.output_rows(sizes.rows), sizes.outputs])
             }
             _ => {
-                let expected = "x [n, in], weight [out, in, k] with k no longer than the padded sequence, and a bias [out] or none";
+                let expected = "x [n, in], weight [k, in, out] with k no longer than the padded sequence, and a bias [out] or none";
                 Err(misfit("conv1d", operands, expected))
             }
         }
@@ -90,9 +95,20 @@ impl<T: Real> Op<T> for Conv1d {
 
     fn memory(&self, operands: &[Shape]) -> Memory {
         let Some(Sizes { geometry, rows, inputs, outputs }) = self.sizes(operands) else { return Memory::default() };
-        let scratch = conv1d::scratch_len(geometry, rows, inputs, outputs);
+        let scratch = conv1d::scratch_len(geometry, inputs, outputs);
         // Gradient of z in front.
-        Memory { workspace: 0, forward_scratch: scratch, backward_scratch: geometry.output_rows(rows) * outputs + scratch }
+        let backward_scratch = geometry.output_rows(rows) * outputs + scratch;
+        let forward_packed = conv1d::packed_len(geometry, inputs, outputs);
+        let backward_packed = conv1d::packed_len(geometry, outputs, inputs);
+        Memory { workspace: 0, forward_scratch: scratch, backward_scratch, forward_packed, backward_packed }
+    }
+
+    fn pack(&self, io: Pack<'_, T>) {
+        let Some(Sizes { geometry, inputs, outputs, .. }) = self.sizes(io.shapes) else { return };
+        match io.pass {
+            Pass::Forward => conv1d::pack(io.level, geometry, (inputs, outputs), io.weight, io.packed),
+            Pass::Backward => conv1d::pack_transposed(io.level, geometry, (inputs, outputs), io.weight, io.packed),
+        }
     }
 
     fn forward(&self, io: Forward<'_, T>) {
@@ -100,7 +116,7 @@ impl<T: Real> Op<T> for Conv1d {
         let y = RowsMut::packed(io.y, sizes.geometry.output_rows(sizes.rows), sizes.outputs);
         let bias = (!bias.is_empty()).then_some(io.x[2]);
         let epilogue = self.epilogue.kernel(io.stream);
-        conv1d::forward(io.level, sizes.geometry, rows(io.x[0], x), io.x[1], bias, epilogue, y, io.scratch);
+        conv1d::forward(io.level, sizes.geometry, rows(io.x[0], x), weight(io.x[1], io.packed), bias, epilogue, y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -130,10 +146,11 @@ impl<T: Real> Differentiable<T> for Conv1d {
         };
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            conv1d::backward_input(io.level, geometry, dz, io.x[1], rows_mut(dx.values, x), dx.write, scratch);
+            let weight = weight(io.x[1], io.packed);
+            conv1d::backward_input(io.level, geometry, dz, weight, rows_mut(dx.values, x), dx.write, scratch);
         }
         if let Some(dweight) = dweight {
-            conv1d::backward_weight(io.level, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write, scratch);
+            conv1d::backward_weight(io.level, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write);
         }
         if let Some(dbias) = dbias {
             conv1d::backward_bias(io.level, dz, dbias.values, dbias.write);
@@ -149,8 +166,8 @@ mod tests {
     const LEAKY: Conv1d = Conv1d { padding: (3, 3), epilogue: Epilogue::Leaky { leak: 0.01, dropout: 0.2 } };
     const TANH: Conv1d = Conv1d { padding: (0, 0), epilogue: Epilogue::Tanh };
 
-    gradcheck!(plain: PLAIN, [[9, 3], [4, 3, 3], [4]], [[9, 3], [4, 3, 3]], [[3, 1], [2, 1, 3], [2]]);
-    gradcheck!(padded_leaky_dropout: LEAKY, [[8, 3], [4, 3, 5], [4]], [[1, 1], [1, 1, 5], [1]], [[2, 2], [1, 2, 5], [1]]);
-    gradcheck!(tanh: TANH, [[9, 3], [4, 3, 3], [4]], [[3, 1], [2, 1, 3], [2]]);
-    gradcheck!(uneven_padding: Conv1d { padding: (2, 3), epilogue: Epilogue::None }, [[6, 2], [3, 2, 4], [3]]);
+    gradcheck!(plain: PLAIN, [[9, 3], [3, 3, 4], [4]], [[9, 3], [3, 3, 4]], [[3, 1], [3, 1, 2], [2]]);
+    gradcheck!(padded_leaky_dropout: LEAKY, [[8, 3], [5, 3, 4], [4]], [[1, 1], [5, 1, 1], [1]], [[2, 2], [5, 2, 1], [1]]);
+    gradcheck!(tanh: TANH, [[9, 3], [3, 3, 4], [4]], [[3, 1], [3, 1, 2], [2]]);
+    gradcheck!(uneven_padding: Conv1d { padding: (2, 3), epilogue: Epilogue::None }, [[6, 2], [4, 2, 3], [3]]);
 }

@@ -32,7 +32,7 @@ impl<T: Real> Op<T> for LayerNorm {
 
     fn memory(&self, operands: &[Shape]) -> Memory {
         let (n, channels) = operands.first().map(Shape::rows).unwrap_or_default();
-        Memory { workspace: 2 * n, forward_scratch: 0, backward_scratch: 2 * channels }
+        Memory { workspace: 2 * n, backward_scratch: 2 * channels, ..Memory::default() }
     }
 
     fn forward(&self, io: Forward<'_, T>) {

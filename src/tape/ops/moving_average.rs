@@ -30,7 +30,7 @@ impl<T: Real> Op<T> for MovingAverage {
     fn memory(&self, operands: &[Shape]) -> Memory {
         let (n, channels) = operands.first().map(Shape::rows).unwrap_or_default();
         let scratch = moving_average::scratch_len(n, channels);
-        Memory { workspace: 0, forward_scratch: scratch, backward_scratch: scratch }
+        Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
     fn forward(&self, io: Forward<'_, T>) {

@@ -32,7 +32,7 @@ impl<T: Real> Op<T> for Temporal {
     fn memory(&self, operands: &[Shape]) -> Memory {
         let [x, weight, ..] = operands else { return Memory::default() };
         let scratch = temporal::scratch_len(x.rows().0, weight.rows().0, x.rows().1);
-        Memory { workspace: 0, forward_scratch: scratch, backward_scratch: scratch }
+        Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
     fn forward(&self, io: Forward<'_, T>) {
