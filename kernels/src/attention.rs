@@ -114,11 +114,18 @@ fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>,
     tile::rows::<T, I, _, _, MR, NR>(&rows, n, panels, &mut Store { c, bias: None, write });
 }
 
-/// c += sᵀ·b, s `[keys, lanes]`, b `[keys, width]`.
+/// c += sᵀ·b for a block s `[keys, lanes]`, with b `[all keys, width]` in panels, from line `key` on.
 #[inline(always)]
-fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(s: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>) {
+fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(
+    s: Rows<'_, T>,
+    (panels, keys, key): (&[T], usize, usize),
+    c: RowsMut<'_, T>,
+) {
     let mut sink = Store { c, bias: None, write: Write::Add };
-    tile::columns::<T, I, _, MR, NR>(&s, &b, &mut sink);
+    for (panel, j) in panels.chunks_exact(keys * NR).zip((0..).step_by(NR)) {
+        let panel = &panel.as_chunks::<NR>().0[key..key + s.rows()];
+        tile::columns::<T, I, _, MR, NR>(&s, panel, (j, NR), &mut sink);
+    }
 }
 
 /// o and `log_sum_exp` `[heads, queries]` from q, k, v.
@@ -167,7 +174,7 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
         let keep_scale = T::of(self.dropout.map_or(1.0, Mask::scale));
         for h in 0..heads {
             let (q, k) = (self.q.columns(h * size, size), self.k.columns(h * size, size));
-            pad(self.v.columns(h * size, size), T::ONE, wide, values);
+            panels::<T, NR>(self.v.columns(h * size, size), T::ONE, keys, values);
             for first in (0..queries).step_by(block) {
                 let end = queries.min(first + block);
                 lanes::<T, NR>(q.range(first, end), self.shape.scale(), query_lanes);
@@ -188,8 +195,8 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
                     for (row, factor) in sums.chunks_exact_mut(wide).zip(factor.iter()) {
                         row.iter_mut().for_each(|x| *x *= *factor);
                     }
-                    let (scores, values) = (Rows::packed(scores, key_end - key, block), Rows::packed(values, keys, wide));
-                    transposed_product::<T, I, MR, NR>(scores, values.range(key, key_end), RowsMut::packed(sums, block, wide));
+                    let scores = Rows::packed(scores, key_end - key, block);
+                    transposed_product::<T, I, MR, NR>(scores, (values, keys, key), RowsMut::packed(sums, block, wide));
                 }
                 for i in first..end {
                     let (lane, target) = (i - first, &mut self.o.row_mut(i)[h * size..][..size]);
@@ -316,7 +323,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
         let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
         let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
         let mut scratch = self.scratch;
-        let padded_keys = take(&mut scratch, keys * wide);
+        let key_panels = take(&mut scratch, keys * wide);
         let key_sums = take(&mut scratch, keys * wide);
         let value_sums = take(&mut scratch, keys * wide);
         let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * block));
@@ -327,7 +334,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
         for h in 0..heads {
             let (q, k, v) = (self.q.columns(h * size, size), self.k.columns(h * size, size), self.v.columns(h * size, size));
             let (o, d_o) = (self.o.columns(h * size, size), self.d_o.columns(h * size, size));
-            pad(k, scale, wide, padded_keys);
+            panels::<T, NR>(k, scale, keys, key_panels);
             key_sums.fill(T::ZERO);
             value_sums.fill(T::ZERO);
             for first in (0..queries).step_by(block) {
@@ -362,8 +369,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
                     let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
                     product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
                     product::<T, I, MR, NR>(ds, query_panels, target(&mut key_sums[key * wide..key_end * wide]), Write::Add);
-                    let b = Rows::packed(padded_keys, keys, wide).range(key, key_end);
-                    transposed_product::<T, I, MR, NR>(ds, b, RowsMut::packed(query_sums, block, wide));
+                    transposed_product::<T, I, MR, NR>(ds, (key_panels, keys, key), RowsMut::packed(query_sums, block, wide));
                 }
                 emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
             }

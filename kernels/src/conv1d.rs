@@ -429,10 +429,6 @@ pub(crate) struct BackwardWeight<'a, T> {
     write: Write,
 }
 
-/// Rows of dz, and of x for all taps, that are summed before the next ones are read. The x of a block stays in the first-level
-/// cache while every tile of the weight passes over it.
-const TIME_BLOCK: usize = 96;
-
 impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
@@ -441,24 +437,31 @@ impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
         if n == 0 && self.write == Write::Set {
             self.dweight.fill(T::ZERO);
         }
-        for start in (0..n).step_by(TIME_BLOCK) {
-            let end = n.min(start + TIME_BLOCK);
+        let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
+        // For each block of rows, x and one panel of dz stay in the first-level cache for all taps.
+        for start in (0..n).step_by(tile::COLUMN_DEPTH) {
+            let end = n.min(start + tile::COLUMN_DEPTH);
             let write = if start == 0 { self.write } else { Write::Add };
-            for (j, dw) in self.dweight.chunks_exact_mut((inputs * outputs).max(1)).enumerate() {
-                // Output rows up to `inner` read the first row of x, from `behind` on the last one.
-                let inner = left.saturating_sub(j).clamp(start, end);
-                let behind = (self.x.rows() + left).saturating_sub(j).clamp(inner, end);
-                let parts = [
-                    (start, inner, Rows::repeated(self.x.row(0), inner - start)),
-                    (inner, behind, self.x.range((inner + j).saturating_sub(left).min(self.x.rows()), self.x.rows())),
-                    (behind, end, Rows::repeated(self.x.row(self.x.rows() - 1), end - behind)),
-                ];
-                let mut write = write;
-                for (first, last, x) in parts {
-                    if first < last {
-                        let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
-                        tile::columns::<T, I, _, MR, NR>(&x.range(0, last - first), &self.dz.range(first, last), &mut sink);
-                        write = Write::Add;
+            for column in (0..outputs).step_by(NR) {
+                let panel = &mut panel[..end - start];
+                tile::pack_panel(&self.dz.range(start, end), column, panel);
+                for (j, dw) in self.dweight.chunks_exact_mut((inputs * outputs).max(1)).enumerate() {
+                    // Output rows up to `inner` read the first row of x, from `behind` on the last one.
+                    let inner = left.saturating_sub(j).clamp(start, end);
+                    let behind = (self.x.rows() + left).saturating_sub(j).clamp(inner, end);
+                    let parts = [
+                        (start, inner, Rows::repeated(self.x.row(0), inner - start)),
+                        (inner, behind, self.x.range((inner + j).saturating_sub(left).min(self.x.rows()), self.x.rows())),
+                        (behind, end, Rows::repeated(self.x.row(self.x.rows() - 1), end - behind)),
+                    ];
+                    let mut write = write;
+                    for (first, last, x) in parts {
+                        if first < last {
+                            let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
+                            let panel = &panel[first - start..last - start];
+                            tile::columns::<T, I, _, MR, NR>(&x, panel, (column, NR.min(outputs - column)), &mut sink);
+                            write = Write::Add;
+                        }
                     }
                 }
             }

@@ -109,10 +109,20 @@ pub(crate) struct TransposedProduct<'a, T> {
 impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
-        for (start, end) in blocks(self.a.rows()) {
+        if self.a.rows() == 0 && self.write == Write::Set {
+            (0..self.c.rows()).for_each(|i| self.c.row_mut(i).fill(T::ZERO));
+        }
+        let n = self.b.cols();
+        let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
+        for start in (0..self.a.rows()).step_by(tile::COLUMN_DEPTH) {
+            let end = self.a.rows().min(start + tile::COLUMN_DEPTH);
             let write = if start == 0 { self.write } else { Write::Add };
-            let mut sink = Store { c: self.c.reborrow(), bias: None, write };
-            tile::columns::<T, I, _, MR, NR>(&self.a.range(start, end), &self.b.range(start, end), &mut sink);
+            for j in (0..n).step_by(NR) {
+                let panel = &mut panel[..end - start];
+                tile::pack_panel(&self.b.range(start, end), j, panel);
+                let mut sink = Store { c: self.c.reborrow(), bias: None, write };
+                tile::columns::<T, I, _, MR, NR>(&self.a.range(start, end), panel, (j, NR.min(n - j)), &mut sink);
+            }
         }
     }
 }

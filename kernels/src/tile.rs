@@ -20,6 +20,9 @@ pub(crate) const WIDEST: usize = 32;
 /// Rows of the left operand that pass over one panel before the next panel is taken: they stay in the second-level cache.
 const ROW_BLOCK: usize = 240;
 
+/// Lines of a panel that the column form takes at a time: with a left operand of 64 columns, 30 KiB in f32.
+pub(crate) const COLUMN_DEPTH: usize = 96;
+
 /// Numbers that the panels of a right operand `[depth, n]` take at any level.
 pub(crate) const fn panels_len(depth: usize, n: usize) -> usize {
     depth * n.next_multiple_of(WIDEST)
@@ -268,21 +271,28 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     }
 }
 
-/// One tile of the column form: `acc[i][j] = Σ_p left[p][i₀ + i]·right[p][j₀ + j]`.
+/// Packs columns `j…` of b as one panel, filled up with zeros.
+#[inline(always)]
+pub(crate) fn pack_panel<T: Real, const NR: usize>(b: &Rows<'_, T>, j: usize, panel: &mut [[T; NR]]) {
+    let width = NR.min(b.cols() - j);
+    for (p, line) in panel.iter_mut().enumerate() {
+        line[width..].fill(T::ZERO);
+        line[..width].copy_from_slice(&b.row(p)[j..][..width]);
+    }
+}
+
+/// One tile of the column form: `acc[i][j] = Σ_p left[p][i₀ + i]·panel[p][j]`.
 #[inline(always)]
 fn column_tile<T: Real, I: Isa, const MR: usize, const NR: usize>(
-    (left, i_first): (&Rows<'_, T>, usize),
-    (right, j_first): (&Rows<'_, T>, usize),
+    left: &Rows<'_, T>,
+    i_first: usize,
+    panel: &[[T; NR]],
 ) -> [Pair<T, I>; MR] {
-    assert!(
-        i_first + MR <= left.cols() && j_first + NR <= right.cols() && left.rows() <= right.rows(),
-        "a tile beyond its operands"
-    );
+    assert!(i_first + MR <= left.cols() && panel.len() <= left.rows(), "a tile beyond its operand");
     let mut acc = [[I::Vector::splat(T::ZERO); 2]; MR];
-    for p in 0..left.rows() {
-        // SAFETY: p is a row of both operands, whose columns were checked above.
-        let b = load::<T, I, NR>(unsafe { right.chunk_unchecked(p, j_first) });
-        // SAFETY: as above.
+    for (p, line) in panel.iter().enumerate() {
+        let b = load::<T, I, NR>(line);
+        // SAFETY: p is a row of the operand, whose columns were checked above.
         let a: &[T; MR] = unsafe { left.chunk_unchecked(p, i_first) };
         for i in 0..MR {
             accumulate::<T, I>(&mut acc[i], a[i], b);
@@ -291,54 +301,37 @@ fn column_tile<T: Real, I: Isa, const MR: usize, const NR: usize>(
     acc
 }
 
-/// sink ← leftᵀ·right, left `[depth, m]`, right `[depth, n]`.
+/// sink ← leftᵀ·panel, left `[depth, m]`, panel `[depth, NR]`, of which `width` columns belong to columns `j…` of the result. Left
+/// and panel should fit in the first-level cache together; the left one is passed over once, the panel m/MR times.
 #[inline(always)]
 pub(crate) fn columns<T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
     left: &Rows<'_, T>,
-    right: &Rows<'_, T>,
+    panel: &[[T; NR]],
+    (j, width): (usize, usize),
     sink: &mut S,
 ) {
-    let (m, n) = (left.cols(), right.cols());
-    // The last tile starts early enough to be whole; what it repeats is not stored again.
-    for j_wanted in (0..n).step_by(NR) {
-        let j = j_wanted.min(n.saturating_sub(NR));
-        for i_wanted in (0..m).step_by(MR) {
-            let i = i_wanted.min(m.saturating_sub(MR));
-            if m < MR || n < NR {
-                narrow_columns::<T, I, S, NR>(
-                    (left, i_wanted, MR.min(m - i_wanted)),
-                    (right, j_wanted, NR.min(n - j_wanted)),
-                    sink,
-                );
-                continue;
+    let m = left.cols();
+    if m < MR {
+        for i in 0..m {
+            let mut sums = [T::ZERO; NR];
+            for (p, line) in panel.iter().enumerate() {
+                let a = left.row(p)[i];
+                sums.iter_mut().zip(line).for_each(|(sum, b)| *sum = I::mul_add(a, *b, *sum));
             }
-            let acc = column_tile::<T, I, MR, NR>((left, i), (right, j));
-            if i == i_wanted && j == j_wanted {
-                store_rows!(acc, |row, sums| sink.store_whole::<I, NR>(i + row, j, sums));
-            } else {
-                for (row, sums) in spill::<T, I, MR, NR>(acc).iter().enumerate().skip(i_wanted - i) {
-                    sink.store::<I>(i + row, j_wanted, &sums[j_wanted - j..]);
-                }
-            }
+            sink.store::<I>(i, j, &sums[..width]);
         }
+        return;
     }
-}
-
-/// A tile of [`columns`] for operands narrower than a tile, each given with its first column and their number.
-#[inline(always)]
-fn narrow_columns<T: Real, I: Isa, S: Sink<T>, const NR: usize>(
-    (left, i, height): (&Rows<'_, T>, usize, usize),
-    (right, j, width): (&Rows<'_, T>, usize, usize),
-    sink: &mut S,
-) {
-    let mut sums = [T::ZERO; NR];
-    for row in i..i + height {
-        let sums = &mut sums[..width];
-        sums.fill(T::ZERO);
-        for p in 0..left.rows() {
-            let a = left.row(p)[row];
-            sums.iter_mut().zip(&right.row(p)[j..]).for_each(|(sum, b)| *sum = I::mul_add(a, *b, *sum));
+    for i_wanted in (0..m).step_by(MR) {
+        // The last tile starts early enough to be whole; what it repeats is not stored again.
+        let i = i_wanted.min(m - MR);
+        let acc = column_tile::<T, I, MR, NR>(left, i, panel);
+        if i == i_wanted && width == NR {
+            store_rows!(acc, |row, sums| sink.store_whole::<I, NR>(i + row, j, sums));
+        } else {
+            for (row, sums) in spill::<T, I, MR, NR>(acc).iter().enumerate().skip(i_wanted - i) {
+                sink.store::<I>(i + row, j, &sums[..width]);
+            }
         }
-        sink.store::<I>(row, j, sums);
     }
 }
