@@ -11,7 +11,9 @@ use std::marker::PhantomData;
 use std::sync::OnceLock;
 
 use crate::Real;
-use crate::vector::{Array, Vector};
+#[cfg(target_arch = "aarch64")]
+use crate::vector::Array;
+use crate::vector::Vector;
 
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
 pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
@@ -213,7 +215,7 @@ pub(crate) trait Isa {
 pub(crate) struct Plain;
 impl Isa for Plain {
     const FMA: bool = false;
-    type Vector<T: Real> = Array<T, 4, false>;
+    type Vector<T: Real> = T::Plain;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::plain_tile(kernel);

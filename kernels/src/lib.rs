@@ -23,6 +23,7 @@ pub mod level;
 pub mod linear;
 pub mod loss;
 pub mod moving_average;
+pub mod peak;
 pub mod random;
 pub mod real;
 pub mod reference;

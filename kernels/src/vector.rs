@@ -38,6 +38,7 @@ pub(crate) trait Vector<T>: Copy {
 
 /// An array in the place of a register; `FMA` says whether a multiply-add is one instruction.
 #[derive(Clone, Copy)]
+#[cfg_attr(all(target_arch = "x86_64", not(test)), expect(dead_code, reason = "every level of this architecture has registers"))]
 pub(crate) struct Array<T, const N: usize, const FMA: bool>([T; N]);
 
 impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
@@ -63,8 +64,9 @@ impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
     }
     #[inline(always)]
     fn mul_add(mut self, a: Self, b: Self) -> Self {
-        for (x, (a, b)) in self.0.iter_mut().zip(a.0.into_iter().zip(b.0)) {
-            *x = if FMA { x.mul_add(a, b) } else { *x * a + b };
+        for lane in 0..N {
+            let x = &mut self.0[lane];
+            *x = if FMA { x.mul_add(a.0[lane], b.0[lane]) } else { *x * a.0[lane] + b.0[lane] };
         }
         self
     }
@@ -74,6 +76,9 @@ impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
 /// operand and one of the left. A supertrait of [`Real`]; not for use outside this crate.
 #[expect(private_bounds, reason = "registers are this crate's own")]
 pub trait Registers: Sized {
+    /// What every processor of the architecture has.
+    #[doc(hidden)]
+    type Plain: Vector<Self>;
     /// 256 bits.
     #[cfg(target_arch = "x86_64")]
     #[doc(hidden)]
@@ -96,9 +101,13 @@ pub trait Registers: Sized {
 }
 
 macro_rules! registers {
-    ($t:ident: plain $plain:tt avx2 $avx2:ident $avx2_tile:tt avx512 $avx512:ident $avx512_tile:tt neon $neon:tt) => {
+    ($t:ident: plain $sse:ident of $lanes:literal $plain:tt avx2 $avx2:ident $avx2_tile:tt avx512 $avx512:ident $avx512_tile:tt neon $neon:tt) => {
         #[expect(private_bounds, reason = "as above")]
         impl Registers for $t {
+            #[cfg(target_arch = "x86_64")]
+            type Plain = std::arch::x86_64::$sse;
+            #[cfg(not(target_arch = "x86_64"))]
+            type Plain = Array<$t, { $lanes }, false>;
             #[cfg(target_arch = "x86_64")]
             type Avx2 = std::arch::x86_64::$avx2;
             #[cfg(target_arch = "x86_64")]
@@ -120,8 +129,8 @@ macro_rules! registers {
     };
 }
 
-registers!(f32: plain [4 x 8] avx2 __m256 [6 x 16] avx512 __m512 [12 x 32] neon [8 x 8]);
-registers!(f64: plain [2 x 8] avx2 __m256d [6 x 8] avx512 __m512d [12 x 16] neon [4 x 8]);
+registers!(f32: plain __m128 of 4 [4 x 8] avx2 __m256 [6 x 16] avx512 __m512 [12 x 32] neon [8 x 8]);
+registers!(f64: plain __m128d of 2 [4 x 4] avx2 __m256d [6 x 8] avx512 __m512d [12 x 16] neon [4 x 8]);
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
@@ -130,7 +139,7 @@ mod x86 {
     use super::Vector;
 
     macro_rules! register {
-        ($register:ident of $lanes:literal $t:ident: $splat:ident $load:ident $store:ident $add:ident $mul_add:ident) => {
+        ($register:ident of $lanes:literal $t:ident: $splat:ident $load:ident $store:ident $add:ident $mul_add:expr) => {
             // SAFETY, of every block here: the instructions exist. A kernel meets this type only as the register of its level, and a
             // level's kernel runs only inside the function of level.rs that enables the level's instructions, after the processor
             // reported them. Pointers are the caller's to vouch for.
@@ -159,14 +168,35 @@ mod x86 {
                 #[inline(always)]
                 fn mul_add(self, a: Self, b: Self) -> Self {
                     // SAFETY: as said above.
-                    unsafe { arch::$mul_add(self, a, b) }
+                    unsafe { ($mul_add)(self, a, b) }
                 }
             }
         };
     }
 
-    register!(__m256 of 8 f32: _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps _mm256_fmadd_ps);
-    register!(__m256d of 4 f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd _mm256_fmadd_pd);
-    register!(__m512 of 16 f32: _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps _mm512_fmadd_ps);
-    register!(__m512d of 8 f64: _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd _mm512_fmadd_pd);
+    // SSE has no multiply-add: two instructions, rounded twice.
+    register!(__m128 of 4 f32: _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps |x, a, b| arch::_mm_add_ps(arch::_mm_mul_ps(x, a), b));
+    register!(__m128d of 2 f64: _mm_set1_pd _mm_loadu_pd _mm_storeu_pd _mm_add_pd |x, a, b| arch::_mm_add_pd(arch::_mm_mul_pd(x, a), b));
+    register!(__m256 of 8 f32: _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps arch::_mm256_fmadd_ps);
+    register!(__m256d of 4 f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd arch::_mm256_fmadd_pd);
+    register!(__m512 of 16 f32: _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps arch::_mm512_fmadd_ps);
+    register!(__m512d of 8 f64: _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd arch::_mm512_fmadd_pd);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_array_does_the_arithmetic_of_a_register() {
+        let numbers = [1.5_f32, -2.0, 0.25, 4.0];
+        // SAFETY: four numbers are read.
+        let x = unsafe { Array::<f32, 4, true>::load(numbers.as_ptr()) };
+        let y = x.mul_add(Vector::splat(2.0), x).add(Vector::splat(1.0));
+        let mut found = [0.0_f32; 4];
+        // SAFETY: four numbers are written.
+        unsafe { y.store(found.as_mut_ptr()) };
+        assert_eq!(found, numbers.map(|x| 2.0_f32.mul_add(x, x) + 1.0));
+        assert_eq!(<Array<f64, 8, false> as Vector<f64>>::LANES, 8);
+    }
 }

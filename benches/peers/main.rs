@@ -1,0 +1,91 @@
+//! One row of the comparison with other programs: a training step or a forward pass, timed step by step, as one JSON line.
+//!
+//! `cargo bench --bench peers -- CASE THREADS BATCH HISTORY REPEATS`, where CASE is `dropout`, `nodropout` or `forward`. Also printed:
+//! the instruction-set level, the peak of fused multiply-adds on one thread measured just before, and the peak memory of the
+//! process. Started by `run.py` beside it, in turn with the other programs; statistics are made there.
+
+use phyture::nn::{Network, OutputScale, PhyTureConfig};
+use phyture::tape::{DropoutKey, Session, Threads};
+use phyture_kernels::adam::{self, Adam};
+use phyture_kernels::random::Stream;
+use phyture_kernels::{Level, peak};
+use std::time::Instant;
+
+/// Steps before the first timed one.
+const WARM_UP: usize = 2;
+
+/// Numbers that look like standardised inputs; the same for every sample, for time does not depend on them.
+fn fill(_: usize, inputs: &mut [&mut [f32]]) {
+    for (index, slab) in inputs.iter_mut().enumerate() {
+        let stream = Stream::new(1, 0, index as u64, 0);
+        slab.iter_mut().zip(0..).for_each(|(value, at)| *value = (2.0 * stream.uniform(at) - 1.0) as f32);
+    }
+}
+
+/// Largest resident memory of this process so far, MiB; Linux tells.
+fn peak_mib() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let kib = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?.trim().strip_suffix("kB")?.trim().parse::<f64>().ok()?;
+    Some(kib / 1024.0)
+}
+
+fn run() -> Result<String, String> {
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
+    let usage = "usage: dropout|nodropout|forward THREADS BATCH HISTORY REPEATS";
+    let [case, numbers @ ..] = arguments.as_slice() else { return Err(usage.into()) };
+    let numbers: Result<Vec<usize>, _> = numbers.iter().map(|number| number.parse()).collect();
+    let Ok(&[threads, batch, history, repeats]) = numbers.as_deref() else { return Err(usage.into()) };
+    let text = |error: phyture::Error| error.to_string();
+    let level = Level::detect().map_err(|error| error.to_string())?;
+    let fma_gflops = peak::f32_gflops(level);
+    let config = PhyTureConfig { history, ..PhyTureConfig::default() };
+    let network = Network::<f32>::new(&config, &OutputScale::unit(config.outputs), false).map_err(text)?;
+    let mut parameters = network.initial(0);
+    let mut seconds = Vec::new();
+    match case.as_str() {
+        "forward" => {
+            let mut session = Session::infer(network.graph(), &[network.output()], Threads(threads)).map_err(text)?;
+            for _ in 0..WARM_UP + repeats {
+                let start = Instant::now();
+                session.predict(&parameters, batch, &fill, &mut |_, _| {}).map_err(text)?;
+                seconds.push(start.elapsed().as_secs_f64());
+            }
+        }
+        "dropout" | "nodropout" => {
+            let mut session = Session::train(network.graph(), network.loss(), &[], Threads(threads)).map_err(text)?;
+            let (mut first, mut second) = (vec![0.0; parameters.len()], vec![0.0; parameters.len()]);
+            for step in 0..(WARM_UP + repeats) as u64 {
+                let start = Instant::now();
+                let key = (case == "dropout").then_some(DropoutKey { seed: 0, step });
+                session.step(&parameters, batch, key, &fill).map_err(text)?;
+                let gradients = session.gradients();
+                adam::step(level, &Adam::default(), step + 1, 1.0, gradients, &mut parameters, &mut first, &mut second);
+                seconds.push(start.elapsed().as_secs_f64());
+            }
+        }
+        _ => return Err(usage.into()),
+    }
+    seconds.drain(..WARM_UP);
+    let line = serde_json::json!({
+        "seconds": seconds, "peak_mib": peak_mib(), "parameters": parameters.len(), "level": level.name(), "fma_gflops": fma_gflops,
+        "version": format!("phyture {}", env!("CARGO_PKG_VERSION")),
+    });
+    Ok(line.to_string())
+}
+
+fn main() -> std::process::ExitCode {
+    // `cargo test` builds and starts benches too; there is nothing to check here.
+    if std::env::args().len() <= 2 && !std::env::args().any(|argument| argument == "forward") {
+        return std::process::ExitCode::SUCCESS;
+    }
+    match run() {
+        Ok(line) => {
+            println!("{line}");
+            std::process::ExitCode::SUCCESS
+        }
+        Err(message) => {
+            eprintln!("{message}");
+            std::process::ExitCode::FAILURE
+        }
+    }
+}

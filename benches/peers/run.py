@@ -1,0 +1,147 @@
+"""Training steps and forward passes of Phy-Ture beside other programs, on this machine, in turn.
+
+    python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes] [--without jax]
+
+Makes a virtual environment under target/ with the pinned versions below, builds this project's own row, and starts every row in a
+process of its own, one after another, ROUNDS times: so that whatever else the machine does hits all alike. Writes OUT.json (every
+time of every step) and OUT.md (medians, ranges, ratios). Rows that this project loses are marked, not left out.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import platform
+import statistics
+import subprocess
+import sys
+
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "jax==0.10.2"]
+# glibc keeps freed memory and asks for huge pages: what an expert sets before starting PyTorch.
+TUNED = {"MALLOC_TOP_PAD_": "4294967296", "MALLOC_MMAP_THRESHOLD_": "4294967296", "MALLOC_TRIM_THRESHOLD_": "8589934592",
+         "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
+HISTORY, BATCH = 1000, 32
+
+# Title, program, case, tuned memory. Within a group all are compared with the first.
+GROUPS = {
+    "training step, dropout 0.2": [
+        ("phyture", "phyture", "dropout", False),
+        ("PyTorch, stored attention map", "torch", "naive-0.2", False),
+        ("PyTorch, fused attention", "torch", "fused-0.2", False),
+        ("PyTorch, stored map, tuned memory", "torch", "naive-0.2", True),
+        ("PyTorch, fused attention, tuned memory", "torch", "fused-0.2", True),
+        ("PyTorch, byte masks, recomputed attention, tuned memory", "torch", "expert-0.2", True),
+        ("JAX, jit", "jax", "0.2", True),
+    ],
+    "training step, no dropout": [
+        ("phyture", "phyture", "nodropout", False),
+        ("PyTorch, stored attention map", "torch", "naive-0", False),
+        ("PyTorch, fused attention", "torch", "fused-0", False),
+        ("PyTorch, fused attention, tuned memory", "torch", "fused-0", True),
+        ("JAX, jit", "jax", "0", True),
+    ],
+    "forward pass": [
+        ("phyture", "phyture", "forward", False),
+        ("PyTorch, stored attention map", "torch", "forward-naive", False),
+        ("PyTorch, fused attention", "torch", "forward-fused", False),
+        ("PyTorch, fused attention, tuned memory", "torch", "forward-fused", True),
+        ("JAX, jit", "jax", "forward", True),
+    ],
+}
+# Batch 1 on one thread.
+LATENCY = GROUPS["forward pass"]
+
+
+def environment():
+    folder = ROOT / "target" / "peers-venv"
+    python = folder / "bin" / "python"
+    if not python.exists():
+        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", *VERSIONS], check=True)
+    return python
+
+
+def own_program():
+    command = ["cargo", "bench", "--bench", "peers", "--no-run", "--message-format=json"]
+    lines = subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout.splitlines()
+    return [json.loads(line)["executable"] for line in lines if '"peers"' in line and '"executable":"' in line][-1]
+
+
+def measure(python, own, row, threads, batch, history, repeats):
+    _, program, case, tuned = row
+    start = [own] if program == "phyture" else [python, HERE / f"{program}_step.py"]
+    command = [*map(str, start), case, str(threads), str(batch), str(history), str(repeats)]
+    variables = {**os.environ, "OMP_NUM_THREADS": str(threads), **(TUNED if tuned else {})}
+    done = subprocess.run(command, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    if done.returncode != 0:
+        print(f"  {row[0]}: {done.stderr.strip().splitlines()[-1:]}", file=sys.stderr)
+        return None
+    return json.loads(done.stdout.strip().splitlines()[-1])
+
+
+def compare(python, own, rows, threads, batch, history, rounds, repeats):
+    found = {row[0]: [] for row in rows}
+    for turn in range(rounds):
+        for row in rows:
+            result = measure(python, own, row, threads, batch, history, repeats)
+            if result:
+                found[row[0]].append(result)
+                print(f"  round {turn + 1}: {row[0]}: {statistics.median(result['seconds']):.4f} s", file=sys.stderr)
+    return found
+
+
+def table(title, found):
+    lines = [f"### {title}", "", "| | median, s | range, s | times phyture | peak memory, MiB |", "| --- | ---: | ---: | ---: | ---: |"]
+    own = statistics.median(second for result in found["phyture"] for second in result["seconds"])
+    for name, results in found.items():
+        if not results:
+            lines.append(f"| {name} | did not run | | | |")
+            continue
+        seconds = [second for result in results for second in result["seconds"]]
+        median, ratio = statistics.median(seconds), statistics.median(seconds) / own
+        memory = max(result["peak_mib"] for result in results)
+        lost = " (faster)" if ratio < 1 else ""
+        lines.append(f"| {name} | {median:.4f} | {min(seconds):.4f}–{max(seconds):.4f} | {ratio:.2f}{lost} | {memory:.0f} |")
+    return [*lines, ""]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("out")
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--sizes", action="store_true", help="also histories 250 to 2000 and batches 1 to 128")
+    parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
+    options = parser.parse_args()
+    python, own = environment(), own_program()
+    keep = lambda rows: [row for row in rows if row[1] not in options.without]
+    threads, record, lines = os.cpu_count(), {}, []
+
+    def add(title, rows, threads, batch, history):
+        print(title, file=sys.stderr)
+        record[title] = compare(python, own, keep(rows), threads, batch, history, options.rounds, options.repeats)
+        lines.extend(table(title, record[title]))
+
+    for title, rows in GROUPS.items():
+        add(f"{title}: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
+    add(f"latency: history {HISTORY}, batch 1, 1 thread", LATENCY, 1, 1, HISTORY)
+    if options.sizes:
+        for title, rows in GROUPS.items():
+            pair = [rows[0], next(row for row in rows if row[2] in ("naive-0.2", "fused-0", "forward-fused"))]
+            for history, batch in [(250, 32), (500, 32), (2000, 32), (1000, 1), (1000, 4), (1000, 128)]:
+                add(f"{title}: history {history}, batch {batch}, {threads} threads", pair, threads, batch, history)
+    own_results = [result for found in record.values() for result in found["phyture"]]
+    versions = sorted({result["version"] for found in record.values() for results in found.values() for result in results})
+    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
+    peak = max(result["fma_gflops"] for result in own_results)
+    head = [f"{processor}, {os.cpu_count()} cores, level {own_results[0]['level']}, {peak:.0f} GFLOP/s of multiply-adds a core; "
+            f"{'; '.join(versions)}; {options.rounds} rounds of {options.repeats} steps each, rows in turn.", ""]
+    pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
+    pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))
+    print("\n".join([*head, *lines]))
+
+
+if __name__ == "__main__":
+    main()
