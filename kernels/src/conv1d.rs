@@ -261,6 +261,10 @@ impl<T: Real> Kernel for BackwardEpilogue<'_, T> {
                     let y = *y * unscale;
                     *dz = *dz * scale * y * (T::ONE - y);
                 }),
+                Activation::Elu => pairs.for_each(|(dz, y)| {
+                    let y = *y * unscale;
+                    *dz = *dz * scale * if y > T::ZERO { T::ONE } else { y + T::ONE };
+                }),
                 Activation::Identity | Activation::Gelu => pairs.for_each(|(dz, _)| *dz *= scale),
             }
             if let Some(mask) = self.epilogue.dropout {

@@ -1,0 +1,149 @@
+//! As `reference`, for the kernels of the peer networks: the clearest loops that can be written, with sums in f64.
+
+use crate::conv1d_general::Geometry;
+use crate::{Real, Rows, RowsMut};
+
+/// `y[t, o] = b[o] + Σ_{c,j} W[o, c, j]·x[t·stride + j·dilation − left, c]`; no activation, no dropout.
+pub fn conv1d<T: Real>(geometry: Geometry, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, mut y: RowsMut<'_, T>) {
+    for t in 0..y.rows() {
+        for o in 0..y.cols() {
+            let mut sum = bias.map_or(0.0, |bias| bias[o].f64());
+            for (c, j) in (0..x.cols()).flat_map(|c| (0..geometry.taps).map(move |j| (c, j))) {
+                if let Some(s) = geometry.source(t, j, x.rows()) {
+                    sum += weight[(o * x.cols() + c) * geometry.taps + j].f64() * x.row(s)[c].f64();
+                }
+            }
+            y.row_mut(t)[o] = T::of(sum);
+        }
+    }
+}
+
+/// Gradients of [`conv1d`] in x and in the weight.
+pub fn conv1d_backward<T: Real>(
+    geometry: Geometry,
+    x: Rows<'_, T>,
+    weight: &[T],
+    dy: Rows<'_, T>,
+    mut dx: RowsMut<'_, T>,
+    dweight: &mut [T],
+) {
+    let (mut input, mut total) = (vec![0.0; x.rows() * x.cols()], vec![0.0; weight.len()]);
+    for t in 0..dy.rows() {
+        for j in 0..geometry.taps {
+            let Some(s) = geometry.source(t, j, x.rows()) else { continue };
+            for (o, c) in (0..dy.cols()).flat_map(|o| (0..x.cols()).map(move |c| (o, c))) {
+                let at = (o * x.cols() + c) * geometry.taps + j;
+                input[s * x.cols() + c] += dy.row(t)[o].f64() * weight[at].f64();
+                total[at] += dy.row(t)[o].f64() * x.row(s)[c].f64();
+            }
+        }
+    }
+    store(&input, &mut dx);
+    dweight.iter_mut().zip(&total).for_each(|(d, t)| *d = T::of(*t));
+}
+
+fn store<T: Real>(from: &[f64], to: &mut RowsMut<'_, T>) {
+    for (i, from) in from.chunks_exact(to.cols().max(1)).enumerate() {
+        to.row_mut(i).iter_mut().zip(from).for_each(|(to, from)| *to = T::of(*from));
+    }
+}
+
+/// What [`lstm`] gives, row by row.
+pub struct Lstm {
+    /// `[n, h]`.
+    pub h: Vec<f64>,
+    /// Gradients of the gates before their functions, `[n, 4h]`.
+    pub dgates: Vec<f64>,
+    /// Gradient of the recurrent weight, `[4h, h]`.
+    pub drecurrent: Vec<f64>,
+}
+
+/// Long short-term memory and its gradients for dy `[n, h]`, gate by gate.
+pub fn lstm<T: Real>(x: Rows<'_, T>, weights: crate::lstm::Weights<'_, T>, dy: Rows<'_, T>) -> Lstm {
+    let (n, hidden) = (x.rows(), dy.cols());
+    let wide = 4 * hidden;
+    let sigma = |x: f64| 1.0 / (1.0 + (-x).exp());
+    let (mut gates, mut cells, mut h) = (vec![0.0; n * wide], vec![0.0; n * hidden], vec![0.0; n * hidden]);
+    for t in 0..n {
+        for o in 0..wide {
+            let input: f64 = (0..x.cols()).map(|c| weights.input[o * x.cols() + c].f64() * x.row(t)[c].f64()).sum();
+            let before = |k: usize| if t > 0 { h[(t - 1) * hidden + k] } else { 0.0 };
+            let recurrent: f64 = (0..hidden).map(|k| weights.recurrent[o * hidden + k].f64() * before(k)).sum();
+            let sum = input + recurrent + weights.input_bias[o].f64() + weights.recurrent_bias[o].f64();
+            gates[t * wide + o] = if o / hidden == 2 { sum.tanh() } else { sigma(sum) };
+        }
+        for k in 0..hidden {
+            let gate = |which: usize| gates[t * wide + which * hidden + k];
+            let before = if t > 0 { cells[(t - 1) * hidden + k] } else { 0.0 };
+            cells[t * hidden + k] = gate(1) * before + gate(0) * gate(2);
+            h[t * hidden + k] = gate(3) * cells[t * hidden + k].tanh();
+        }
+    }
+    let (mut dgates, mut drecurrent) = (vec![0.0; n * wide], vec![0.0; wide * hidden]);
+    let mut dcells = vec![0.0; hidden];
+    for t in (0..n).rev() {
+        for k in 0..hidden {
+            let later = |o: usize| if t + 1 < n { dgates[(t + 1) * wide + o] } else { 0.0 };
+            let dh = dy.row(t)[k].f64() + (0..wide).map(|o| later(o) * weights.recurrent[o * hidden + k].f64()).sum::<f64>();
+            let gate = |which: usize| gates[t * wide + which * hidden + k];
+            let bent = cells[t * hidden + k].tanh();
+            let before = if t > 0 { cells[(t - 1) * hidden + k] } else { 0.0 };
+            let dc = dcells[k] + dh * gate(3) * (1.0 - bent * bent);
+            let slope = |which: usize| gate(which) * (1.0 - gate(which));
+            let own =
+                [dc * gate(2) * slope(0), dc * before * slope(1), dc * gate(0) * (1.0 - gate(2).powi(2)), dh * bent * slope(3)];
+            (0..4).for_each(|which| dgates[t * wide + which * hidden + k] = own[which]);
+            dcells[k] = dc * gate(1);
+        }
+    }
+    for t in 1..n {
+        for (o, k) in (0..wide).flat_map(|o| (0..hidden).map(move |k| (o, k))) {
+            drecurrent[o * hidden + k] += dgates[t * wide + o] * h[(t - 1) * hidden + k];
+        }
+    }
+    Lstm { h, dgates, drecurrent }
+}
+
+/// w(o) = g(o)·v(o)/‖v(o)‖ for v `[out, n]`.
+pub fn weight_norm<T: Real>(v: Rows<'_, T>, g: &[T], mut w: RowsMut<'_, T>) {
+    for o in 0..v.rows() {
+        let norm = v.row(o).iter().map(|v| v.f64().powi(2)).sum::<f64>().sqrt();
+        w.row_mut(o).iter_mut().zip(v.row(o)).for_each(|(w, v)| *w = T::of(g[o].f64() * v.f64() / norm));
+    }
+}
+
+/// Gradients of [`weight_norm`].
+pub fn weight_norm_backward<T: Real>(v: Rows<'_, T>, g: &[T], dw: Rows<'_, T>, mut dv: RowsMut<'_, T>, dg: &mut [T]) {
+    for o in 0..v.rows() {
+        let norm = v.row(o).iter().map(|v| v.f64().powi(2)).sum::<f64>().sqrt();
+        let along: f64 = v.row(o).iter().zip(dw.row(o)).map(|(v, dw)| v.f64() * dw.f64()).sum::<f64>() / norm;
+        dg[o] = T::of(along);
+        for ((dv, v), dw) in dv.row_mut(o).iter_mut().zip(v.row(o)).zip(dw.row(o)) {
+            *dv = T::of(g[o].f64() / norm * (dw.f64() - v.f64() / norm * along));
+        }
+    }
+}
+
+/// Rows of x that row t of a pooled sequence looks at.
+fn window(geometry: crate::pool::Geometry, t: usize, rows: usize) -> std::ops::Range<usize> {
+    let first = t * geometry.stride;
+    first.saturating_sub(geometry.padding)..(first + geometry.width).saturating_sub(geometry.padding).min(rows)
+}
+
+/// Largest, or mean, of each window, by channel; and its adjoint for dy (of several largest, the first has the gradient).
+pub fn pool<T: Real>(geometry: crate::pool::Geometry, largest: bool, x: Rows<'_, T>, dy: Rows<'_, T>) -> (Vec<f64>, Vec<f64>) {
+    let (mut y, mut dx) = (vec![0.0; dy.rows() * dy.cols()], vec![0.0; x.rows() * x.cols()]);
+    for (t, c) in (0..dy.rows()).flat_map(|t| (0..x.cols()).map(move |c| (t, c))) {
+        let rows = window(geometry, t, x.rows());
+        let at = |s: usize| x.row(s)[c].f64();
+        if largest {
+            let best = rows.clone().fold(rows.start, |best, s| if at(s) > at(best) { s } else { best });
+            y[t * x.cols() + c] = at(best);
+            dx[best * x.cols() + c] += dy.row(t)[c].f64();
+        } else {
+            y[t * x.cols() + c] = rows.clone().map(at).sum::<f64>() / geometry.width as f64;
+            rows.for_each(|s| dx[s * x.cols() + c] += dy.row(t)[c].f64() / geometry.width as f64);
+        }
+    }
+    (y, dx)
+}
