@@ -33,6 +33,7 @@ pub mod rows;
 pub mod sci;
 mod sums;
 pub mod temporal;
+pub mod temporal_each;
 #[cfg(test)]
 mod testing;
 mod tile;

@@ -5,6 +5,7 @@
 
 use super::config::PhyTureConfig;
 use super::layers::Recorder;
+use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, TcnConfig, TimeMixerConfig};
 use crate::error::{Error, Result};
 use crate::tape::Var;
 use phyture_kernels::Real;
@@ -73,6 +74,17 @@ pub(crate) trait Configuration {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "lowercase")]
 pub enum Architecture {
+    /// CNN hybrid.
+    Cnn(CnnConfig),
+    /// CNN–LSTM hybrid.
+    #[serde(rename = "cnn_lstm")]
+    CnnLstm(CnnLstmConfig),
+    /// TCN.
+    Tcn(TcnConfig),
+    /// DLinear.
+    DLinear(DLinearConfig),
+    /// TimeMixer.
+    TimeMixer(TimeMixerConfig),
     /// Phy-Ture, its ablations and fusion variants. Written without a `kind`, so that earlier programs read it, too.
     #[serde(untagged)]
     PhyTure(PhyTureConfig),
@@ -83,6 +95,11 @@ macro_rules! of_each {
     ($architecture:expr, $config:ident => $value:expr) => {
         match $architecture {
             Architecture::PhyTure($config) => $value,
+            Architecture::Cnn($config) => $value,
+            Architecture::CnnLstm($config) => $value,
+            Architecture::Tcn($config) => $value,
+            Architecture::DLinear($config) => $value,
+            Architecture::TimeMixer($config) => $value,
         }
     };
 }
@@ -181,7 +198,14 @@ macro_rules! from_configuration {
     )*};
 }
 
-from_configuration!(PhyTure(PhyTureConfig));
+from_configuration!(
+    PhyTure(PhyTureConfig),
+    Cnn(CnnConfig),
+    CnnLstm(CnnLstmConfig),
+    Tcn(TcnConfig),
+    DLinear(DLinearConfig),
+    TimeMixer(TimeMixerConfig),
+);
 
 impl<'de> Deserialize<'de> for Architecture {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
@@ -190,6 +214,11 @@ impl<'de> Deserialize<'de> for Architecture {
         let fields = Value::Object(fields);
         let read = match kind.as_ref().map(|kind| kind.as_str().unwrap_or_default()) {
             None | Some("phyture") => serde_json::from_value(fields).map(Self::PhyTure),
+            Some("cnn") => serde_json::from_value(fields).map(Self::Cnn),
+            Some("cnn_lstm") => serde_json::from_value(fields).map(Self::CnnLstm),
+            Some("tcn") => serde_json::from_value(fields).map(Self::Tcn),
+            Some("dlinear") => serde_json::from_value(fields).map(Self::DLinear),
+            Some("timemixer") => serde_json::from_value(fields).map(Self::TimeMixer),
             Some(_) => {
                 let found = kind.unwrap_or_default();
                 return Err(D::Error::custom(format!("network kind {found}; expected one of: {}", Self::KINDS.join(", "))));
@@ -201,7 +230,7 @@ impl<'de> Deserialize<'de> for Architecture {
 
 impl Architecture {
     /// Kinds as they stand in files.
-    pub const KINDS: [&'static str; 1] = ["phyture"];
+    pub const KINDS: [&'static str; 6] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer"];
 }
 
 /// Checks that sizes lie in 1 to their largest value, and numbers in their range.

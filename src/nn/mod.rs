@@ -8,6 +8,7 @@ mod config;
 mod layers;
 mod network;
 pub mod parity;
+pub mod peers;
 mod phyture;
 pub mod safetensors;
 

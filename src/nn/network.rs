@@ -140,9 +140,10 @@ impl<T: Real> Network<T> {
     pub fn initial(&self, seed: u64) -> Vec<T> {
         let mut slab = vec![T::ZERO; self.graph.parameter_count()];
         for (index, (parameter, init)) in self.graph.parameters().iter().zip(&self.inits).enumerate() {
-            if let Some(values) = slab.get_mut(parameter.range()) {
-                init.fill(Stream::new(seed, 0, index as u64, 0), values);
-            }
+            let before = index.checked_sub(1).map_or(0..0, |before| self.graph.parameters()[before].range());
+            let (done, rest) = slab.split_at_mut(parameter.offset);
+            let values = &mut rest[..parameter.shape.len()];
+            init.fill(Stream::new(seed, 0, index as u64, 0), &done[before], values);
         }
         slab
     }

@@ -7,8 +7,8 @@ use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Write};
 
-/// Largest number of operands of one operation.
-pub const MAX_OPERANDS: usize = 4;
+/// Largest number of operands of one operation: the kernels that an inception layer merges into one.
+pub const MAX_OPERANDS: usize = 8;
 
 /// Buffers of one operation for one sample, in elements.
 ///
