@@ -18,6 +18,7 @@ const SMALL: &[&str] = &[
     r#"{"kind": "dlinear", "history": 12, "state_channels": 3, "moving_average": 5}"#,
     r#"{"kind": "dlinear", "history": 12, "state_channels": 3, "moving_average": 5, "individual": true}"#,
     r#"{"kind": "timemixer", "history": 16, "state_channels": 3, "d_model": 4, "d_ff": 5, "scales": 2, "moving_average": 5}"#,
+    r#"{"kind": "timesnet", "history": 14, "state_channels": 3, "d_model": 4, "d_ff": 3, "periods": 3, "kernels": 3}"#,
 ];
 
 fn small() -> Result<Vec<Architecture>> {

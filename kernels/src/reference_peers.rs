@@ -147,3 +147,65 @@ pub fn pool<T: Real>(geometry: crate::pool::Geometry, largest: bool, x: Rows<'_,
     }
     (y, dx)
 }
+
+/// What [`fold`] gives.
+pub struct Folded {
+    /// Result.
+    pub y: Vec<f64>,
+    /// Gradient of the sequence.
+    pub dx: Vec<f64>,
+    /// Gradient of the weight.
+    pub dweight: Vec<f64>,
+    /// Gradient of the bias.
+    pub dbias: Vec<f64>,
+}
+
+/// Two-dimensional convolution of the folded sequence and its gradients, all kernel rows and columns, tested one by one.
+pub fn fold<T: Real>(fold: crate::fold::Fold, x: Rows<'_, T>, weight: &[T], bias: &[T], dy: Rows<'_, T>) -> Folded {
+    let (inputs, outputs, kernel, half) = (x.cols(), dy.cols(), fold.kernel, fold.kernel / 2);
+    let mut found = Folded {
+        y: vec![0.0; dy.rows() * outputs],
+        dx: vec![0.0; x.rows() * inputs],
+        dweight: vec![0.0; weight.len()],
+        dbias: vec![0.0; outputs],
+    };
+    for n in 0..fold.positions().min(dy.rows()) {
+        let (r, c) = (n / fold.period, n % fold.period);
+        for o in 0..outputs {
+            found.y[n * outputs + o] += bias[o].f64();
+            found.dbias[o] += dy.row(n)[o].f64();
+        }
+        for (a, b) in (0..kernel).flat_map(|a| (0..kernel).map(move |b| (a, b))) {
+            let (row, column) = (r + a, c + b);
+            if row < half || row - half >= fold.height() || column < half || column - half >= fold.period {
+                continue;
+            }
+            let from = (row - half) * fold.period + column - half;
+            if from >= x.rows() {
+                continue;
+            }
+            for (i, o) in (0..inputs).flat_map(|i| (0..outputs).map(move |o| (i, o))) {
+                let at = ((a * kernel + b) * inputs + i) * outputs + o;
+                found.y[n * outputs + o] += weight[at].f64() * x.row(from)[i].f64();
+                found.dx[from * inputs + i] += weight[at].f64() * dy.row(n)[o].f64();
+                found.dweight[at] += x.row(from)[i].f64() * dy.row(n)[o].f64();
+            }
+        }
+    }
+    found
+}
+
+/// Mean over the channels of |X_f|, and its gradient `[n, C]`.
+pub fn amplitude<T: Real>(x: Rows<'_, T>, f: usize) -> (f64, Vec<f64>) {
+    let (n, channels) = (x.rows(), x.cols());
+    let angle = |t: usize| std::f64::consts::TAU * (f * t % n) as f64 / n as f64;
+    let (mut sum, mut dx) = (0.0, vec![0.0; n * channels]);
+    for c in 0..channels {
+        let re: f64 = (0..n).map(|t| x.row(t)[c].f64() * angle(t).cos()).sum();
+        let im: f64 = (0..n).map(|t| -x.row(t)[c].f64() * angle(t).sin()).sum();
+        let size = re.hypot(im);
+        sum += size / channels as f64;
+        (0..n).for_each(|t| dx[t * channels + c] = (re * angle(t).cos() - im * angle(t).sin()) / size / channels as f64);
+    }
+    (sum, dx)
+}

@@ -270,6 +270,25 @@ pub fn interleave<T: Real>(level: Level, even: Rows<'_, T>, odd: Rows<'_, T>, mu
     copy(level, odd, y.odd(), write);
 }
 
+/// Σ x∘y over all elements, both `[n, C]`.
+pub fn inner<T: Real>(level: Level, x: Rows<'_, T>, y: Rows<'_, T>) -> T {
+    same_shape(&x, &y);
+    level.run(Inner { x, y })
+}
+
+struct Inner<'a, T> {
+    x: Rows<'a, T>,
+    y: Rows<'a, T>,
+}
+
+impl<T: Real> Kernel for Inner<'_, T> {
+    type Output = T;
+    #[inline(always)]
+    fn run<I: Isa>(self) -> T {
+        (0..self.x.rows).map(|i| crate::sums::dot::<T, I>(self.x.row(i), self.y.row(i))).sum()
+    }
+}
+
 /// Every element of y becomes `value`.
 pub fn fill<T: Real>(mut y: RowsMut<'_, T>, value: T) {
     for i in 0..y.rows {
@@ -321,6 +340,8 @@ mod tests {
                 subtract(level, a.view(), b.view(), y.view_mut());
                 assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a - b).collect::<Vec<_>>());
                 y.check_gaps();
+                let expected: f64 = a_values.iter().zip(&b_values).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                assert_near("inner", &[super::inner(level, a.view(), b.view())], &[expected as f32], Tolerance::Approximate);
                 check_writes("copy", &a, Tolerance::Close, |y, write| copy(level, a.view(), y, write));
             }
         }

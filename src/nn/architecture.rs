@@ -5,7 +5,7 @@
 
 use super::config::PhyTureConfig;
 use super::layers::Recorder;
-use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, TcnConfig, TimeMixerConfig};
+use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
 use crate::error::{Error, Result};
 use crate::tape::Var;
 use phyture_kernels::Real;
@@ -85,6 +85,8 @@ pub enum Architecture {
     DLinear(DLinearConfig),
     /// TimeMixer.
     TimeMixer(TimeMixerConfig),
+    /// TimesNet.
+    TimesNet(TimesNetConfig),
     /// Phy-Ture, its ablations and fusion variants. Written without a `kind`, so that earlier programs read it, too.
     #[serde(untagged)]
     PhyTure(PhyTureConfig),
@@ -100,6 +102,7 @@ macro_rules! of_each {
             Architecture::Tcn($config) => $value,
             Architecture::DLinear($config) => $value,
             Architecture::TimeMixer($config) => $value,
+            Architecture::TimesNet($config) => $value,
         }
     };
 }
@@ -205,6 +208,7 @@ from_configuration!(
     Tcn(TcnConfig),
     DLinear(DLinearConfig),
     TimeMixer(TimeMixerConfig),
+    TimesNet(TimesNetConfig),
 );
 
 impl<'de> Deserialize<'de> for Architecture {
@@ -219,6 +223,7 @@ impl<'de> Deserialize<'de> for Architecture {
             Some("tcn") => serde_json::from_value(fields).map(Self::Tcn),
             Some("dlinear") => serde_json::from_value(fields).map(Self::DLinear),
             Some("timemixer") => serde_json::from_value(fields).map(Self::TimeMixer),
+            Some("timesnet") => serde_json::from_value(fields).map(Self::TimesNet),
             Some(_) => {
                 let found = kind.unwrap_or_default();
                 return Err(D::Error::custom(format!("network kind {found}; expected one of: {}", Self::KINDS.join(", "))));
@@ -230,7 +235,7 @@ impl<'de> Deserialize<'de> for Architecture {
 
 impl Architecture {
     /// Kinds as they stand in files.
-    pub const KINDS: [&'static str; 6] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer"];
+    pub const KINDS: [&'static str; 7] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer", "timesnet"];
 }
 
 /// Checks that sizes lie in 1 to their largest value, and numbers in their range.

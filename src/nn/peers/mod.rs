@@ -9,12 +9,14 @@ mod cnn_lstm;
 mod dlinear;
 mod tcn;
 mod timemixer;
+mod timesnet;
 
 pub use cnn::CnnConfig;
 pub use cnn_lstm::CnnLstmConfig;
 pub use dlinear::DLinearConfig;
 pub use tcn::TcnConfig;
 pub use timemixer::TimeMixerConfig;
+pub use timesnet::TimesNetConfig;
 
 /// A configuration's answers about its own fields, which every peer has.
 macro_rules! common_fields {
