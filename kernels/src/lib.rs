@@ -12,6 +12,7 @@
 pub mod activation;
 pub mod adam;
 pub mod attention;
+pub mod batch_norm;
 pub mod conv1d;
 pub mod conv1d_general;
 pub mod dropout;
@@ -27,6 +28,7 @@ pub mod loss;
 pub mod lstm;
 pub mod moving_average;
 pub mod pool;
+pub mod prob_sparse;
 pub mod random;
 pub mod real;
 pub mod reference;

@@ -209,3 +209,60 @@ pub fn amplitude<T: Real>(x: Rows<'_, T>, f: usize) -> (f64, Vec<f64>) {
     }
     (sum, dx)
 }
+
+/// Sparsity measure of query `i` of head `h`: the largest of the sampled products less their sum over the number of keys.
+pub fn sparsity<T: Real>(
+    sparse: crate::prob_sparse::Sparse,
+    stream: crate::random::Stream,
+    q: Rows<'_, T>,
+    k: Rows<'_, T>,
+    h: usize,
+    i: usize,
+) -> f64 {
+    let (size, keys) = (q.cols() / sparse.heads, k.rows());
+    let sample = |s: usize| (u64::from(stream.sub(i as u64).word(s as u32)) * keys as u64 >> 32) as usize;
+    let product = |j: usize| (h * size..(h + 1) * size).map(|c| q.row(i)[c].f64() * k.row(j)[c].f64()).sum::<f64>();
+    let products: Vec<f64> = (0..sparse.chosen(keys)).map(|s| product(sample(s))).collect();
+    products.iter().copied().fold(f64::NEG_INFINITY, f64::max) - products.iter().sum::<f64>() / keys as f64
+}
+
+/// o, dq, dk, dv of ProbSparse attention for the queries `chosen` of each head.
+pub fn prob_sparse<T: Real>(
+    sparse: crate::prob_sparse::Sparse,
+    chosen: &[usize],
+    q: Rows<'_, T>,
+    k: Rows<'_, T>,
+    v: Rows<'_, T>,
+    d_o: Rows<'_, T>,
+) -> [Vec<f64>; 4] {
+    let (queries, keys, d) = (q.rows(), k.rows(), q.cols());
+    let (size, count) = (d / sparse.heads, chosen.len() / sparse.heads);
+    let scale = 1.0 / (size as f64).sqrt();
+    let [mut o, mut dq, mut dk, mut dv] = [queries, queries, keys, keys].map(|rows| vec![0.0; rows * d]);
+    for (h, i) in (0..sparse.heads).flat_map(|h| (0..queries).map(move |i| (h, i))) {
+        let head = h * size..(h + 1) * size;
+        let seen = if sparse.masked { i + 1 } else { keys };
+        let is_chosen = chosen[h * count..(h + 1) * count].contains(&i);
+        let weights: Vec<f64> = if is_chosen {
+            let score = |j: usize| head.clone().map(|c| q.row(i)[c].f64() * k.row(j)[c].f64()).sum::<f64>() * scale;
+            let scores: Vec<f64> = (0..seen).map(score).collect();
+            let most = scores.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let sum: f64 = scores.iter().map(|score| (score - most).exp()).sum();
+            scores.iter().map(|score| (score - most).exp() / sum).collect()
+        } else {
+            vec![if sparse.masked { 1.0 } else { 1.0 / keys as f64 }; seen]
+        };
+        let dweight = |j: usize| head.clone().map(|c| d_o.row(i)[c].f64() * v.row(j)[c].f64()).sum::<f64>();
+        let mean: f64 = weights.iter().enumerate().map(|(j, weight)| weight * dweight(j)).sum();
+        for (j, weight) in weights.iter().enumerate() {
+            let dscore = if is_chosen { weight * (dweight(j) - mean) * scale } else { 0.0 };
+            for c in head.clone() {
+                o[i * d + c] += weight * v.row(j)[c].f64();
+                dv[j * d + c] += weight * d_o.row(i)[c].f64();
+                dq[i * d + c] += dscore * k.row(j)[c].f64();
+                dk[j * d + c] += dscore * q.row(i)[c].f64();
+            }
+        }
+    }
+    [o, dq, dk, dv]
+}

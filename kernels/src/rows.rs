@@ -144,6 +144,11 @@ impl<'a, T> RowsMut<'a, T> {
         &mut self.data[i * self.stride..][..self.cols]
     }
 
+    /// The numbers from the first row on, as they lie.
+    pub(crate) fn into_slice(self) -> &'a mut [T] {
+        self.data
+    }
+
     /// The same rows, to be read.
     #[inline(always)]
     pub fn view(&self) -> Rows<'_, T> {
