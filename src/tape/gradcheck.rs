@@ -124,6 +124,7 @@ impl<'a, T: Real> Trial<'a, T> {
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
+            coupled: None,
         });
         (y, workspace)
     }
@@ -151,6 +152,7 @@ impl<'a, T: Real> Trial<'a, T> {
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
+            coupled: None,
         });
         (0..dx.len()).filter(|&index| !differentiable.reaches(index)).for_each(|index| dx[index].fill(T::ZERO));
         Ok(dx)
@@ -417,7 +419,7 @@ mod tests {
             self.op.differentiable().map(|inner| inner.reads()).unwrap_or_default()
         }
         fn backward(&self, io: Backward<'_, T>) {
-            let Backward { x, y, dy, workspace, mut dx, scratch, shapes, level, stream } = io;
+            let Backward { x, y, dy, workspace, mut dx, scratch, shapes, level, stream, coupled } = io;
             let Some(inner) = self.op.differentiable() else { return };
             let (Fault::Scaled(at)
             | Fault::Dropped(at)
@@ -429,7 +431,7 @@ mod tests {
             let mut own = vec![T::ZERO; target.values.len()];
             let mut slots: [Option<Gradient<'_, T>>; MAX_OPERANDS] = dx;
             slots[at] = Some(Gradient { values: &mut own, write: Write::Set });
-            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, shapes, level, stream });
+            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, shapes, level, stream, coupled });
             let write = match self.fault {
                 Fault::Dropped(_) => return,
                 Fault::NeverSets(_) => Write::Add,

@@ -54,6 +54,15 @@ impl Reads {
     }
 }
 
+/// What all samples of a step have given together to an operation that couples them.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupled<'a, T> {
+    /// Their parts, combined.
+    pub total: &'a [T],
+    /// How many they are.
+    pub samples: usize,
+}
+
 /// What a forward pass is given.
 pub struct Forward<'a, T> {
     /// Operands, in order; empty beyond the last.
@@ -71,6 +80,8 @@ pub struct Forward<'a, T> {
     /// Random stream of this operation, step and sample; `None` when random parts are off. Counter-based: the backward pass
     /// and any thread make the same numbers again.
     pub stream: Option<Stream>,
+    /// For a [`Coupling`] while training; otherwise `None`.
+    pub coupled: Option<Coupled<'a, T>>,
 }
 
 /// One gradient to be produced, and how.
@@ -101,6 +112,8 @@ pub struct Backward<'a, T> {
     pub level: Level,
     /// The random stream of the forward pass.
     pub stream: Option<Stream>,
+    /// For a [`Coupling`] while training, combined from the parts of the backward pass; otherwise `None`.
+    pub coupled: Option<Coupled<'a, T>>,
 }
 
 /// An operation: numbers in, numbers out, for one sample.
@@ -127,6 +140,42 @@ pub trait Op<T: Real>: Send + Sync {
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         None
     }
+
+    /// How it couples the samples of a step, if it does.
+    fn coupling(&self) -> Option<&dyn Coupling<T>> {
+        None
+    }
+}
+
+/// An operation whose result for one sample depends on all samples of the step, as that of a batch normalisation does.
+///
+/// While training (that is, where random parts are on) all samples reach the operation before any goes on: each gives its part, the
+/// parts are combined in the order of the samples, and the passes find the total in `coupled`. Where random parts are off there is no
+/// total, and the operation takes what earlier steps have left in its parameters.
+pub trait Coupling<T: Real>: Op<T> {
+    /// Numbers in a part, and in the total.
+    fn part_len(&self, operands: &[Shape]) -> usize;
+
+    /// The part of one sample. Of the buffers only operands may be read, and nothing written.
+    fn gather(&self, io: &Forward<'_, T>, part: &mut [T]);
+
+    /// The same in the backward pass, where dy and the workspace may be read, too.
+    fn gather_backward(&self, io: &Backward<'_, T>, part: &mut [T]);
+
+    /// The total of the parts `[samples, part_len]`.
+    fn combine(&self, pass: Pass, operands: &[Shape], parts: &[T], total: &mut [T]);
+
+    /// What the total of a forward pass leaves in operand `operand`, a parameter without gradient, for steps to come.
+    fn settle(&self, operand: usize, operands: &[Shape], coupled: Coupled<'_, T>, values: &mut [T]);
+}
+
+/// Which pass parts are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pass {
+    /// Forward.
+    Forward,
+    /// Backward.
+    Backward,
 }
 
 /// An operation with a backward pass.

@@ -141,6 +141,7 @@ impl<'a> Trainer<'a> {
         let State { parameters, first_moment, second_moment, .. } = &mut self.state;
         let adam = Adam { learning_rate: rate, ..Adam::default() };
         adam::step(self.session.level(), &adam, done + 1, 1.0, gradients, parameters, first_moment, second_moment);
+        self.session.settle(parameters);
         self.state.step += 1;
         Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
     }
