@@ -5,7 +5,7 @@
 
 use super::config::PhyTureConfig;
 use super::layers::Recorder;
-use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
+use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, InformerConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
 use crate::error::{Error, Result};
 use crate::tape::Var;
 use phyture_kernels::Real;
@@ -87,6 +87,8 @@ pub enum Architecture {
     TimeMixer(TimeMixerConfig),
     /// TimesNet.
     TimesNet(TimesNetConfig),
+    /// Conv–Informer.
+    Informer(InformerConfig),
     /// Phy-Ture, its ablations and fusion variants. Written without a `kind`, so that earlier programs read it, too.
     #[serde(untagged)]
     PhyTure(PhyTureConfig),
@@ -103,6 +105,7 @@ macro_rules! of_each {
             Architecture::DLinear($config) => $value,
             Architecture::TimeMixer($config) => $value,
             Architecture::TimesNet($config) => $value,
+            Architecture::Informer($config) => $value,
         }
     };
 }
@@ -209,6 +212,7 @@ from_configuration!(
     DLinear(DLinearConfig),
     TimeMixer(TimeMixerConfig),
     TimesNet(TimesNetConfig),
+    Informer(InformerConfig),
 );
 
 impl<'de> Deserialize<'de> for Architecture {
@@ -224,6 +228,7 @@ impl<'de> Deserialize<'de> for Architecture {
             Some("dlinear") => serde_json::from_value(fields).map(Self::DLinear),
             Some("timemixer") => serde_json::from_value(fields).map(Self::TimeMixer),
             Some("timesnet") => serde_json::from_value(fields).map(Self::TimesNet),
+            Some("informer") => serde_json::from_value(fields).map(Self::Informer),
             Some(_) => {
                 let found = kind.unwrap_or_default();
                 return Err(D::Error::custom(format!("network kind {found}; expected one of: {}", Self::KINDS.join(", "))));
@@ -235,7 +240,7 @@ impl<'de> Deserialize<'de> for Architecture {
 
 impl Architecture {
     /// Kinds as they stand in files.
-    pub const KINDS: [&'static str; 7] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer", "timesnet"];
+    pub const KINDS: [&'static str; 8] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer", "timesnet", "informer"];
 }
 
 /// Checks that sizes lie in 1 to their largest value, and numbers in their range.

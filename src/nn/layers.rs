@@ -6,7 +6,7 @@
 //! linear rule (not the packed Xavier rule of `MultiheadAttention`).
 
 use crate::error::Result;
-use crate::tape::ops::{Conv1d, Epilogue, GeneralConv1d, LayerNorm, Linear, Lstm, Temporal, TemporalEach, WeightNorm};
+use crate::tape::ops::{BatchNorm, Conv1d, Epilogue, GeneralConv1d, LayerNorm, Linear, Lstm, Temporal, TemporalEach, WeightNorm};
 use crate::tape::{Graph, Var};
 use phyture_kernels::Real;
 use phyture_kernels::random::Stream;
@@ -236,5 +236,19 @@ impl<T: Real> Recorder<T> {
         let weight = self.parameter(&format!("{name}.weight"), &[channels, rows], init)?;
         let bias = self.parameter(&format!("{name}.bias"), &[channels], init)?;
         self.graph.apply(TemporalEach, &[x, weight, bias])
+    }
+
+    /// Batch normalisation over all rows of a step: `name.weight` and `name.bias` `[C]`, and `name.running_mean` and
+    /// `name.running_variance` `[C]`, which are not trained but kept by [`Session::settle`](crate::tape::Session::settle).
+    ///
+    /// # Errors
+    /// As [`Graph::apply`].
+    pub fn batch_norm(&mut self, name: &str, x: Var, op: BatchNorm) -> Result<Var> {
+        let channels = self.graph.shape(x).rows().1;
+        let mut operands = vec![x];
+        for (part, start) in [("weight", 1.0), ("bias", 0.0), ("running_mean", 0.0), ("running_variance", 1.0)] {
+            operands.push(self.parameter(&format!("{name}.{part}"), &[channels], Init::Constant(start))?);
+        }
+        self.graph.apply(op, &operands)
     }
 }

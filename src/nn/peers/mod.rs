@@ -7,6 +7,7 @@
 mod cnn;
 mod cnn_lstm;
 mod dlinear;
+mod informer;
 mod tcn;
 mod timemixer;
 mod timesnet;
@@ -14,6 +15,7 @@ mod timesnet;
 pub use cnn::CnnConfig;
 pub use cnn_lstm::CnnLstmConfig;
 pub use dlinear::DLinearConfig;
+pub use informer::InformerConfig;
 pub use tcn::TcnConfig;
 pub use timemixer::TimeMixerConfig;
 pub use timesnet::TimesNetConfig;
