@@ -37,7 +37,7 @@ impl<T: Real> Kernel for Moments<'_, T> {
         for t in 0..self.x.rows() {
             mean.iter_mut().zip(self.x.row(t)).for_each(|(mean, x)| *mean += *x);
         }
-        mean.iter_mut().for_each(|mean| *mean = *mean * share);
+        mean.iter_mut().for_each(|mean| *mean *= share);
         for t in 0..self.x.rows() {
             for ((square, mean), x) in square.iter_mut().zip(&*mean).zip(self.x.row(t)) {
                 let off = *x - *mean;
@@ -179,7 +179,7 @@ impl<T: Real> Kernel for BackwardInput<'_, T> {
                 if let Some((sums, count)) = self.sums {
                     let share = T::of(1.0 / count as f64);
                     let normal = (self.x.row(t)[c] - self.mean[c]) * self.rstd[c];
-                    inner = inner - share * (sums[channels + c] + normal * sums[c]);
+                    inner -= share * (sums[channels + c] + normal * sums[c]);
                 }
                 let value = self.gamma[c] * self.rstd[c] * inner;
                 *dx = value + if self.write == Write::Add { *dx } else { T::ZERO };

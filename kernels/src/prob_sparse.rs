@@ -223,7 +223,7 @@ impl<T: Real> Kernel for Softmax<'_, T> {
             let most = row.iter().fold(T::NEG_INFINITY, |most, x| if *x > most { *x } else { most });
             row.iter_mut().for_each(|x| *x = exp::<T, I>((*x - most) * self.scale));
             let inverse = T::ONE / crate::sums::of::<T, I>(row, |x| x);
-            row.iter_mut().for_each(|x| *x = *x * inverse);
+            row.iter_mut().for_each(|x| *x *= inverse);
         }
     }
 }

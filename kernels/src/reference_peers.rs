@@ -106,9 +106,9 @@ pub fn lstm<T: Real>(x: Rows<'_, T>, weights: crate::lstm::Weights<'_, T>, dy: R
 
 /// w(o) = g(o)·v(o)/‖v(o)‖ for v `[out, n]`.
 pub fn weight_norm<T: Real>(v: Rows<'_, T>, g: &[T], mut w: RowsMut<'_, T>) {
-    for o in 0..v.rows() {
+    for (o, g) in g.iter().enumerate() {
         let norm = v.row(o).iter().map(|v| v.f64().powi(2)).sum::<f64>().sqrt();
-        w.row_mut(o).iter_mut().zip(v.row(o)).for_each(|(w, v)| *w = T::of(g[o].f64() * v.f64() / norm));
+        w.row_mut(o).iter_mut().zip(v.row(o)).for_each(|(w, v)| *w = T::of(g.f64() * v.f64() / norm));
     }
 }
 
@@ -171,8 +171,8 @@ pub fn fold<T: Real>(fold: crate::fold::Fold, x: Rows<'_, T>, weight: &[T], bias
     };
     for n in 0..fold.positions().min(dy.rows()) {
         let (r, c) = (n / fold.period, n % fold.period);
-        for o in 0..outputs {
-            found.y[n * outputs + o] += bias[o].f64();
+        for (o, bias) in bias.iter().enumerate() {
+            found.y[n * outputs + o] += bias.f64();
             found.dbias[o] += dy.row(n)[o].f64();
         }
         for (a, b) in (0..kernel).flat_map(|a| (0..kernel).map(move |b| (a, b))) {
@@ -220,7 +220,7 @@ pub fn sparsity<T: Real>(
     i: usize,
 ) -> f64 {
     let (size, keys) = (q.cols() / sparse.heads, k.rows());
-    let sample = |s: usize| (u64::from(stream.sub(i as u64).word(s as u32)) * keys as u64 >> 32) as usize;
+    let sample = |s: usize| ((u64::from(stream.sub(i as u64).word(s as u32)) * keys as u64) >> 32) as usize;
     let product = |j: usize| (h * size..(h + 1) * size).map(|c| q.row(i)[c].f64() * k.row(j)[c].f64()).sum::<f64>();
     let products: Vec<f64> = (0..sparse.chosen(keys)).map(|s| product(sample(s))).collect();
     products.iter().copied().fold(f64::NEG_INFINITY, f64::max) - products.iter().sum::<f64>() / keys as f64

@@ -9,6 +9,8 @@
 //! radix r combines r stretches of rows, all channels of a stretch side by side. 1000 = 2³·5³ takes six passes; a prime length is its
 //! own definition. The gradient needs the chosen frequencies only.
 
+use std::cmp::Ordering;
+
 use crate::level::{Isa, Kernel, Level};
 use crate::{Real, Rows, RowsMut};
 
@@ -187,14 +189,15 @@ pub fn strongest<T: Real>(amplitudes: &[T], count: usize, mut take: impl FnMut(u
     // Each is the largest of those that come after the one before it.
     let mut before: Option<(usize, T)> = None;
     for place in 0..count {
-        let after = |f: usize, amplitude: T| {
-            before.is_none_or(|(last, largest)| amplitude < largest || !(amplitude > largest || amplitude < largest) && f > last)
+        let after = |&(f, amplitude): &(usize, T)| {
+            before.is_none_or(|(last, largest)| match amplitude.partial_cmp(&largest) {
+                Some(Ordering::Less) => true,
+                Some(Ordering::Equal) => f > last,
+                _ => false,
+            })
         };
-        let free = amplitudes.iter().enumerate().map(|(f, amplitude)| (f + 1, *amplitude)).filter(|(f, a)| after(*f, *a));
-        let best = free.fold(None, |best: Option<(usize, T)>, (f, amplitude)| match best {
-            Some((_, largest)) if !(amplitude > largest) => best,
-            _ => Some((f, amplitude)),
-        });
+        let free = amplitudes.iter().enumerate().map(|(f, amplitude)| (f + 1, *amplitude)).filter(after);
+        let best = free.reduce(|best, other| if other.1 > best.1 { other } else { best });
         before = best.or(before);
         take(place, best.map_or(1, |(f, _)| f));
     }

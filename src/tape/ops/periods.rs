@@ -76,7 +76,7 @@ impl<T: Real> Op<T> for Periods {
             *weight = (*weight - largest).exp();
             sum += *weight;
         }
-        y.iter_mut().skip(1).step_by(2).for_each(|weight| *weight = *weight / sum);
+        y.iter_mut().skip(1).step_by(2).for_each(|weight| *weight /= sum);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
