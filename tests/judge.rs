@@ -8,7 +8,7 @@ use phyture::flight::{Column, DataSet, Flight, Span, Window};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::sensitivity::{HALF_WIDTH, half_width};
 use phyture::hybrid::{Description, Hybrid, network_target, sequence};
-use phyture::nn::{PhyTureConfig, Variant};
+use phyture::nn::{Architecture, PhyTureConfig, Variant};
 use phyture::physics::{Estimate, Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
@@ -41,6 +41,7 @@ impl Case {
             variant,
             ..PhyTureConfig::default()
         };
+        let config = Architecture::from(config);
         let inputs: Vec<String> = Column::STATE.iter().map(|column| column.name().to_owned()).collect();
         let linear = sequence::linear(&set.flights, &split.training, &model, &LinearConfig { lags: 3, ..LinearConfig::default() })?;
         let description = Description {

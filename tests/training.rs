@@ -31,8 +31,15 @@ fn job() -> Result<Job> {
     let network =
         PhyTureConfig { history: 16, d_model: 8, heads: 2, levels: 2, stacks: 1, moving_average: 5, ..PhyTureConfig::default() };
     let linear = LinearConfig { lags: 3, ..LinearConfig::default() };
-    let config =
-        TrainConfig { network, linear: Some(linear.clone()), epochs: 3, stride: 40, batch: 16, seed: 5, ..TrainConfig::default() };
+    let config = TrainConfig {
+        network: network.into(),
+        linear: Some(linear.clone()),
+        epochs: 3,
+        stride: 40,
+        batch: 16,
+        seed: 5,
+        ..TrainConfig::default()
+    };
     let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
     let description = Description {
         scaling: sequence::scaling(&set.flights, &split.training, &model, &config.inputs, Some(&linear), &config.network)?,
@@ -43,7 +50,7 @@ fn job() -> Result<Job> {
         gate: [1.0; 6],
         step_s: 0.01,
     };
-    let windows = windows(&split.training, config.network.history, config.stride);
+    let windows = windows(&split.training, config.network.history(), config.stride);
     Ok(Job { set, config, description, windows })
 }
 
@@ -127,7 +134,7 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
         |description| description.inputs.truncate(3),
         |description| description.scaling.state.truncate(3),
         |description| description.scaling.physics[2].deviation = 0.0,
-        |description| description.config.outputs = 5,
+        |description| description.config = PhyTureConfig { outputs: 5, ..PhyTureConfig::default() }.into(),
         |description| description.gate[1] = f64::NAN,
         |description| description.step_s = 0.0,
     ];

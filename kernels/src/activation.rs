@@ -7,6 +7,7 @@
 //! | leaky relu | x if x > 0 else slope·x, slope ≥ 0 | 1 if y > 0 else slope |
 //! | tanh | tanh x | 1 − y² |
 //! | sigmoid | 1/(1 + e⁻ˣ) | y·(1 − y) |
+//! | elu | x if x > 0 else eˣ − 1 | 1 if y > 0 else y + 1 |
 //! | gelu | x·Φ(x) = x/2·(1 + erf(x/√2)), the exact form | Φ(x) + x·φ(x), from x |
 //!
 //! All but gelu take their derivative from their own output, so that the input need not be kept.
@@ -34,6 +35,8 @@ pub enum Activation {
     Tanh,
     /// 1/(1 + e⁻ˣ)
     Sigmoid,
+    /// x above 0, eˣ − 1 otherwise
+    Elu,
     /// x·Φ(x), erf form
     Gelu,
 }
@@ -71,6 +74,7 @@ pub(crate) fn map<T: Real, I: Isa>(kind: Activation, values: &mut [T]) {
         }
         Activation::Tanh => values.for_each(|x| *x = tanh::<T, I>(*x)),
         Activation::Sigmoid => values.for_each(|x| *x = sigmoid::<T, I>(*x)),
+        Activation::Elu => values.for_each(|x| *x = if *x > T::ZERO { *x } else { exp::<T, I>(*x) - T::ONE }),
         Activation::Gelu => values.for_each(|x| *x = *x * half * (T::ONE + erf::<T, I>(*x * T::of(FRAC_1_SQRT_2)))),
     }
 }
@@ -96,6 +100,13 @@ fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
         }
         Activation::Tanh => T::ONE - saved * saved,
         Activation::Sigmoid => saved * (T::ONE - saved),
+        Activation::Elu => {
+            if saved > T::ZERO {
+                T::ONE
+            } else {
+                saved + T::ONE
+            }
+        }
         Activation::Gelu => {
             let density = T::of(FRAC_1_SQRT_2 * 0.5 * FRAC_2_SQRT_PI) * exp::<T, I>(T::of(-0.5) * saved * saved);
             T::of(0.5) * (T::ONE + erf::<T, I>(saved * T::of(FRAC_1_SQRT_2))) + saved * density
@@ -163,12 +174,13 @@ mod tests {
     use crate::testing::{Matrix, assert_near, check_writes};
     use crate::tolerance::Tolerance;
 
-    const ALL: [Activation; 6] = [
+    const ALL: [Activation; 7] = [
         Activation::Identity,
         Activation::Relu,
         Activation::LeakyRelu { slope: 0.01 },
         Activation::Tanh,
         Activation::Sigmoid,
+        Activation::Elu,
         Activation::Gelu,
     ];
 

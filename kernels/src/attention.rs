@@ -124,7 +124,7 @@ fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(
     let mut sink = Store { c, bias: None, write: Write::Add };
     for (panel, j) in panels.chunks_exact(keys * NR).zip((0..).step_by(NR)) {
         let panel = &panel.as_chunks::<NR>().0[key..key + s.rows()];
-        tile::columns::<T, I, _, MR, NR>(&s, panel, (j, NR), &mut sink);
+        tile::columns::<T, I, _, MR, NR>((|p| s.row(p), s.cols()), panel, (j, NR), &mut sink);
     }
 }
 

@@ -8,7 +8,8 @@
 
 use crate::level::Level;
 use crate::{
-    activation, adam, attention, conv1d, dropout, elementary, gemm, layer_norm, linear, loss, moving_average, rows, sci, temporal,
+    activation, adam, attention, batch_norm, conv1d, conv1d_general, dropout, elementary, fold, gemm, layer_norm, linear, loss,
+    lstm, moving_average, pool, prob_sparse, rows, sci, spectrum, temporal, temporal_each, weight_norm,
 };
 
 macro_rules! kernels {
@@ -47,11 +48,33 @@ kernels! {
         moving_average: moving_average::Average,
         rows_scale: rows::Scale,
         rows_combine: rows::Combine,
+        rows_inner: rows::Inner,
         sci_scale: sci::Scale,
         sci_backward: sci::Backward,
         temporal_weighted_sum: temporal::WeightedSum,
         temporal_row_dots: temporal::RowDots,
         temporal_row_sums: temporal::RowSums,
+        batch_norm_moments: batch_norm::Moments,
+        batch_norm_forward: batch_norm::Forward,
+        batch_norm_backward_sums: batch_norm::BackwardSums,
+        batch_norm_backward_input: batch_norm::BackwardInput,
+        lstm_forward: lstm::Forward,
+        lstm_backward: lstm::Backward,
+        pool_forward: pool::Forward,
+        pool_backward: pool::Backward,
+        prob_sparse_scores: prob_sparse::Scores,
+        prob_sparse_rest: prob_sparse::Rest,
+        prob_sparse_softmax: prob_sparse::Softmax,
+        prob_sparse_backward_rest: prob_sparse::BackwardRest,
+        prob_sparse_backward_softmax: prob_sparse::BackwardSoftmax,
+        spectrum_amplitudes: spectrum::Amplitudes,
+        spectrum_backward: spectrum::Backward,
+        temporal_each_forward: temporal_each::Forward,
+        temporal_each_backward_input: temporal_each::BackwardInput,
+        temporal_each_backward_weight: temporal_each::BackwardWeight,
+        weight_norm_forward: weight_norm::Forward,
+        weight_norm_direction: weight_norm::Direction,
+        weight_norm_length: weight_norm::Length,
     }
     tiles {
         attention_forward: attention::Forward,
@@ -62,5 +85,10 @@ kernels! {
         conv1d_backward_weight: conv1d::BackwardWeight,
         gemm_product: gemm::Product,
         gemm_transposed_product: gemm::TransposedProduct,
+        conv1d_general_forward: conv1d_general::Forward,
+        conv1d_general_backward_input: conv1d_general::BackwardInput,
+        conv1d_general_backward_weight: conv1d_general::BackwardWeight,
+        fold_product: fold::Product,
+        fold_backward_weight: fold::BackwardWeight,
     }
 }

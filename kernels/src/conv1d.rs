@@ -301,6 +301,10 @@ impl<T: Real> Kernel for BackwardEpilogue<'_, T> {
                     let y = *y * unscale;
                     *dz = *dz * scale * y * (T::ONE - y);
                 }),
+                Activation::Elu => pairs.for_each(|(dz, y)| {
+                    let y = *y * unscale;
+                    *dz = *dz * scale * if y > T::ZERO { T::ONE } else { y + T::ONE };
+                }),
                 Activation::Identity | Activation::Gelu => pairs.for_each(|(dz, _)| *dz *= scale),
             }
             if let Some(mask) = self.epilogue.dropout {
@@ -459,7 +463,12 @@ impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
                         if first < last {
                             let mut sink = Store { c: RowsMut::packed(dw, inputs, outputs), bias: None, write };
                             let panel = &panel[first - start..last - start];
-                            tile::columns::<T, I, _, MR, NR>(&x, panel, (column, NR.min(outputs - column)), &mut sink);
+                            tile::columns::<T, I, _, MR, NR>(
+                                (|p| x.row(p), inputs),
+                                panel,
+                                (column, NR.min(outputs - column)),
+                                &mut sink,
+                            );
                             write = Write::Add;
                         }
                     }

@@ -120,8 +120,8 @@ impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
             for j in (0..n).step_by(NR) {
                 let panel = &mut panel[..end - start];
                 tile::pack_panel(&self.b.range(start, end), j, panel);
-                let mut sink = Store { c: self.c.reborrow(), bias: None, write };
-                tile::columns::<T, I, _, MR, NR>(&self.a.range(start, end), panel, (j, NR.min(n - j)), &mut sink);
+                let (a, mut sink) = (self.a.range(start, end), Store { c: self.c.reborrow(), bias: None, write });
+                tile::columns::<T, I, _, MR, NR>((|p| a.row(p), a.cols()), panel, (j, NR.min(n - j)), &mut sink);
             }
         }
     }

@@ -53,6 +53,13 @@ pub fn activation(kind: Activation, x: f64) -> f64 {
         }
         Activation::Tanh => x.tanh(),
         Activation::Sigmoid => 1.0 / (1.0 + (-x).exp()),
+        Activation::Elu => {
+            if x > 0.0 {
+                x
+            } else {
+                x.exp_m1()
+            }
+        }
         Activation::Gelu => x * 0.5 * (1.0 + erf(x / std::f64::consts::SQRT_2)),
     }
 }
@@ -71,6 +78,7 @@ pub fn activation_derivative(kind: Activation, x: f64) -> f64 {
         }
         Activation::Tanh => 1.0 - x.tanh() * x.tanh(),
         Activation::Sigmoid => (1.0 / (1.0 + (-x).exp())) * (1.0 / (1.0 + x.exp())),
+        Activation::Elu => x.min(0.0).exp(),
         Activation::Gelu => {
             let density = (-0.5 * x * x).exp() / (2.0 * std::f64::consts::PI).sqrt();
             0.5 * (1.0 + erf(x / std::f64::consts::SQRT_2)) + x * density

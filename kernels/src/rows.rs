@@ -53,16 +53,6 @@ impl<'a, T> Rows<'a, T> {
         Self { data: row, rows, cols: row.len(), stride: 0 }
     }
 
-    /// Columns `j…j + N` of row `i`.
-    ///
-    /// # Safety
-    /// `i` must be less than the number of rows, and `j + N` no more than the number of columns.
-    #[inline(always)]
-    pub(crate) unsafe fn chunk_unchecked<const N: usize>(&self, i: usize, j: usize) -> &'a [T; N] {
-        // SAFETY: every constructor checks that the slice holds (rows − 1)·stride + cols numbers, unless the view is empty.
-        unsafe { &*self.data.as_ptr().add(i * self.stride + j).cast::<[T; N]>() }
-    }
-
     /// Number of rows.
     pub const fn rows(&self) -> usize {
         self.rows
@@ -157,6 +147,11 @@ impl<'a, T> RowsMut<'a, T> {
     #[inline(always)]
     pub fn row_mut(&mut self, i: usize) -> &mut [T] {
         &mut self.data[i * self.stride..][..self.cols]
+    }
+
+    /// The numbers from the first row on, as they lie.
+    pub(crate) fn into_slice(self) -> &'a mut [T] {
+        self.data
     }
 
     /// The same rows, to be read.
@@ -283,6 +278,27 @@ pub fn interleave<T: Real>(level: Level, even: Rows<'_, T>, odd: Rows<'_, T>, mu
     copy(level, odd, y.odd(), write);
 }
 
+/// Σ x∘y over all elements, both `[n, C]`.
+pub fn inner<T: Real>(level: Level, x: Rows<'_, T>, y: Rows<'_, T>) -> T {
+    same_shape(&x, &y);
+    let mut sum = T::ZERO;
+    T::rows_inner(level, Inner { x, y, sum: &mut sum });
+    sum
+}
+
+pub(crate) struct Inner<'a, T> {
+    x: Rows<'a, T>,
+    y: Rows<'a, T>,
+    sum: &'a mut T,
+}
+
+impl<T: Real> Kernel for Inner<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa>(self) {
+        *self.sum = (0..self.x.rows).map(|i| crate::sums::dot::<T, I>(self.x.row(i), self.y.row(i))).sum();
+    }
+}
+
 /// Every element of y becomes `value`.
 pub fn fill<T: Real>(mut y: RowsMut<'_, T>, value: T) {
     for i in 0..y.rows {
@@ -334,6 +350,8 @@ mod tests {
                 subtract(level, a.view(), b.view(), y.view_mut());
                 assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a - b).collect::<Vec<_>>());
                 y.check_gaps();
+                let expected: f64 = a_values.iter().zip(&b_values).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
+                assert_near("inner", &[super::inner(level, a.view(), b.view())], &[expected as f32], Tolerance::Approximate);
                 check_writes("copy", &a, Tolerance::Close, |y, write| copy(level, a.view(), y, write));
             }
         }

@@ -283,17 +283,15 @@ pub(crate) fn pack_panel<T: Real, const NR: usize>(b: &Rows<'_, T>, j: usize, pa
 
 /// One tile of the column form: `acc[i][j] = Σ_p left[p][i₀ + i]·panel[p][j]`.
 #[inline(always)]
-fn column_tile<T: Real, I: Isa, const MR: usize, const NR: usize>(
-    left: &Rows<'_, T>,
+fn column_tile<'a, T: Real, I: Isa, const MR: usize, const NR: usize>(
+    left: impl Fn(usize) -> &'a [T],
     i_first: usize,
     panel: &[[T; NR]],
 ) -> [Pair<T, I>; MR] {
-    assert!(i_first + MR <= left.cols() && panel.len() <= left.rows(), "a tile beyond its operand");
     let mut acc = [[I::Vector::splat(T::ZERO); 2]; MR];
     for (p, line) in panel.iter().enumerate() {
         let b = load::<T, I, NR>(line);
-        // SAFETY: p is a row of the operand, whose columns were checked above.
-        let a: &[T; MR] = unsafe { left.chunk_unchecked(p, i_first) };
+        let a = &left(p)[i_first..][..MR];
         for i in 0..MR {
             accumulate::<T, I>(&mut acc[i], a[i], b);
         }
@@ -301,21 +299,20 @@ fn column_tile<T: Real, I: Isa, const MR: usize, const NR: usize>(
     acc
 }
 
-/// sink ← leftᵀ·panel, left `[depth, m]`, panel `[depth, NR]`, of which `width` columns belong to columns `j…` of the result. Left
+/// sink ← leftᵀ·panel; row p of the left operand is `left(p)` `[m]`; panel `[depth, NR]`, of which `width` columns belong to columns `j…` of the result. Left
 /// and panel should fit in the first-level cache together; the left one is passed over once, the panel m/MR times.
 #[inline(always)]
-pub(crate) fn columns<T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
-    left: &Rows<'_, T>,
+pub(crate) fn columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: usize>(
+    (left, m): (impl Fn(usize) -> &'a [T], usize),
     panel: &[[T; NR]],
     (j, width): (usize, usize),
     sink: &mut S,
 ) {
-    let m = left.cols();
     if m < MR {
         for i in 0..m {
             let mut sums = [T::ZERO; NR];
             for (p, line) in panel.iter().enumerate() {
-                let a = left.row(p)[i];
+                let a = left(p)[i];
                 sums.iter_mut().zip(line).for_each(|(sum, b)| *sum = I::mul_add(a, *b, *sum));
             }
             sink.store::<I>(i, j, &sums[..width]);
@@ -325,7 +322,7 @@ pub(crate) fn columns<T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR: us
     for i_wanted in (0..m).step_by(MR) {
         // The last tile starts early enough to be whole; what it repeats is not stored again.
         let i = i_wanted.min(m - MR);
-        let acc = column_tile::<T, I, MR, NR>(left, i, panel);
+        let acc = column_tile::<T, I, MR, NR>(&left, i, panel);
         if i == i_wanted && width == NR {
             store_rows!(acc, |row, sums| sink.store_whole::<I, NR>(i + row, j, sums));
         } else {

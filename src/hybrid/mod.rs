@@ -21,7 +21,7 @@ use crate::blocks::Blocks;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Window};
 use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
-use crate::nn::{Network, OutputScale, PhyTureConfig};
+use crate::nn::{Architecture, Network, OutputScale};
 use crate::physics::Model;
 use crate::tape::{Session, Threads};
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,7 @@ pub struct Description {
     /// The calibrated physical model.
     pub model: Model,
     /// The network.
-    pub config: PhyTureConfig,
+    pub config: Architecture,
     /// State-control inputs, as formulas of the log's columns.
     pub inputs: Vec<String>,
     /// Linear history between physics and network, if there is one.
@@ -79,10 +79,10 @@ impl Description {
         };
         let Self { config, inputs, linear, scaling, gate, step_s, .. } = self;
         let sizes = [
-            ("network.state_channels", config.state_channels, inputs.len()),
+            ("network.state_channels", config.state_channels(), inputs.len()),
             ("scaling.state", scaling.state.len(), inputs.len()),
-            ("network.physics_channels", config.physics_channels, 6),
-            ("network.outputs", config.outputs, 6),
+            ("network.physics_channels", config.physics_channels(), 6),
+            ("network.outputs", config.outputs(), 6),
         ];
         if let Some((field, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
             return fault(field, found.to_string(), expected.to_string());
@@ -146,7 +146,7 @@ impl Hybrid {
     /// As [`Hybrid::predict`].
     pub fn fit_gate(&mut self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<[f64; 6]> {
         self.description.gate = [1.0; 6];
-        if !self.description.config.variant.predicts_residual() || windows.is_empty() {
+        if !self.description.config.predicts_residual() || windows.is_empty() {
             return Ok(self.description.gate);
         }
         let sequences = sequence::sequences(flights, &self.description)?;
@@ -234,14 +234,14 @@ impl Hybrid {
         let config = &self.description.config;
         flights.iter().try_for_each(|flight| self.description.check_step(flight))?;
         let whole = |window: &Window| {
-            window.last + 1 >= config.history && flights.get(window.flight).is_some_and(|flight| window.last < flight.len())
+            window.last + 1 >= config.history() && flights.get(window.flight).is_some_and(|flight| window.last < flight.len())
         };
         windows.iter().find(|window| !whole(window)).map_or(Ok(()), |window| {
             Err(Error::Config {
                 place: "prediction".into(),
                 field: "window".into(),
                 found: format!("flight {}, row {}", window.flight, window.last),
-                expected: format!("a row with a full history of {} samples", config.history),
+                expected: format!("a row with a full history of {} samples", config.history()),
             })
         })
     }
@@ -266,7 +266,7 @@ impl Hybrid {
 
     /// The network's last row, on top of the baseline where it is a residual.
     fn complete(&self, baseline: [f64; 6], output: &[f32]) -> [f64; 6] {
-        let residual = self.description.config.variant.predicts_residual();
+        let residual = self.description.config.predicts_residual();
         let last = &output[output.len().saturating_sub(6)..];
         std::array::from_fn(|channel| {
             let learned = last.get(channel).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel];

@@ -75,7 +75,7 @@ impl Hybrid {
         let mut parameters = self.parameters.clone();
         let weights = parameters.len();
         parameters.resize(weights + 6, 0.0);
-        let residual = description.config.variant.predicts_residual();
+        let residual = description.config.predicts_residual();
         let mut found = vec![vec![Movement::default(); windows.len()]; estimates.len()];
         for (flight, members) in by_flight(windows) {
             let Some(flight) = flights.get(flight) else { continue };
@@ -90,7 +90,7 @@ impl Hybrid {
                     }
                 }
             }
-            if !description.config.variant.reads_physics() {
+            if !description.config.reads_physics() {
                 continue;
             }
             let sequences = sequences(std::slice::from_ref(flight), description)?;
@@ -232,7 +232,7 @@ impl Probe {
         let rule = LossRule { scale: 1.0, standardise: false, input_gradients: true };
         let network = Network::<f32>::record(&description.config, &description.output_scale(), rule)?;
         let mut graph = network.graph().clone();
-        let weight = graph.parameter("sensitivity.channel", &[1, description.config.outputs])?;
+        let weight = graph.parameter("sensitivity.channel", &[1, description.config.outputs()])?;
         let rows = graph.apply(Linear, &[network.output(), weight])?;
         let chosen = graph.apply(LastRows { count: 1 }, &[rows])?;
         Ok(Self { graph, chosen })

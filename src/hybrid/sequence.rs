@@ -6,7 +6,7 @@ use super::scaling::{Scale, Scaling};
 use crate::error::{Error, Result};
 use crate::flight::{Accelerations, Column, Flight, Span, Window};
 use crate::formula::Formula;
-use crate::nn::PhyTureConfig;
+use crate::nn::Architecture;
 use crate::physics::Model;
 
 /// What the network learns: the residual r = a − a^p, or the acceleration itself (the variants without residual learning).
@@ -110,7 +110,7 @@ pub fn sequences(flights: &[Flight], description: &Description) -> Result<Vec<Se
     let Description { model, config, inputs, linear, scaling, .. } = description;
     let formulas = parse_inputs(inputs)?;
     let one = |flight: &Flight| {
-        let raw = Raw::new(flight, model, &formulas, linear.as_ref(), config.variant.predicts_residual())?;
+        let raw = Raw::new(flight, model, &formulas, linear.as_ref(), config.predicts_residual())?;
         let sequence = Sequence::new(raw, scaling);
         check_finite(flight, inputs, &sequence)?;
         Ok(sequence)
@@ -128,10 +128,10 @@ pub fn scaling(
     model: &Model,
     inputs: &[String],
     linear: Option<&Linear>,
-    config: &PhyTureConfig,
+    network: &Architecture,
 ) -> Result<Scaling> {
     let formulas = parse_inputs(inputs)?;
-    let residual = config.variant.predicts_residual();
+    let residual = network.predicts_residual();
     let raw: Vec<Raw> = flights.iter().map(|flight| Raw::new(flight, model, &formulas, linear, residual)).collect::<Result<_>>()?;
     let of = |column: &dyn Fn(&Raw) -> &Vec<f64>| {
         let columns: Vec<&[f64]> = raw.iter().map(|raw| column(raw).as_slice()).collect();

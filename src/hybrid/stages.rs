@@ -32,7 +32,7 @@ impl Hybrid {
         let sequences = sequence::sequences(flights, description)?;
         let physics: Vec<Accelerations> = flights.iter().map(|flight| description.model.predict(flight)).collect::<Result<_>>()?;
         let alone = |window: &Window| std::array::from_fn(|channel| physics[window.flight][channel][window.last]);
-        let added = description.linear.is_some() && description.config.variant.predicts_residual();
+        let added = description.linear.is_some() && description.config.predicts_residual();
         let with_linear = |window: &Window| sequences[window.flight].baseline(window.last);
         Ok(Stages {
             physics: windows.iter().map(alone).collect(),

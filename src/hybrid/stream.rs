@@ -34,7 +34,7 @@ impl<'a> StreamingHybrid<'a> {
         if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&known)) {
             return Err(error);
         }
-        let history = description.config.history;
+        let history = description.config.history();
         Ok(Self {
             hybrid,
             model: description.model.stream(description.step_s)?,
@@ -67,7 +67,7 @@ impl<'a> StreamingHybrid<'a> {
         let channels = self.inputs.len();
         self.state.copy_within(channels.., 0);
         self.physics.copy_within(6.., 0);
-        let rows = description.config.history;
+        let rows = description.config.history();
         for (input, (formula, scale)) in self.inputs.iter_mut().zip(&description.scaling.state).enumerate() {
             self.values.clear();
             self.values.extend(formula.inputs().iter().map(|name| quantity_at(state, time_s, name).unwrap_or(f64::NAN)));

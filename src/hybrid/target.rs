@@ -63,7 +63,7 @@ pub fn network_target(
         return Err(Error::Config { place: "network target".into(), field: "stride".into(), found, expected });
     }
     let description = hybrid.description();
-    let history = description.config.history;
+    let history = description.config.history();
     let mut target = NetworkTarget { set: DataSet::default(), stride, first: history.saturating_sub(1), originals: Vec::new() };
     for (index, flight) in flights.iter().enumerate().filter(|(index, _)| spans.iter().any(|span| span.flight == *index)) {
         let all = windows(&[Span { flight: 0, start: 0, end: flight.len() }], history, stride);

@@ -2,7 +2,8 @@
 //!
 //! What the sizes mean is in `phyture`; how the network is trained is not here.
 
-use crate::error::{Error, Result};
+use super::architecture::{LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused};
+use crate::error::Result;
 use serde::{Deserialize, Serialize};
 
 /// Phy-Ture, its ablations (paper table 4) and its fusion variants (paper table 6).
@@ -37,6 +38,19 @@ impl Variant {
         Self::StateControlOnly,
         Self::DirectConcatenation,
     ];
+
+    /// As it stands in the paper's tables 4 and 6.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::PhyTure => "Phy-Ture",
+            Self::WithoutPaf => "Without PAF",
+            Self::WithoutMstfe => "Without MSTFE",
+            Self::WithoutTsdpTemporalLinear => "Without TSDP (temporal linear)",
+            Self::WithoutTsdpLastRow => "Without TSDP (last row)",
+            Self::StateControlOnly => "State-Control Only",
+            Self::DirectConcatenation => "Direct Concatenation",
+        }
+    }
 
     /// Whether the output is the residual r̂ of eq. 11 (true), to which the physical baseline is added (eq. 12), or the
     /// acceleration itself (false).
@@ -117,10 +131,7 @@ impl Default for PhyTureConfig {
     }
 }
 
-/// Bounds of any size, far above every sensible one: a hostile file cannot ask for a graph or a slab that exhausts the machine.
-const LARGEST_HISTORY: usize = 100_000;
-const LARGEST_WIDTH: usize = 4096;
-const LARGEST_KERNEL: usize = 255;
+/// Bounds of depth; those of sizes are every network's.
 const MOST_LEVELS: usize = 8;
 const MOST_STACKS: usize = 16;
 
@@ -130,10 +141,8 @@ impl PhyTureConfig {
     /// # Errors
     /// [`Error::Config`] with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
-        let refuse = |field: &str, found: String, expected: String| {
-            Err(Error::Config { place: "network".into(), field: field.into(), found, expected })
-        };
-        let ranges = [
+        let refuse = |field: &str, found: String, expected: String| Err(refused(field, found, expected));
+        let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
             ("physics_channels", self.physics_channels, LARGEST_WIDTH),
@@ -147,11 +156,8 @@ impl PhyTureConfig {
             ("kernel1", self.kernel1, LARGEST_KERNEL),
             ("kernel2", self.kernel2, LARGEST_KERNEL),
         ];
-        for (field, value, largest) in ranges {
-            if value == 0 || value > largest {
-                return refuse(field, value.to_string(), format!("1 to {largest}"));
-            }
-        }
+        let reals = [("leak", self.leak, 0.0, 1.0), ("norm_eps", self.norm_eps, 0.0, 1.0), ("dropout", self.dropout, 0.0, 0.95)];
+        check_ranges(&sizes, &reals)?;
         if !self.d_model.is_multiple_of(self.heads) {
             return refuse("heads", self.heads.to_string(), format!("a divisor of d_model = {}", self.d_model));
         }
@@ -175,12 +181,6 @@ impl PhyTureConfig {
                 format!("{} to {}: 1 to {LARGEST_WIDTH} channels", 1.0 / self.d_model as f64, LARGEST_WIDTH / self.d_model);
             return refuse("hidden", self.hidden.to_string(), expected);
         }
-        let reals = [("leak", self.leak, 0.0, 1.0), ("norm_eps", self.norm_eps, 0.0, 1.0), ("dropout", self.dropout, 0.0, 0.95)];
-        for (field, value, smallest, largest) in reals {
-            if !(value >= smallest && value <= largest) {
-                return refuse(field, value.to_string(), format!("{smallest} to {largest}"));
-            }
-        }
         Ok(())
     }
 
@@ -193,6 +193,7 @@ impl PhyTureConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
 
     #[test]
     fn each_rule_names_its_field() {

@@ -1,15 +1,19 @@
-//! Networks on the tape: layers, Phy-Ture, its ablations and fusion variants, and their weights in safetensors files.
+//! Networks on the tape: layers, Phy-Ture, its ablations and fusion variants, the peers, and their weights in safetensors files.
 //!
 //! A network is a recorded graph plus the rule by which its parameters start. It holds no numbers: parameters are one flat
 //! slab, owned by whoever trains or predicts.
 
+mod architecture;
 mod config;
 mod layers;
+mod network;
 pub mod parity;
+pub mod peers;
 mod phyture;
 pub mod safetensors;
 
+pub use architecture::Architecture;
 pub use config::{PhyTureConfig, Variant};
 pub use layers::{Init, Recorder};
-pub(crate) use phyture::LossRule;
-pub use phyture::{Network, OutputScale};
+pub(crate) use network::LossRule;
+pub use network::{Network, OutputScale};

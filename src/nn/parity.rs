@@ -1,12 +1,12 @@
-//! Parity: weights, inputs, outputs and gradients of another program's Phy-Ture against this one's.
+//! Parity: weights, inputs, outputs and gradients of another program's network against this one's.
 //!
 //! The file (safetensors) holds the configuration, `param.*`, `input.state`, `input.physics`, `target`, and what the other program
 //! found: `output`, `loss` (mean over all elements of the squared error), `grad.param.*`, `grad.input.*`, and optionally
 //! `adam1.param.*` after one Adam step. Everything is computed again in the file's precision, without dropout. This file
 //! measures; what difference is too large is for the caller to say.
 
-use super::config::PhyTureConfig;
-use super::phyture::{LossRule, Network, OutputScale};
+use super::architecture::Architecture;
+use super::network::{LossRule, Network, OutputScale};
 use super::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::error::{Error, Result};
 use crate::tape::{Session, Threads};
@@ -18,7 +18,7 @@ use std::path::Path;
 
 /// Its true gradient is zero (a softmax does not see a constant added to all keys): any value is rounding, and so is the sign
 /// from which Adam takes its step.
-const WITHOUT_GRADIENT: &str = "paf.key.bias";
+const WITHOUT_GRADIENT: &str = ".key.bias";
 
 /// Largest relative error of each tensor.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -63,14 +63,14 @@ pub fn compare(path: &Path, threads: Threads) -> Result<Parity> {
     let fault = |message: String| Error::File { path: path.into(), message };
     let config =
         file.metadata.get("config").ok_or_else(|| fault("no `config` in the metadata; export it with the weights".into()))?;
-    let config: PhyTureConfig =
+    let architecture: Architecture =
         serde_json::from_str(config).map_err(|error| fault(format!("`config` in the metadata: {error}")))?;
     let run = match file.tensors.get("input.state").map(|tensor| &tensor.numbers) {
         Some(Numbers::F32(_)) => run::<f32>,
         Some(Numbers::F64(_)) => run::<f64>,
         None => return Err(fault("no tensor `input.state`; export the inputs with the weights".into())),
     };
-    run(&file, &config, threads).map_err(|error| match error {
+    run(&file, &architecture, threads).map_err(|error| match error {
         Problem::File(message) => fault(message),
         Problem::Other(error) => error,
     })
@@ -120,18 +120,19 @@ fn tensor<'a, T: Precision>(file: &'a SafeTensors, name: &str, shape: &[usize]) 
 /// Tensors by the name they are compared under.
 type Compared<'a, T> = BTreeMap<String, (Vec<T>, &'a [T])>;
 
-fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Threads) -> Result<Parity, Problem> {
-    let elements = config.horizon as f64 * config.outputs as f64;
+fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: Threads) -> Result<Parity, Problem> {
+    let (history, horizon, outputs) = (architecture.history(), architecture.horizon(), architecture.outputs());
+    let elements = horizon as f64 * outputs as f64;
     let rule = LossRule { scale: 1.0 / elements, standardise: false, input_gradients: true };
-    let network = Network::<T>::record(config, &OutputScale::unit(config.outputs), rule)?;
+    let network = Network::<T>::record(architecture, &OutputScale::unit(outputs), rule)?;
     let samples = match file.tensors.get("input.state").map(|tensor| tensor.shape.as_slice()) {
         Some([samples, _, _]) if *samples > 0 => *samples,
         found => return Err(Problem::File(format!("`input.state` has shape {found:?}; expected [samples, history, channels]"))),
     };
     let inputs = [
-        ("input.state", [samples, config.history, config.state_channels]),
-        ("input.physics", [samples, config.history, config.physics_channels]),
-        ("target", [samples, config.horizon, config.outputs]),
+        ("input.state", [samples, history, architecture.state_channels()]),
+        ("input.physics", [samples, history, architecture.physics_channels()]),
+        ("target", [samples, horizon, outputs]),
     ];
     let [state, physics, target] = inputs.map(|(name, shape)| tensor::<T>(file, name, &shape));
     let given = [state?, physics?, target?];
@@ -155,7 +156,7 @@ fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Thread
 
     let mut compared = Compared::<T>::new();
     let output: Vec<T> = (0..samples).flat_map(|sample| session.output(0, sample)).copied().collect();
-    compared.insert("output".into(), (output, tensor(file, "output", &[samples, config.horizon, config.outputs])?));
+    compared.insert("output".into(), (output, tensor(file, "output", &[samples, horizon, outputs])?));
     compared.insert("loss".into(), (vec![T::of(loss)], tensor(file, "loss", &[1])?));
     for (index, (name, shape)) in inputs.into_iter().take(2).enumerate() {
         let mut gradient: Vec<T> = (0..samples).flat_map(|sample| session.input_gradient(index, sample)).copied().collect();
@@ -165,7 +166,7 @@ fn run<T: Precision>(file: &SafeTensors, config: &PhyTureConfig, threads: Thread
         }
         compared.insert(format!("grad.{name}"), (gradient, tensor(file, &format!("grad.{name}"), &shape)?));
     }
-    let with_gradient = network.parameters().iter().filter(|parameter| parameter.name != WITHOUT_GRADIENT);
+    let with_gradient = network.parameters().iter().filter(|parameter| !parameter.name.ends_with(WITHOUT_GRADIENT));
     for parameter in with_gradient.clone() {
         let name = format!("grad.param.{}", parameter.name);
         let reference = tensor(file, &name, &parameter.file_lengths())?;
@@ -201,7 +202,7 @@ fn relative_error<T: Real>(found: &[T], reference: &[T]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::config::Variant;
+    use super::super::config::{PhyTureConfig, Variant};
     use super::*;
     use phyture_kernels::random::Stream;
 

@@ -1,150 +1,69 @@
 //! Phy-Ture as a recorded graph: physics-augmented fusion (PAF), multiscale feature enhancement (MSTFE), series decomposition and
 //! prediction (TSDP); paper eqs. 17–32. And its ablations and fusion variants, which leave out or replace one part.
 //!
-//! Inputs of one sample, in this order whatever the variant: S `[H, 16]` and P `[H, 6]`, both normalised per channel, and the
-//! target `[P, 6]` in m/s² and rad/s². Output: `[P, 6]` in the same units. Training, normalisation and the physical baseline
-//! itself are elsewhere.
+//! Sizes are in `config`; inputs, output scale and loss in `network`.
 
+use super::architecture::Configuration;
 use super::config::{PhyTureConfig, Variant};
-use super::layers::{Init, Recorder};
-use crate::error::{Error, Result};
+use super::layers::Recorder;
+use crate::error::Result;
+use crate::tape::Var;
 use crate::tape::ops::{
-    Add, Affine, Attention, Concatenate, Epilogue, Half, Interleave, LastRows, MovingAverage, PositionalEncoding, ScaleExp,
-    SquaredError, Subtract,
+    Add, Attention, Concatenate, Epilogue, Half, Interleave, LastRows, MovingAverage, PositionalEncoding, ScaleExp, Subtract,
 };
-use crate::tape::{Graph, Parameter, Var};
 use phyture_kernels::Real;
-use phyture_kernels::random::Stream;
 
-/// Fixed affine map from the network's unit scale to physical units, one number a channel: r̂ = scale ∘ net(·) + offset.
-///
-/// Scale and offset are the standard deviation and the mean of the training residual (of the training target for variants that
-/// predict the acceleration itself). The loss stays in physical units (eq. 13).
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct OutputScale {
-    /// σ, m/s² for the first three channels, rad/s² for the others.
-    pub scale: Vec<f64>,
-    /// μ, in the same units.
-    pub offset: Vec<f64>,
-}
-
-impl OutputScale {
-    /// The identity.
-    pub fn unit(outputs: usize) -> Self {
-        Self { scale: vec![1.0; outputs], offset: vec![0.0; outputs] }
-    }
-}
-
-/// How the loss of one sample is formed, and whether S and P get gradients.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LossRule {
-    /// Factor before the sum of squares.
-    pub scale: f64,
-    /// Divide errors by the output scale first.
-    pub standardise: bool,
-    /// Gradients of S and P.
-    pub input_gradients: bool,
-}
-
-/// A network of this file, recorded.
-pub struct Network<T> {
-    config: PhyTureConfig,
-    graph: Graph<T>,
-    inits: Vec<Init>,
-    output: Var,
-    loss: Var,
-}
-
-impl<T: Real> Network<T> {
-    /// Records the network of a configuration. The loss of one sample is the squared 2-norm over the channels, averaged over the
-    /// rows predicted; a session's mean over samples is then eq. 13.
-    ///
-    /// # Errors
-    /// [`Error::Config`] if the configuration or the length of the output scale is wrong.
-    ///
-    /// With `standardise`, the errors of each channel are divided by its output scale first, so that channels of small and of
-    /// large magnitude count alike.
-    pub fn new(config: &PhyTureConfig, output: &OutputScale, standardise: bool) -> Result<Self> {
-        let loss = LossRule { scale: 1.0 / config.horizon.max(1) as f64, standardise, input_gradients: false };
-        Self::record(config, output, loss)
+impl Configuration for PhyTureConfig {
+    fn name(&self) -> &'static str {
+        self.variant.name()
     }
 
-    /// As [`Network::new`], with the factor before the sum of squares free, and gradients of S and P if asked for.
-    pub(crate) fn record(config: &PhyTureConfig, scale: &OutputScale, rule: LossRule) -> Result<Self> {
-        config.check()?;
-        if scale.scale.len() != config.outputs || scale.offset.len() != config.outputs {
-            return Err(Error::Config {
-                place: "network".into(),
-                field: "output scale".into(),
-                found: format!("{} scales and {} offsets", scale.scale.len(), scale.offset.len()),
-                expected: format!("{} of each, one an output channel", config.outputs),
-            });
-        }
-        let mut recorder = Recorder::<T>::default();
-        let mut input = |name: &str, lengths: &[usize]| match rule.input_gradients {
-            true => recorder.graph.input_with_gradient(name, lengths),
-            false => recorder.graph.input(name, lengths),
-        };
-        let state = input("state", &[config.history, config.state_channels])?;
-        let physics = input("physics", &[config.history, config.physics_channels])?;
-        let target = recorder.graph.input("target", &[config.horizon, config.outputs])?;
+    fn history(&self) -> usize {
+        self.history
+    }
 
-        let mut builder = Builder { recorder, config };
+    fn state_channels(&self) -> usize {
+        self.state_channels
+    }
+
+    fn physics_channels(&self) -> usize {
+        self.physics_channels
+    }
+
+    fn outputs(&self) -> usize {
+        self.outputs
+    }
+
+    fn horizon(&self) -> usize {
+        self.horizon
+    }
+
+    fn predicts_residual(&self) -> bool {
+        self.variant.predicts_residual()
+    }
+
+    fn reads_physics(&self) -> bool {
+        self.variant.reads_physics()
+    }
+
+    fn is_random(&self) -> bool {
+        self.dropout > 0.0
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check()
+    }
+
+    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> Result<Var> {
+        let mut builder = Builder { recorder, config: self };
         let fused = builder.front(state, physics)?;
-        let enhanced = if config.variant == Variant::WithoutMstfe { fused } else { builder.trees(fused)? };
-        let predicted = builder.head(enhanced)?;
-        let Recorder { mut graph, inits } = builder.recorder;
-        let output = graph.apply(Affine { scale: scale.scale.clone(), offset: scale.offset.clone() }, &[predicted])?;
-        let (mut judged, mut wanted) = (output, target);
-        if rule.standardise {
-            let unit = Affine { scale: scale.scale.iter().map(|scale| 1.0 / scale).collect(), offset: vec![0.0; config.outputs] };
-            judged = graph.apply(unit.clone(), &[output])?;
-            wanted = graph.apply(unit, &[target])?;
-        }
-        let loss = graph.apply(SquaredError { scale: rule.scale }, &[judged, wanted])?;
-        Ok(Self { config: config.clone(), graph, inits, output, loss })
-    }
-
-    /// The configuration it was recorded from.
-    pub const fn config(&self) -> &PhyTureConfig {
-        &self.config
-    }
-
-    /// The graph, for a [`Session`](crate::tape::Session).
-    pub const fn graph(&self) -> &Graph<T> {
-        &self.graph
-    }
-
-    /// Predicted `[P, outputs]`, in physical units.
-    pub const fn output(&self) -> Var {
-        self.output
-    }
-
-    /// Loss of one sample.
-    pub const fn loss(&self) -> Var {
-        self.loss
-    }
-
-    /// Parameter tensors, in the order of the flat slab.
-    pub fn parameters(&self) -> &[Parameter] {
-        self.graph.parameters()
-    }
-
-    /// Initial parameters: the same for the same seed, whatever the precision (up to rounding) and the machine.
-    pub fn initial(&self, seed: u64) -> Vec<T> {
-        let mut slab = vec![T::ZERO; self.graph.parameter_count()];
-        for (index, (parameter, init)) in self.graph.parameters().iter().zip(&self.inits).enumerate() {
-            // Drawn in the order of files, so that a seed's start does not depend on how a tensor lies in memory.
-            let mut values = vec![T::ZERO; parameter.shape.len()];
-            init.fill(Stream::new(seed, 0, index as u64, 0), &mut values);
-            parameter.put_file_order(&values, &mut slab);
-        }
-        slab
+        let enhanced = if self.variant == Variant::WithoutMstfe { fused } else { builder.trees(fused)? };
+        builder.head(enhanced)
     }
 }
 
 struct Builder<'a, T> {
-    recorder: Recorder<T>,
+    recorder: &'a mut Recorder<T>,
     config: &'a PhyTureConfig,
 }
 
@@ -248,6 +167,7 @@ impl<T: Real> Builder<'_, T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nn::{Network, OutputScale};
 
     fn count(config: PhyTureConfig) -> Result<usize> {
         Ok(Network::<f32>::new(&config, &OutputScale::unit(6), false)?.graph().parameter_count())

@@ -126,6 +126,7 @@ impl<'a, T: Real> Trial<'a, T> {
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
+            coupled: None,
         });
         (y, workspace)
     }
@@ -155,6 +156,7 @@ impl<'a, T: Real> Trial<'a, T> {
             shapes: &self.shapes,
             level: self.level,
             stream: self.stream,
+            coupled: None,
         });
         (0..dx.len()).filter(|&index| !differentiable.reaches(index)).for_each(|index| dx[index].fill(T::ZERO));
         Ok(dx)
@@ -421,7 +423,7 @@ mod tests {
             self.op.differentiable().map(|inner| inner.reads()).unwrap_or_default()
         }
         fn backward(&self, io: Backward<'_, T>) {
-            let Backward { x, y, dy, workspace, mut dx, scratch, packed, shapes, level, stream } = io;
+            let Backward { x, y, dy, workspace, mut dx, scratch, packed, shapes, level, stream, coupled } = io;
             let Some(inner) = self.op.differentiable() else { return };
             let (Fault::Scaled(at)
             | Fault::Dropped(at)
@@ -433,7 +435,7 @@ mod tests {
             let mut own = vec![T::ZERO; target.values.len()];
             let mut slots: [Option<Gradient<'_, T>>; MAX_OPERANDS] = dx;
             slots[at] = Some(Gradient { values: &mut own, write: Write::Set });
-            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, packed, shapes, level, stream });
+            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, packed, shapes, level, stream, coupled });
             let write = match self.fault {
                 Fault::Dropped(_) => return,
                 Fault::NeverSets(_) => Write::Add,

@@ -7,8 +7,8 @@ use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Write};
 
-/// Largest number of operands of one operation.
-pub const MAX_OPERANDS: usize = 4;
+/// Largest number of operands of one operation: the kernels that an inception layer merges into one.
+pub const MAX_OPERANDS: usize = 8;
 
 /// Buffers of one operation for one sample, in elements.
 ///
@@ -58,6 +58,15 @@ impl Reads {
     }
 }
 
+/// What all samples of a step have given together to an operation that couples them.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupled<'a, T> {
+    /// Their parts, combined.
+    pub total: &'a [T],
+    /// How many they are.
+    pub samples: usize,
+}
+
 /// What a forward pass is given.
 pub struct Forward<'a, T> {
     /// Operands, in order; empty beyond the last.
@@ -77,6 +86,8 @@ pub struct Forward<'a, T> {
     /// Random stream of this operation, step and sample; `None` when random parts are off. Counter-based: the backward pass
     /// and any thread make the same numbers again.
     pub stream: Option<Stream>,
+    /// For a [`Coupling`] while training; otherwise `None`.
+    pub coupled: Option<Coupled<'a, T>>,
 }
 
 /// One gradient to be produced, and how.
@@ -109,12 +120,14 @@ pub struct Backward<'a, T> {
     pub level: Level,
     /// The random stream of the forward pass.
     pub stream: Option<Stream>,
+    /// For a [`Coupling`] while training, combined from the parts of the backward pass; otherwise `None`.
+    pub coupled: Option<Coupled<'a, T>>,
 }
 
 /// The operand that may be packed once a step.
 pub const WEIGHT: usize = 1;
 
-/// Which of the two packed forms of a weight.
+/// Which of the two passes a packed weight, or a sample's part of a coupling, is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pass {
     /// For [`Op::forward`].
@@ -165,6 +178,33 @@ pub trait Op<T: Real>: Send + Sync {
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         None
     }
+
+    /// How it couples the samples of a step, if it does.
+    fn coupling(&self) -> Option<&dyn Coupling<T>> {
+        None
+    }
+}
+
+/// An operation whose result for one sample depends on all samples of the step, as that of a batch normalisation does.
+///
+/// While training (that is, where random parts are on) all samples reach the operation before any goes on: each gives its part, the
+/// parts are combined in the order of the samples, and the passes find the total in `coupled`. Where random parts are off there is no
+/// total, and the operation takes what earlier steps have left in its parameters.
+pub trait Coupling<T: Real>: Op<T> {
+    /// Numbers in a part, and in the total.
+    fn part_len(&self, operands: &[Shape]) -> usize;
+
+    /// The part of one sample. Of the buffers only operands may be read, and nothing written.
+    fn gather(&self, io: &Forward<'_, T>, part: &mut [T]);
+
+    /// The same in the backward pass, where dy and the workspace may be read, too.
+    fn gather_backward(&self, io: &Backward<'_, T>, part: &mut [T]);
+
+    /// The total of the parts `[samples, part_len]`.
+    fn combine(&self, pass: Pass, operands: &[Shape], parts: &[T], total: &mut [T]);
+
+    /// What the total of a forward pass leaves in operand `operand`, a parameter without gradient, for steps to come.
+    fn settle(&self, operand: usize, operands: &[Shape], coupled: Coupled<'_, T>, values: &mut [T]);
 }
 
 /// An operation with a backward pass.

@@ -7,13 +7,16 @@
 //! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic but the sum over shards.
 
 use super::graph::{Graph, MAX_INPUTS, Var};
-use super::op::{Backward, Forward, Gradient, MAX_OPERANDS, Pack, Pass};
+use super::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS, Pack, Pass};
 use super::plan::{ALIGNMENT_BYTES, Piece, Plan, Role, Step, alignment};
 use crate::error::{Error, Result};
+use lockstep::Lockstep;
 use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Write};
 use std::sync::{Mutex, PoisonError};
+
+mod lockstep;
 
 /// Gradient shards of a training session: a constant, so that the order of summation is one. More than this many threads bring
 /// nothing in training.
@@ -73,6 +76,8 @@ pub struct Session<T> {
     losses: Vec<f64>,
     /// By sample: outputs in order, then the gradients of the inputs that have one.
     results: Vec<T>,
+    /// All samples of a step at once, for a plan that couples them.
+    lockstep: Option<Lockstep<T>>,
     #[cfg(feature = "rayon")]
     pool: Option<rayon::ThreadPool>,
 }
@@ -117,6 +122,7 @@ impl<T: Real> Session<T> {
             gradients: vec![T::ZERO; gradient_len],
             losses: Vec::new(),
             results: Vec::new(),
+            lockstep: plan.forward.iter().any(|step| step.op.coupling().is_some()).then(Lockstep::default),
             #[cfg(feature = "rayon")]
             pool: if count > 1 { Some(pool(count)?) } else { None },
             plan,
@@ -155,7 +161,7 @@ impl<T: Real> Session<T> {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
-        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, .. } = self;
+        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, .. } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
@@ -168,7 +174,10 @@ impl<T: Real> Session<T> {
             let packed = [&*forward, &*backward];
             let replay =
                 Replay { plan, level, poison, slabs, packed, parameters, dropout, fill, samples, result_len, shards: count };
-            replay.work(shards, 0, losses_mut, results);
+            match lockstep.as_mut().filter(|_| dropout.is_some()) {
+                Some(lockstep) => lockstep.run(&replay, shards, losses_mut, results),
+                None => replay.work(shards, 0, losses_mut, results),
+            }
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
             reduce(gradients, shards, &used, 0);
@@ -206,6 +215,14 @@ impl<T: Real> Session<T> {
             each(sample, &self.results[sample * result_len..][..output_len]);
         }
         Ok(())
+    }
+
+    /// Lets operations that couple samples keep what the last step told them (running means of a batch normalisation) in their
+    /// parameters. Does nothing for other plans, or after a step without random parts.
+    pub fn settle(&mut self, parameters: &mut [T]) {
+        if let Some(lockstep) = &mut self.lockstep {
+            lockstep.settle(&self.plan, parameters);
+        }
     }
 
     /// Gradient of the mean loss of the last step, one number a parameter, in the layout of the flat slab. Empty in an
@@ -353,7 +370,8 @@ impl<T: Real> Replay<'_, T> {
         lock().push(slab);
     }
 
-    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
+    /// Fills the inputs of a sample.
+    fn begin(&self, slab: &mut [T], sample: usize) {
         if self.poison {
             slab.fill(T::NAN);
         }
@@ -365,31 +383,49 @@ impl<T: Real> Replay<'_, T> {
             }
         });
         (self.fill)(sample, &mut inputs[..count]);
+    }
+
+    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
+        self.begin(slab, sample);
         for step in &self.plan.forward {
-            self.forward(step, slab, sample);
+            step.op.forward(self.forward(step, slab, sample, None));
         }
         let mut loss = 0.0;
         if let Some((value, gradient)) = self.plan.loss {
             loss = slab[value].f64();
             slab[gradient] = T::of(1.0 / self.samples as f64);
             for step in &self.plan.backward {
-                self.backward(step, slab, gradients, sample, first);
+                if let Some(differentiable) = step.op.differentiable() {
+                    differentiable.backward(self.backward(step, slab, gradients, (sample, first), None));
+                }
             }
         }
+        self.finish(slab, result);
+        loss
+    }
+
+    /// Copies outputs and gradients of inputs.
+    fn finish(&self, slab: &[T], result: &mut [T]) {
         let mut result = result;
         for range in self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()) {
             let (now, later) = result.split_at_mut(range.len());
             now.copy_from_slice(&slab[range.clone()]);
             result = later;
         }
-        loss
     }
 
     fn stream(&self, step: &Step<T>, sample: usize) -> Option<Stream> {
         self.dropout.map(|key| Stream::new(key.seed, key.step, step.site, sample as u64))
     }
 
-    fn forward(&self, step: &Step<T>, slab: &mut [T], sample: usize) {
+    /// What the forward pass of a step is given.
+    fn forward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        sample: usize,
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Forward<'b, T> {
         let mut io = Forward {
             x: [&[]; MAX_OPERANDS],
             y: Default::default(),
@@ -399,6 +435,7 @@ impl<T: Real> Replay<'_, T> {
             shapes: &step.shapes,
             level: self.level,
             stream: self.stream(step, sample),
+            coupled,
         };
         for (index, range) in &step.parameters {
             io.x[*index] = &self.parameters[range.clone()];
@@ -410,10 +447,18 @@ impl<T: Real> Replay<'_, T> {
             Role::Scratch => io.scratch = piece,
             Role::Dy | Role::Dx(..) => {}
         });
-        step.op.forward(io);
+        io
     }
 
-    fn backward(&self, step: &Step<T>, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool) {
+    /// What the backward pass of a step is given; the first sample of a shard sets parameter gradients.
+    fn backward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        gradients: &'b mut [T],
+        (sample, first): (usize, bool),
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Backward<'b, T> {
         let mut io = Backward {
             x: [&[]; MAX_OPERANDS],
             y: &[],
@@ -425,6 +470,7 @@ impl<T: Real> Replay<'_, T> {
             shapes: &step.shapes,
             level: self.level,
             stream: self.stream(step, sample),
+            coupled,
         };
         for (index, range) in &step.parameters {
             io.x[*index] = &self.parameters[range.clone()];
@@ -444,9 +490,7 @@ impl<T: Real> Replay<'_, T> {
                 io.dx[index] = Some(Gradient { values: piece, write });
             }
         });
-        if let Some(differentiable) = step.op.differentiable() {
-            differentiable.backward(io);
-        }
+        io
     }
 }
 

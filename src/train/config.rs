@@ -4,15 +4,15 @@ use super::schedule::WARMUP_EPOCHS;
 use crate::error::{Error, Result};
 use crate::flight::windows::TRAINING_STRIDE;
 use crate::hybrid::linear::LinearConfig;
-use crate::nn::PhyTureConfig;
+use crate::nn::Architecture;
 use serde::{Deserialize, Serialize};
 
 /// Settings of a training run. Every field has a default, the paper's where it states one.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
-    /// The network.
-    pub network: PhyTureConfig,
+    /// The network: its sizes, and its `kind` if it is not Phy-Ture.
+    pub network: Architecture,
     /// State-control inputs, as formulas of the log's columns. Default: the 16 of paper eq. 10 (position, Euler angles,
     /// velocity, rates, controls).
     pub inputs: Vec<String>,
@@ -43,7 +43,7 @@ pub struct TrainConfig {
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
-            network: PhyTureConfig::default(),
+            network: Architecture::default(),
             inputs: crate::flight::Column::STATE.iter().map(|column| column.name().to_owned()).collect(),
             linear: None,
             epochs: 100,
@@ -87,10 +87,10 @@ impl TrainConfig {
         if !(self.checkpoint_s >= 0.0 && self.checkpoint_s.is_finite()) {
             return Err(fault("checkpoint_s", self.checkpoint_s, "seconds, 0 or more"));
         }
-        if self.inputs.len() != self.network.state_channels {
+        if self.inputs.len() != self.network.state_channels() {
             return Err(fault(
                 "network.state_channels",
-                self.network.state_channels,
+                self.network.state_channels(),
                 &format!("the number of inputs, {}", self.inputs.len()),
             ));
         }

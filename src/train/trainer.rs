@@ -68,7 +68,7 @@ impl<'a> Trainer<'a> {
         if windows.is_empty() {
             return Err(Error::Undetermined(format!(
                 "no training window: no run of training samples is as long as the history of {} samples; shorten `network.history` or give longer flights",
-                config.network.history
+                config.network.history()
             )));
         }
         let count = network.graph().parameter_count();
@@ -126,7 +126,7 @@ impl<'a> Trainer<'a> {
                 sequences[window.flight].target(window.last, target);
             }
         };
-        let dropout = (self.config.network.dropout > 0.0).then_some(DropoutKey { seed: self.config.seed, step: done });
+        let dropout = self.config.network.is_random().then_some(DropoutKey { seed: self.config.seed, step: done });
         let loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
         let gradients = self.session.gradients();
         let gradient_norm = gradients.iter().map(|gradient| f64::from(*gradient).powi(2)).sum::<f64>().sqrt();
@@ -141,6 +141,7 @@ impl<'a> Trainer<'a> {
         let State { parameters, first_moment, second_moment, .. } = &mut self.state;
         let adam = Adam { learning_rate: rate, ..Adam::default() };
         adam::step(self.session.level(), &adam, done + 1, 1.0, gradients, parameters, first_moment, second_moment);
+        self.session.settle(parameters);
         self.state.step += 1;
         Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
     }

@@ -1,4 +1,4 @@
-//! Elementwise functions: leaky rectifier, rectifier, tanh, logistic, GELU. y = f(x), dx = dy∘f′(x).
+//! Elementwise functions: leaky rectifier, rectifier, tanh, logistic, ELU, GELU. y = f(x), dx = dy∘f′(x).
 //!
 //! The backward pass reads x or y, whichever the function's derivative is written in.
 
@@ -62,5 +62,6 @@ mod tests {
     gradcheck!(relu: Activation { kind: Kind::Relu }, [[7, 5]]);
     gradcheck!(tanh: Activation { kind: Kind::Tanh }, [[7, 5]], [[9]]);
     gradcheck!(sigmoid: Activation { kind: Kind::Sigmoid }, [[7, 5]]);
+    gradcheck!(elu: Activation { kind: Kind::Elu }, [[7, 5]]);
     gradcheck!(gelu: Activation { kind: Kind::Gelu }, [[7, 5]]);
 }

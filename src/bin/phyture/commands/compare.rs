@@ -39,7 +39,7 @@ pub struct Wanted<'a> {
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
     let networks = wanted.networks.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
     let models = wanted.models.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
-    let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history).max().unwrap_or(1);
+    let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
     let set = context.flights(data, history)?;
     let first = models.first().map(|(_, model)| model).or_else(|| networks.first().map(|(_, hybrid)| &hybrid.description().model));
     let Some(first) = first else {
@@ -151,7 +151,7 @@ impl Contest<'_> {
         let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
         comparison.shares = judged;
         for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
-            let effort = Effort::for_history(hybrid.description().config.history, context.seed());
+            let effort = Effort::for_history(hybrid.description().config.history(), context.seed());
             comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, context.threads())?);
         }
         Ok(Judged { comparison, windows, focus: rows.len() - 1, rows })

@@ -49,13 +49,13 @@ struct Scale {
 impl Scale {
     fn new(quick: bool, seed: u64) -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        let full = TrainConfig { network, epochs: 6, stride: 12, seed, ..TrainConfig::default() };
+        let full = TrainConfig { network: network.clone().into(), epochs: 6, stride: 12, seed, ..TrainConfig::default() };
         if !quick {
             return Self { minutes: 20.0, config: full };
         }
         // 20 flights of 30 s: one of each class, so that the locked ones are among them.
-        let network = PhyTureConfig { history: 64, d_model: 16, ..full.network.clone() };
-        Self { minutes: 10.0, config: TrainConfig { network, epochs: 6, ..full } }
+        let network = PhyTureConfig { history: 64, d_model: 16, ..network };
+        Self { minutes: 10.0, config: TrainConfig { network: network.into(), epochs: 6, ..full } }
     }
 }
 
@@ -117,7 +117,7 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let (on_baseline, on_amended) = (train(&model, "run")?, train(&amended, "run-amended")?);
 
     context.say("\n6. Measured against predicted on the locked flights, which nothing saw");
-    let history = config.network.history;
+    let history = config.network.history();
     let contest = Contest {
         models: &[("baseline".into(), model.clone()), ("amended".into(), amended.clone())],
         networks: &[("baseline + network".into(), on_baseline), ("amended + network".into(), on_amended)],

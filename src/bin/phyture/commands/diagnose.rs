@@ -169,7 +169,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     };
     if let Some(hybrid) = hybrid {
         let samples: usize = set.flights.iter().map(Flight::len).sum();
-        let affordable = if hybrid.description().config.history <= SHORT_HISTORY { MOST_WINDOWS } else { MOST_WINDOWS / 10 };
+        let affordable = if hybrid.description().config.history() <= SHORT_HISTORY { MOST_WINDOWS } else { MOST_WINDOWS / 10 };
         let stride = samples.div_ceil(affordable).max(1);
         context.say(format!(
             "searching what the network learned, in place of the measured accelerations: every {stride}{} sample",

@@ -52,8 +52,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
             });
         }
     }
-    let set = context.flights(data, hybrid.description().config.history)?;
-    let history = hybrid.description().config.history;
+    let set = context.flights(data, hybrid.description().config.history())?;
+    let history = hybrid.description().config.history();
     let whole = |flight: usize| Span { flight, start: 0, end: set.flights[flight].len() };
     let all = windows(&(0..set.flights.len()).map(whole).collect::<Vec<_>>(), history, wanted.stride);
     let mut predicted = Vec::with_capacity(all.len());

@@ -46,7 +46,7 @@ struct Output {
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
     let mut config = wanted.config.map_or_else(|| Ok(TrainConfig::default()), TrainConfig::read)?;
     config.seed = context.common.seed.unwrap_or(config.seed);
-    let set = context.flights(data, config.network.history)?;
+    let set = context.flights(data, config.network.history())?;
     let model = Model::read(wanted.model)?;
     let split = context.split(&set.flights, &model, division)?;
     let identity = format!("{}\n{}\n{split:?}", data_sha256(data)?, model.to_toml()?);
@@ -93,7 +93,7 @@ impl Task<'_> {
             "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs",
             network.graph().parameter_count(),
             job.windows.len(),
-            config.network.history,
+            config.network.history(),
             trainer.steps(),
             config.batch,
             config.epochs
@@ -168,7 +168,7 @@ impl Job {
             step_s: flights.first().map_or(0.01, |flight| flight.step_s),
         };
         let sequences = sequence::sequences(flights, &description)?;
-        let all = windows(spans, config.network.history, config.stride);
+        let all = windows(spans, config.network.history(), config.stride);
         let blocks = Blocks::new(flights, &all).of_window;
         let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
         let choose =
