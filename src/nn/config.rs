@@ -139,7 +139,7 @@ impl PhyTureConfig {
     /// Checks each field and how they fit together.
     ///
     /// # Errors
-    /// [`Error::Config`] with the field, its value and its range.
+    /// [`Error::Config`](crate::Error::Config) with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
         let refuse = |field: &str, found: String, expected: String| Err(refused(field, found, expected));
         let sizes = [

@@ -126,6 +126,26 @@ mod tests {
 
     #[cfg(feature = "files")]
     #[test]
+    fn the_network_is_named_by_its_kind_and_is_phy_ture_without_one() -> Result<()> {
+        let folder = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+        let path = folder.path().join("train.toml");
+        for (text, name) in [
+            ("[network]\nkind = \"tcn\"\nhistory = 128\nchannels = 16\n", "TCN"),
+            ("[network]\nhistory = 128\nd_model = 16\n", "Phy-Ture"),
+            ("epochs = 3\n", "Phy-Ture"),
+        ] {
+            std::fs::write(&path, text).map_err(Error::io(&path))?;
+            let config = TrainConfig::read(&path)?;
+            assert_eq!(config.network.name(), name);
+            assert_eq!(config.network.history(), if text.contains("128") { 128 } else { 1000 });
+        }
+        std::fs::write(&path, "[network]\nkind = \"tcn\"\nheads = 4\n").map_err(Error::io(&path))?;
+        assert!(TrainConfig::read(&path).is_err_and(|error| error.to_string().contains("heads")));
+        Ok(())
+    }
+
+    #[cfg(feature = "files")]
+    #[test]
     fn an_unknown_key_is_refused_with_its_line() -> Result<()> {
         let folder = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
         let path = folder.path().join("train.toml");
