@@ -110,13 +110,14 @@ fn convolution(criterion: &mut Criterion) {
         let (x, weight, dz) = (numbers(1, rows * WIDTH), numbers(2, 5 * WIDTH * WIDTH), numbers(3, after * WIDTH));
         let (x, weight, dz) = (Rows::packed(&x, rows, WIDTH), &weight[..], Rows::packed(&dz, after, WIDTH));
         let (shape, operations) = (format!("{rows}x{WIDTH}x5"), (2 * after * 5 * WIDTH * WIDTH) as u64);
-        let packed = |level, pack: fn(Level, Geometry, (usize, usize), &[f32], &mut [f32])| {
+        let packed = |level, transposed: bool| {
             let mut packed = vec![0.0; conv1d::packed_len(geometry, WIDTH, WIDTH)];
+            let pack = if transposed { conv1d::pack_transposed } else { conv1d::pack };
             pack(level, geometry, (WIDTH, WIDTH), weight, &mut packed);
             packed
         };
         let mut contenders = each_level(|level| {
-            let (mut y, packed) = (vec![0.0; after * WIDTH], packed(level, conv1d::pack));
+            let (mut y, packed) = (vec![0.0; after * WIDTH], packed(level, false));
             Box::new(move || {
                 conv1d::forward(
                     level,
@@ -137,7 +138,7 @@ fn convolution(criterion: &mut Criterion) {
         ));
         compare(criterion, "conv1d_forward", &shape, operations, contenders);
         let mut contenders = each_level(|level| {
-            let packed = packed(level, conv1d::pack_transposed);
+            let packed = packed(level, true);
             let (mut dx, mut scratch) = (vec![0.0; rows * WIDTH], vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)]);
             Box::new(move || {
                 conv1d::backward_input(
