@@ -1,8 +1,9 @@
 //! Kernels of phyture: numbers in, numbers out.
 //!
 //! Slices with shapes and row strides; no tape, no model, no input or output, no dependency (`matrixmultiply` is an oracle of
-//! tests and benches). All `unsafe` of the project lives in this crate, and all of it in one place: the call of a kernel
-//! compiled for an instruction-set level ([`level`]). There are no intrinsics: a kernel is plain Rust, compiled once a level.
+//! tests and benches). All `unsafe` of the project lives in this crate: the call of a kernel compiled for an instruction-set level
+//! ([`level`]), the registers of the innermost loops (`vector`), and their unchecked reads (`tile`). Everything else is plain Rust,
+//! compiled once a level and a float type, in `compiled`.
 //!
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
 //! of a sequence are views; the [`Level`] is the first argument, chosen once; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
