@@ -289,6 +289,37 @@ mod tests {
         check::<f64>(Function::Exp, f64::exp, -1.0, 1.0, 2.0);
     }
 
+    /// [`exp_negative`] over numbers.
+    struct Negative<'a, T>(&'a mut [T]);
+
+    impl<T: Real> Kernel for Negative<'_, T> {
+        #[inline(always)]
+        fn run<I: Isa>(self) {
+            self.0.iter_mut().for_each(|x| *x = exp_negative::<T, I>(*x));
+        }
+    }
+
+    #[test]
+    fn exp_of_negative_numbers_is_exp_without_subnormals() {
+        fn check<T: Real>(level: Level) {
+            let low = T::EXP_SUBNORMAL.f64();
+            let points: Vec<T> = (0..=100_000).map(|i| T::of(low * f64::from(i) / 100_000.0)).collect();
+            let (mut found, mut expected) = (points.clone(), points);
+            level.run(Negative(&mut found));
+            apply(level, Function::Exp, &mut expected);
+            // Both round the same polynomial; the scaling by a power of two is exact.
+            assert!(found.iter().zip(&expected).all(|(a, b)| a.f64().to_bits() == b.f64().to_bits()), "level {level}");
+            let mut ends = [T::NEG_INFINITY, T::of(2.0 * low), T::ZERO, T::NAN];
+            level.run(Negative(&mut ends));
+            assert_eq!(ends[..3].iter().map(|x| x.f64()).collect::<Vec<_>>(), [0.0, 0.0, 1.0]);
+            assert!(ends[3].f64().is_nan(), "NaN is not hidden");
+        }
+        for level in Level::available() {
+            check::<f32>(level);
+            check::<f64>(level);
+        }
+    }
+
     #[test]
     fn tanh_stays_within_its_bound() {
         check::<f32>(Function::Tanh, f64::tanh, -12.0, 12.0, 2.0);

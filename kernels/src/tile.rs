@@ -185,6 +185,7 @@ pub(crate) fn pack_transposed<'b, T: Real, const NR: usize>(
 /// them in memory, all through the inner loop.
 macro_rules! store_rows {
     ($acc:ident, |$i:ident, $sums:ident| $store:expr) => {
+        const { assert!(MR <= 12, "a tile has more rows than are written out here") };
         store_rows!(@ $acc, |$i, $sums| $store, 0 1 2 3 4 5 6 7 8 9 10 11)
     };
     (@ $acc:ident, |$i:ident, $sums:ident| $store:expr, $($row:literal)*) => {
