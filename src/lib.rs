@@ -17,6 +17,8 @@ pub mod formula;
 pub mod hybrid;
 pub mod nn;
 pub mod physics;
+#[cfg(feature = "protocol")]
+pub mod protocol;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;

@@ -1,10 +1,11 @@
 //! One row of the comparison with other programs: a training step or a forward pass, timed step by step, as one JSON line.
 //!
-//! `cargo bench --bench peers -- CASE THREADS BATCH HISTORY REPEATS`, where CASE is `dropout`, `nodropout` or `forward`. Also printed:
+//! `cargo bench --bench peers -- CASE THREADS BATCH HISTORY REPEATS`, where CASE is `dropout`, `nodropout`, `forward`, or `peer-KIND` for a
+//! training step of another network (`peer-tcn`) at its own sizes without dropout. Also printed:
 //! the instruction-set level, the peak of fused multiply-adds on one thread measured just before, and the peak memory of the
 //! process. Started by `run.py` beside it, in turn with the other programs; statistics are made there.
 
-use phyture::nn::{Network, OutputScale, PhyTureConfig};
+use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
 use phyture_kernels::adam::{self, Adam};
 use phyture_kernels::random::Stream;
@@ -31,15 +32,27 @@ fn peak_mib() -> Option<f64> {
 
 fn run() -> Result<String, String> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
-    let usage = "usage: dropout|nodropout|forward THREADS BATCH HISTORY REPEATS";
+    let usage = "usage: dropout|nodropout|forward|peer-KIND THREADS BATCH HISTORY REPEATS";
     let [case, numbers @ ..] = arguments.as_slice() else { return Err(usage.into()) };
     let numbers: Result<Vec<usize>, _> = numbers.iter().map(|number| number.parse()).collect();
     let Ok(&[threads, batch, history, repeats]) = numbers.as_deref() else { return Err(usage.into()) };
+    if !["dropout", "nodropout", "forward"].contains(&case.as_str()) && !case.starts_with("peer-") {
+        return Err(usage.into());
+    }
     let text = |error: phyture::Error| error.to_string();
     let level = Level::detect().map_err(|error| error.to_string())?;
     let fma_gflops = peak::f32_gflops(level);
-    let config = PhyTureConfig { history, ..PhyTureConfig::default() };
-    let network = Network::<f32>::new(&config, &OutputScale::unit(config.outputs), false).map_err(text)?;
+    let config: Architecture = match case.strip_prefix("peer-") {
+        Some(kind) => {
+            let sizes = serde_json::json!({ "kind": kind, "history": history, "dropout": 0.0 });
+            serde_json::from_value(sizes.clone())
+                // DLinear has no dropout to switch off.
+                .or_else(|_| serde_json::from_value(serde_json::json!({ "kind": kind, "history": history })))
+                .map_err(|error| error.to_string())?
+        }
+        None => PhyTureConfig { history, ..PhyTureConfig::default() }.into(),
+    };
+    let network = Network::<f32>::new(&config, &OutputScale::unit(config.outputs()), false).map_err(text)?;
     let mut parameters = network.initial(0);
     let mut seconds = Vec::new();
     match case.as_str() {
@@ -51,19 +64,19 @@ fn run() -> Result<String, String> {
                 seconds.push(start.elapsed().as_secs_f64());
             }
         }
-        "dropout" | "nodropout" => {
+        _ => {
             let mut session = Session::train(network.graph(), network.loss(), &[], Threads(threads)).map_err(text)?;
             let (mut first, mut second) = (vec![0.0; parameters.len()], vec![0.0; parameters.len()]);
             for step in 0..(WARM_UP + repeats) as u64 {
                 let start = Instant::now();
-                let key = (case == "dropout").then_some(DropoutKey { seed: 0, step });
+                let random = case != "nodropout" && config.is_random();
+                let key = random.then_some(DropoutKey { seed: 0, step });
                 session.step(&parameters, batch, key, &fill).map_err(text)?;
                 let gradients = session.gradients();
                 adam::step(level, &Adam::default(), step + 1, 1.0, gradients, &mut parameters, &mut first, &mut second);
                 seconds.push(start.elapsed().as_secs_f64());
             }
         }
-        _ => return Err(usage.into()),
     }
     seconds.drain(..WARM_UP);
     let line = serde_json::json!({

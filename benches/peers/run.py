@@ -1,6 +1,6 @@
 """Training steps and forward passes of Phy-Ture beside other programs, on this machine, in turn.
 
-    python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes] [--without jax]
+    python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes] [--peers | --only-peers] [--without jax]
 
 Makes a virtual environment under target/ with the pinned versions below, builds this project's own row, and starts every row in a
 process of its own, one after another, ROUNDS times: so that whatever else the machine does hits all alike. Writes OUT.json (every
@@ -50,6 +50,8 @@ GROUPS = {
         ("JAX, jit", "jax", "forward", True),
     ],
 }
+# The peer networks at their own sizes, without dropout. PyTorch's Informer here attends to every key (fused), ours to those it samples.
+PEERS = ["cnn", "cnn_lstm", "tcn", "timesnet", "timemixer", "dlinear", "informer"]
 # Batch 1 on one thread.
 LATENCY = GROUPS["forward pass"]
 
@@ -113,6 +115,8 @@ def main():
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--sizes", action="store_true", help="also histories 250 to 2000 and batches 1 to 128")
+    parser.add_argument("--peers", action="store_true", help="also a training step of every peer network beside PyTorch")
+    parser.add_argument("--only-peers", action="store_true", help="the peer networks and nothing else")
     parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
     options = parser.parse_args()
     python, own = environment(), own_program()
@@ -124,9 +128,14 @@ def main():
         record[title] = compare(python, own, keep(rows), threads, batch, history, options.rounds, options.repeats)
         lines.extend(table(title, record[title]))
 
-    for title, rows in GROUPS.items():
-        add(f"{title}: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
-    add(f"latency: history {HISTORY}, batch 1, 1 thread", LATENCY, 1, 1, HISTORY)
+    if not options.only_peers:
+        for title, rows in GROUPS.items():
+            add(f"{title}: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
+        add(f"latency: history {HISTORY}, batch 1, 1 thread", LATENCY, 1, 1, HISTORY)
+    for kind in PEERS if options.peers or options.only_peers else []:
+        rows = [("phyture", "phyture", f"peer-{kind}", False), ("PyTorch", "torch", f"peer-{kind}", False),
+                ("PyTorch, tuned memory", "torch", f"peer-{kind}", True)]
+        add(f"{kind}, training step: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
     if options.sizes:
         for title, rows in GROUPS.items():
             pair = [rows[0], next(row for row in rows if row[2] in ("naive-0.2", "fused-0", "forward-fused"))]

@@ -6,11 +6,14 @@ Prints one JSON line. Not a library: the script `run.py` beside it starts this i
 
 CASE is attention-dropout, with attention `naive` (the stored map), `fused` (scaled_dot_product_attention), `compile` (fused, under
 torch.compile) or `expert` (byte masks drawn once a step, attention recomputed in the backward pass), and dropout `0.2` or `0`;
-or `forward-ATTENTION` for inference.
+`forward-ATTENTION` for inference; or `peer-KIND` for a training step of a peer network without dropout.
 """
 
+import functools
+import importlib.util
 import json
 import math
+import pathlib
 import resource
 import sys
 import time
@@ -22,6 +25,17 @@ from torch.utils.checkpoint import checkpoint
 
 WIDTH, HEADS, STATES, PHYSICS, OUTPUTS = 64, 4, 16, 6, 6
 LEVELS, STACKS, AVERAGE, KERNEL1, KERNEL2, LEAK = 3, 2, 25, 5, 3, 0.01
+
+# Default sizes of the peers, src/nn/peers/*.rs.
+PEERS = {
+    "cnn": {"channels": [32, 64, 64, 128], "kernels": [7, 5, 3, 3], "hidden": 128},
+    "cnn_lstm": {"channels": [64, 64], "kernels": [5, 3], "pool": 2, "hidden": 64},
+    "tcn": {"channels": 30, "kernel": 7, "levels": 8},
+    "timesnet": {"d_model": 32, "d_ff": 32, "periods": 5, "kernels": 6, "layers": 2},
+    "timemixer": {"d_model": 16, "d_ff": 32, "layers": 2, "scales": 3, "moving_average": 25},
+    "dlinear": {"moving_average": 25, "individual": False},
+    "informer": {"d_model": 64, "d_ff": 256, "heads": 4, "encoder_layers": 2, "decoder_layers": 1, "decoder_rows": 48, "factor": 5},
+}
 
 
 class ByteDropout(torch.autograd.Function):
@@ -111,14 +125,41 @@ class PhyTure(nn.Module):
         return self.head((self.trend(trend) + self.seasonal(x - trend)).transpose(1, 2))
 
 
+class Peer(nn.Module):
+    """A peer network as the golden files' script writes it with PyTorch's own operators, in f32, at its default sizes, without dropout."""
+
+    def __init__(self, kind, history):
+        super().__init__()
+        path = pathlib.Path(__file__).resolve().parents[2] / "fixtures" / "peers" / "generate.py"
+        spec = importlib.util.spec_from_file_location("golden", path)
+        golden = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(golden)
+        # Positions are the same in every step.
+        positions = functools.cache(golden.positions)
+        self.network, self.weights = golden.NETWORKS[kind][0], golden.Weights()
+        self.config = {"history": history, "state_channels": STATES, **PEERS[kind]}
+        self.network(self.config, torch.zeros(1, history, STATES, dtype=torch.float64), self.weights)
+        golden.positions = lambda rows, channels: single(rows, channels)
+        single = functools.cache(lambda rows, channels: positions(rows, channels).float())
+        self.weights.tensors = {name: nn.Parameter(value.detach().float()) for name, value in self.weights.tensors.items()}
+        self.values = nn.ParameterList(self.weights.tensors.values())
+
+    def forward(self, state, _):
+        return self.network(self.config, state, self.weights)[:, None, :]
+
+
 def main():
     case, threads, batch, history, repeats = sys.argv[1], *map(int, sys.argv[2:6])
     torch.set_num_threads(threads)
     torch.manual_seed(0)
     first, second = case.split("-")
     training = first != "forward"
-    attention, rate = (first, float(second)) if training else (second, 0.0)
-    network = PhyTure(history, rate, attention).train(training)
+    if first == "peer":
+        network = Peer(second, history)
+        attention = "peer"
+    else:
+        attention, rate = (first, float(second)) if training else (second, 0.0)
+        network = PhyTure(history, rate, attention).train(training)
     run = torch.compile(network) if attention == "compile" else network
     adam = torch.optim.Adam(network.parameters(), lr=1e-3)
     state, physics = torch.rand(batch, history, STATES) * 2 - 1, torch.rand(batch, history, PHYSICS) * 2 - 1

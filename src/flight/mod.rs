@@ -174,10 +174,18 @@ impl Flight {
     /// # Errors
     /// [`Error::Log`] as [`Flight::new`].
     pub fn with_accelerations(&self, accelerations: &Accelerations) -> Result<Self> {
-        let columns = Column::ALL.map(|column| match Column::TARGETS.iter().position(|target| *target == column) {
-            Some(channel) => accelerations[channel].clone(),
-            None => self.column(column).to_vec(),
-        });
+        self.with_columns(|column| {
+            let channel = Column::TARGETS.iter().position(|target| *target == column)?;
+            Some(accelerations[channel].clone())
+        })
+    }
+
+    /// The same flight with other values in the columns for which `other` has some.
+    ///
+    /// # Errors
+    /// [`Error::Log`] as [`Flight::new`].
+    pub fn with_columns(&self, other: impl Fn(Column) -> Option<Vec<f64>>) -> Result<Self> {
+        let columns = Column::ALL.map(|column| other(column).unwrap_or_else(|| self.column(column).to_vec()));
         let made = Self::new(self.name.clone(), self.manoeuvre.clone(), self.start_s, self.step_s, columns, self.targets)?;
         Ok(Self { absent: self.absent.clone(), extra: self.extra.clone(), ..made })
     }

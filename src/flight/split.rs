@@ -156,6 +156,19 @@ impl Split {
     }
 }
 
+impl Split {
+    /// The same division with a random share of the training part's 10-s segments; what is left over at the end of a training span
+    /// goes with the rest.
+    #[must_use]
+    pub fn with_less_training(&self, flights: &[Flight], share: f64, seed: u64) -> Self {
+        let of_span = |span: &Span| segments(*span, flights[span.flight].step_s).collect::<Vec<_>>();
+        let sorted: Vec<Span> = self.training.iter().flat_map(of_span).collect();
+        let kept = (sorted.len() as f64 * share).round() as usize;
+        let chosen = permutation(sorted.len(), seed, 0).into_iter().take(kept).map(|index| sorted[index as usize]);
+        Self { training: joined(chosen.collect()), ..self.clone() }
+    }
+}
+
 fn whole(flights: &[Flight]) -> impl Iterator<Item = Span> {
     flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() })
 }
@@ -267,6 +280,20 @@ mod tests {
             let all = samples(&split.training) + samples(&split.validation) + samples(&split.test);
             prop_assert_eq!(all, whole_segments * 1000);
         }
+    }
+
+    #[test]
+    fn less_training_is_a_part_of_the_training_and_leaves_the_test() -> Result<()> {
+        let logs = flights(&[9000, 8500, 7000]);
+        let whole = Split::new(&logs, &[], &Protocol::Segments, 3)?;
+        let half = whole.with_less_training(&logs, 0.5, 3);
+        assert_eq!(samples(&half.training), (samples(&whole.training) as f64 / 2000.0).round() as usize * 1000);
+        let inside = |span: &Span| {
+            whole.training.iter().any(|other| other.flight == span.flight && other.start <= span.start && span.end <= other.end)
+        };
+        assert!(half.training.iter().all(inside));
+        assert_eq!((&half.test, &half.validation), (&whole.test, &whole.validation));
+        Ok(())
     }
 
     #[test]

@@ -2,12 +2,16 @@
 //!
 //! Numbers come in finished from the critique; nothing is computed here that a table or a JSON file would not also say.
 
+#[cfg(feature = "protocol")]
+pub mod benchmark;
 pub mod colour;
 pub mod compare;
 pub mod diagnose;
 pub mod figures;
 pub mod page;
 
+#[cfg(feature = "protocol")]
+pub use benchmark::benchmark_page;
 pub use compare::{CompareReport, compare_page};
 pub use diagnose::{DiagnoseReport, diagnose_page};
 pub use figures::Figure;

@@ -5,10 +5,12 @@
 
 pub mod config;
 pub mod container;
+mod job;
 pub mod run;
 pub mod schedule;
 pub mod trainer;
 
 pub use config::TrainConfig;
+pub use job::Job;
 pub use run::{Outcome, Report, RunFolder};
 pub use trainer::{State, StepReport, Trainer};

@@ -1,7 +1,9 @@
 //! The commands and their options, as `phyture <command> --help` shows them.
 
-use clap::{Args, Parser, Subcommand};
+use crate::commands::Shard;
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use phyture::flight::split::Protocol;
+use phyture::protocol::TableId;
 use std::path::PathBuf;
 
 /// Calibrate a first-principles model of an unmanned helicopter on recorded flights, see where it fails, and learn the rest.
@@ -266,6 +268,53 @@ pub enum Command {
         #[arg(short, long)]
         model: Option<PathBuf>,
     },
+    /// The paper's tables: every method, on the same splits, with several seeds
+    #[command(
+        args_conflicts_with_subcommands = true,
+        subcommand_negates_reqs = true,
+        after_help = "Examples:\n  phyture benchmark flights -o bench --plan hour --table 1\n  phyture benchmark flights -o bench --plan hour --table 1 --resume   # after a kill\n  phyture benchmark flights -o bench --shard 2/8                       # one part of eight\n  phyture benchmark flights -o bench --emit slurm --shards 20 > array.sh\n  phyture benchmark collect bench"
+    )]
+    Benchmark {
+        /// Finished runs to tables.
+        #[command(subcommand)]
+        command: Option<BenchmarkCommand>,
+        /// Flights.
+        #[command(flatten)]
+        data: Option<Data>,
+        /// Model file [default: the paper's baseline]
+        #[arg(short, long)]
+        model: Option<PathBuf>,
+        /// Folder of the benchmark
+        #[arg(short, long, required = true)]
+        output: Option<PathBuf>,
+        /// Table of the paper, 1 to 6, or `robustness`; repeatable [default: all]
+        #[arg(long, value_name = "TABLE")]
+        table: Vec<TableId>,
+        /// Row of the tables by identifier, such as `timesnet`; repeatable [default: all]
+        #[arg(long, value_name = "METHOD")]
+        method: Vec<String>,
+        /// Seeds of each network [default: the plan's]
+        #[arg(long)]
+        seeds: Option<usize>,
+        /// Budget: the paper's (days), an hour's for table 1, or one that only shows that it works
+        #[arg(long, value_enum, default_value_t = Plans::Paper)]
+        plan: Plans,
+        /// Training configuration (TOML) in place of the plan's: sizes of Phy-Ture, inputs, epochs, strides
+        #[arg(long, value_name = "FILE")]
+        config: Option<PathBuf>,
+        /// Make one part of the plan: every N-th run, from the I-th
+        #[arg(long, value_name = "I/N")]
+        shard: Option<Shard>,
+        /// Go on in a folder that holds runs of this plan
+        #[arg(long)]
+        resume: bool,
+        /// Run nothing; print the script of a job array for this batch system, one task a shard, `--threads` processors each
+        #[arg(long, value_name = "SYSTEM", value_parser = ["slurm"], conflicts_with = "shard")]
+        emit: Option<String>,
+        /// Tasks of the job array
+        #[arg(long, default_value_t = 10, requires = "emit")]
+        shards: usize,
+    },
     /// Forward, backward and an Adam step against the figures a file brings from PyTorch
     #[command(after_help = "Example:\n  phyture parity small_f32.safetensors --json -")]
     Parity {
@@ -295,4 +344,27 @@ pub enum EffectCommand {
         #[arg(short, long)]
         output: PathBuf,
     },
+}
+
+/// What to do with a benchmark's folder.
+#[derive(Subcommand)]
+pub enum BenchmarkCommand {
+    /// The tables of all runs that are done
+    Collect {
+        /// Folder of the benchmark
+        folder: PathBuf,
+        /// Folders of the same plan whose runs are taken over first
+        from: Vec<PathBuf>,
+    },
+}
+
+/// How much of the paper's experiment is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Plans {
+    /// The paper's sizes, 100 epochs, 10 seeds.
+    Paper,
+    /// Table 1 in an hour on two cores.
+    Hour,
+    /// A few minutes; the figures mean nothing.
+    Quick,
 }

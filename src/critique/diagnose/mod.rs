@@ -6,6 +6,7 @@
 //!
 //! Nothing here reads a file or draws a picture, and nothing knows of the built-in simulator.
 
+mod amend;
 mod candidate;
 mod confirm;
 mod describe;
@@ -24,6 +25,7 @@ mod significance;
 mod textbook;
 mod verdict;
 
+pub use amend::{Amended, amend, calibrated, searched};
 pub use report::{
     CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
 };

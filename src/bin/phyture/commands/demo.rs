@@ -5,12 +5,12 @@
 //! the baseline and on the amended model; everything judged on the locked flights.
 
 use super::compare::{Contest, write_page};
-use super::diagnose::{self, Amended};
+use super::diagnose;
 use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
 use phyture::critique::Comparison;
 use phyture::critique::check::check;
-use phyture::critique::diagnose::{Diagnosis, Options};
+use phyture::critique::diagnose::{Amended, Diagnosis, Options};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::write;
 use phyture::nn::PhyTureConfig;

@@ -5,11 +5,11 @@ use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
-use phyture::critique::diagnose::{Diagnosis, Options, Outcome, Verdict, diagnose};
+use phyture::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, calibrated, searched};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
-use phyture::physics::{Effect, Entry, Model, calibrate};
+use phyture::physics::{Entry, Model};
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::{Error, Result};
 use serde::Serialize;
@@ -21,8 +21,6 @@ use std::process::ExitCode;
 const MOST_WINDOWS: usize = 100_000;
 /// A history of at most this many rows is short.
 const SHORT_HISTORY: usize = 256;
-/// Rounds of `loop` before it stops by itself.
-const MOST_ROUNDS: usize = 4;
 
 /// Flights, and what may be searched of them.
 pub struct Task<'a> {
@@ -39,8 +37,8 @@ pub struct Task<'a> {
 impl Task<'_> {
     /// Searches once.
     pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
-        let searched: Vec<_> = self.split.training.iter().chain(&self.split.validation).copied().collect();
-        let mut outcome = diagnose(&self.set.flights, model, &searched, &self.split.test, self.split.tested.name(), &self.options)?;
+        let (searched, locked) = (searched(self.split), &self.split.test);
+        let mut outcome = diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options)?;
         outcome.diagnosis.data_sha256.clone_from(&self.data_sha256);
         Ok(outcome)
     }
@@ -83,7 +81,7 @@ impl<'a> Paper<'a> {
         split: &Split,
         models: [&Model; 2],
     ) -> Result<()> {
-        let searched: Vec<Span> = split.training.iter().chain(&split.validation).copied().collect();
+        let searched = searched(split);
         let [before, after] = models;
         let report = DiagnoseReport {
             title: &self.title,
@@ -98,18 +96,6 @@ impl<'a> Paper<'a> {
         let path = write_page(&diagnose_page(&report)?, self.folder)?;
         context.say(format!("report: {}", path.display()));
         Ok(())
-    }
-}
-
-/// The model as it was given, without what is switched off, calibrated on what is searched; as it stands if the flights do not determine
-/// its coefficients.
-fn calibrated(model: &Model, set: &DataSet, split: &Split) -> Result<Model> {
-    let mut model = model.clone();
-    model.effects.retain(|effect| effect.enabled);
-    let searched: Vec<Span> = split.training.iter().chain(&split.validation).copied().collect();
-    match calibrate(&model, &set.flights, &searched) {
-        Err(Error::Undetermined(_)) => Ok(model),
-        calibrated => Ok(calibrated?.0),
     }
 }
 
@@ -191,7 +177,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", outcome.diagnosis));
     if let Some(paper) = paper {
-        let before = calibrated(&model, &set, &split)?;
+        let before = calibrated(&model, &set.flights, &split)?;
         let after = if outcome.diagnosis.accepted.is_empty() { &before } else { &outcome.model };
         paper.write(context, std::slice::from_ref(&outcome.diagnosis), &set.flights, &split, [&before, after])?;
     }
@@ -221,40 +207,18 @@ struct LoopOutput {
     model: PathBuf,
 }
 
-/// What `loop` did.
-pub struct Amended {
-    /// Diagnoses, one a round; the last found nothing more.
-    pub rounds: Vec<Diagnosis>,
-    /// The calibrated model with all that was added.
-    pub model: Model,
-}
-
 /// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger.
 pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
-    let off: Vec<_> = model.effects.iter().filter(|effect| !effect.enabled).cloned().collect();
-    let mut model = calibrated(model, task.set, task.split)?;
-    model.effects.extend(off);
-    let mut rounds = Vec::new();
-    for round in 1..=MOST_ROUNDS {
-        let outcome = task.diagnose(&model)?;
-        context.say(format!("\nRound {round}\n{}", outcome.diagnosis));
-        let (found, confirmed) = (!outcome.diagnosis.accepted.is_empty(), outcome.diagnosis.is_confirmed());
-        if found && !confirmed {
+    diagnose::amend(&task.set.flights, model, task.split, &task.options, &mut |round, diagnosis| {
+        diagnosis.data_sha256.clone_from(&task.data_sha256);
+        context.say(format!("\nRound {round}\n{diagnosis}"));
+        if diagnosis.is_confirmed() {
+            append(ledger, round, diagnosis)?;
+        } else if !diagnosis.accepted.is_empty() {
             context.say("\nNothing is added: flights that no search has seen do not confirm it.");
         }
-        if confirmed {
-            append(ledger, round, &outcome.diagnosis)?;
-        }
-        rounds.push(outcome.diagnosis);
-        if !confirmed {
-            break;
-        }
-        let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
-        let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
-        model = calibrated(&outcome.model, task.set, task.split)?;
-        model.effects.extend(off);
-    }
-    Ok(Amended { rounds, model })
+        Ok(())
+    })
 }
 
 /// Adds lines at the end of the ledger and never changes what is there.
@@ -297,7 +261,7 @@ pub fn run_loop(
     let options = Options { seed: context.seed(), ..Options::default() };
     let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options };
     let ledger = output.with_extension("ledger.jsonl");
-    let before = paper.as_ref().map(|_| calibrated(&model, &set, &split)).transpose()?;
+    let before = paper.as_ref().map(|_| calibrated(&model, &set.flights, &split)).transpose()?;
     let Amended { rounds, mut model } = amend(context, &task, &model, &ledger)?;
     model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
     model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));

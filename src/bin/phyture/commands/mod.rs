@@ -1,5 +1,6 @@
 //! One file a command; here the dispatch and what several commands share: reading flights, models and splits.
 
+mod benchmark;
 mod calibrate;
 mod check;
 mod compare;
@@ -12,7 +13,9 @@ mod predict;
 mod simulate;
 mod train;
 
-use crate::arguments::{Arguments, Command, Common, Data, Division};
+pub use benchmark::Shard;
+
+use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
 use crate::output;
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::{BENCHMARK_SEED, Split};
@@ -70,6 +73,30 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Implant { data, dir, effect, formula, scale, size, model } => {
             let (effect, formula, model) = (effect.as_deref(), formula.as_deref(), model.as_deref());
             implant::run(&context, data, dir, &implant::Wanted { effect, formula, scale: *scale, size, model })
+        }
+        Command::Benchmark { command: Some(BenchmarkCommand::Collect { folder, from }), .. } => {
+            benchmark::collect(&context, folder, from)
+        }
+        Command::Benchmark { data, model, output, table, method, seeds, plan, config, shard, resume, emit, shards, .. } => {
+            let (Some(data), Some(output)) = (data, output) else {
+                let (place, field) = ("command line".into(), "DATA, --output".into());
+                return Err(Error::Config { place, field, found: "nothing".into(), expected: "flights and a folder".into() });
+            };
+            let wanted = benchmark::Wanted {
+                model: model.as_deref(),
+                output,
+                tables: table,
+                methods: method,
+                seeds: *seeds,
+                plan: *plan,
+                config: config.as_deref(),
+                shard: *shard,
+                resume: *resume,
+            };
+            match emit {
+                Some(_) => benchmark::emit(&context, output, *shards),
+                None => benchmark::run(&context, data, &wanted),
+            }
         }
         Command::Parity { file } => parity::run(&context, file),
     }

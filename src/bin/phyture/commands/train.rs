@@ -3,13 +3,11 @@
 use super::{Context, data_sha256, interruption};
 use crate::arguments::{Data, Division};
 use crate::output::Progress;
-use phyture::blocks::Blocks;
 use phyture::flight::split::Split;
-use phyture::flight::windows::windows;
-use phyture::flight::{Column, DataSet, Window};
-use phyture::hybrid::{Description, Hybrid, sequence};
+use phyture::flight::{Column, DataSet};
+use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
-use phyture::train::{Outcome, RunFolder, TrainConfig, Trainer};
+use phyture::train::{Job, Outcome, RunFolder, TrainConfig, Trainer};
 use phyture::{Error, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -82,7 +80,7 @@ impl Task<'_> {
     fn run(&self, context: &Context, resume: bool, interrupted: &AtomicBool) -> Result<Output> {
         let Task { set, split, model, config, identity, folder } = *self;
         let begun = Instant::now();
-        let job = Job::new(set, split, model, config)?;
+        let job = Job::new(&set.flights, split, model, config)?;
         let folder = RunFolder::create(folder)?;
         let digest = Sha256::digest(identity.as_bytes());
         let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
@@ -119,12 +117,13 @@ impl Task<'_> {
             );
             return Err(Error::Interrupted { saved });
         }
-        let mut hybrid = Hybrid::new(job.description, trainer.state().parameters.clone())?;
-        if config.gate_every > 0 {
-            let gate = hybrid.fit_gate(&set.flights, &job.gate_windows, context.threads())?;
-            let shown: Vec<String> =
-                Column::TARGETS.iter().zip(gate).map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
-            context.say(format!("gate, from {} windows kept from training: {}", job.gate_windows.len(), shown.join("  ")));
+        let (steps, windows, kept) = (trainer.steps(), job.windows.len(), job.gate_windows.len());
+        let parameters = trainer.state().parameters.clone();
+        let hybrid = job.hybrid(&set.flights, parameters, context.threads())?;
+        if kept > 0 {
+            let factors = Column::TARGETS.iter().zip(hybrid.description().gate);
+            let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
+            context.say(format!("gate, from {kept} windows kept from training: {}", shown.join("  ")));
         }
         hybrid.write(&folder.network())?;
         let last_epoch_loss = sum / f64::from(count.max(1));
@@ -136,43 +135,10 @@ impl Task<'_> {
         Ok(Output {
             network: folder.network(),
             parameters: network.graph().parameter_count(),
-            windows: job.windows.len(),
-            steps: trainer.steps(),
+            windows,
+            steps,
             last_epoch_loss,
             seconds: begun.elapsed().as_secs_f64(),
         })
-    }
-}
-
-/// Training data and what the hybrid will be, but for its weights.
-struct Job {
-    description: Description,
-    sequences: Vec<sequence::Sequence>,
-    windows: Vec<Window>,
-    /// Windows kept from training, for the gate.
-    gate_windows: Vec<Window>,
-}
-
-impl Job {
-    fn new(set: &DataSet, split: &Split, model: &Model, config: &TrainConfig) -> Result<Self> {
-        config.check()?;
-        let (flights, spans) = (&set.flights, &split.training);
-        let linear = config.linear.as_ref().map(|linear| sequence::linear(flights, spans, model, linear)).transpose()?;
-        let description = Description {
-            model: model.clone(),
-            config: config.network.clone(),
-            inputs: config.inputs.clone(),
-            scaling: sequence::scaling(flights, spans, model, &config.inputs, linear.as_ref(), &config.network)?,
-            linear,
-            gate: [1.0; 6],
-            step_s: flights.first().map_or(0.01, |flight| flight.step_s),
-        };
-        let sequences = sequence::sequences(flights, &description)?;
-        let all = windows(spans, config.network.history(), config.stride);
-        let blocks = Blocks::new(flights, &all).of_window;
-        let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
-        let choose =
-            |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
-        Ok(Self { description, sequences, windows: choose(false).collect(), gate_windows: choose(true).collect() })
     }
 }

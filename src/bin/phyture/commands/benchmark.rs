@@ -1,0 +1,306 @@
+//! `benchmark`: the runs of the paper's tables, and the tables of finished runs.
+
+use super::compare::write_page;
+use super::{Context, data_sha256, interruption};
+use crate::arguments::{Data, Plans};
+use crate::output::Progress;
+use phyture::flight::DataSet;
+use phyture::flight::split::{Split, class_folds};
+use phyture::flight::windows::windows;
+use phyture::physics::Model;
+use phyture::protocol::{Division, Experiment, Finished, Folder, JobArray, Plan, Run, Settings, TableId, estimate, method, text};
+use phyture::report::benchmark_page;
+use phyture::train::TrainConfig;
+use phyture::{Error, Result};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// What was asked for.
+pub struct Wanted<'a> {
+    /// Model file.
+    pub model: Option<&'a Path>,
+    /// Folder of the benchmark.
+    pub output: &'a Path,
+    /// Tables; all if empty.
+    pub tables: &'a [TableId],
+    /// Rows; all if empty.
+    pub methods: &'a [String],
+    /// Seeds in place of the plan's.
+    pub seeds: Option<usize>,
+    /// Which budget.
+    pub plan: Plans,
+    /// Training configuration in place of the plan's.
+    pub config: Option<&'a Path>,
+    /// Which runs of how many parts.
+    pub shard: Option<Shard>,
+    /// Go on in a folder that holds runs.
+    pub resume: bool,
+}
+
+/// A part of a plan, written `2/8`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// From 1.
+    pub number: usize,
+    /// Of so many.
+    pub count: usize,
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        let parts = text.split_once('/').and_then(|(number, count)| Some((number.parse().ok()?, count.parse().ok()?)));
+        parts
+            .filter(|(number, count)| (1..=*count).contains(number))
+            .map(|(number, count)| Self { number, count })
+            .ok_or_else(|| format!("`{text}` is no part of a plan; expected I/N with I from 1 to N, as in 2/8"))
+    }
+}
+
+/// What `--json` writes after runs.
+#[derive(Serialize)]
+struct Output<'a> {
+    plan: &'a Plan,
+    runs: usize,
+    done_before: usize,
+    done_now: usize,
+    seconds: f64,
+}
+
+/// Makes the runs that are not done yet.
+pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
+    let begun = Instant::now();
+    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model)?);
+    let set = context.flights(data, settings.phyture()?.history)?;
+    let plan = plan(&set, data, settings, &model, wanted)?;
+    let folder = Folder::create(wanted.output)?;
+    open(&folder, &plan, wanted)?;
+    context.say(format!("\n{}", plan.settings.budget(plan.step_s)));
+    let runs = match wanted.shard {
+        None => plan.runs()?,
+        Some(shard) => plan.shard(shard.number, shard.count)?,
+    };
+    let mut left = Vec::new();
+    for run in &runs {
+        if !folder.is_done(&plan.key(run)?) {
+            left.push(run.clone());
+        }
+    }
+    let done_before = runs.len() - left.len();
+    let experiment = Experiment::new(&plan, &set.flights, &model, context.threads());
+    let interrupted = interruption()?;
+    Queue { context, folder: &folder, experiment: &experiment, left: &left }.work(&interrupted)?;
+    context.say(format!(
+        "{} runs are done, {done_before} of them before; tables: phyture benchmark collect {}",
+        runs.len(),
+        folder.path().display()
+    ));
+    let seconds = begun.elapsed().as_secs_f64();
+    context.json(&Output { plan: &plan, runs: runs.len(), done_before, done_now: left.len(), seconds })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The budget: a preset, or a training configuration with the preset's seeds and strides.
+fn settings(context: &Context, wanted: &Wanted) -> Result<Settings> {
+    let mut settings = match wanted.plan {
+        Plans::Paper => Settings::paper(),
+        Plans::Hour => Settings::hour(),
+        Plans::Quick => Settings::quick(),
+    };
+    if let Some(path) = wanted.config {
+        settings.training = TrainConfig::read(path)?;
+    }
+    settings.seeds = wanted.seeds.unwrap_or(settings.seeds);
+    settings.split_seed = context.common.seed.unwrap_or(settings.split_seed);
+    settings.check()?;
+    Ok(settings)
+}
+
+fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &Wanted) -> Result<Plan> {
+    let folds = class_folds(&set.manoeuvres(), settings.folds);
+    let all = TableId::ALL.into_iter().filter(|table| wanted.tables.is_empty() || wanted.tables.contains(table));
+    let possible = |table: &TableId| *table != TableId::Paper(3) || folds.len() > 1;
+    if wanted.tables.contains(&TableId::Paper(3)) && folds.len() < 2 {
+        return Err(Error::Undetermined("table 3 holds manoeuvre classes out, and these flights are of one class".into()));
+    }
+    let plan = Plan {
+        data_sha256: data_sha256(data)?,
+        data: data.data.display().to_string(),
+        model: model.to_toml()?,
+        step_s: set.flights.first().map_or(f64::NAN, |flight| flight.step_s),
+        tables: all.filter(possible).collect(),
+        folds: if folds.len() > 1 { folds } else { Vec::new() },
+        settings,
+        version: env!("CARGO_PKG_VERSION").into(),
+        methods: wanted.methods.into(),
+    };
+    plan.check()?;
+    Ok(plan)
+}
+
+/// Puts the plan into the folder. One that holds another plan is refused, and one that holds this plan is gone on with only when asked.
+fn open(folder: &Folder, plan: &Plan, wanted: &Wanted) -> Result<()> {
+    if !folder.plan_file().exists() {
+        return folder.write_plan(plan);
+    }
+    let refuse = |found: &str, expected: &str| {
+        let (place, field) = (folder.path().display().to_string(), "plan.json".into());
+        Err(Error::Config { place, field, found: found.into(), expected: expected.into() })
+    };
+    let there = folder.plan()?;
+    if !plan.continues(&there) {
+        return refuse("another plan (data, model, settings or version differ)", "another folder with -o for this one");
+    }
+    if !wanted.resume && wanted.shard.is_none() {
+        return refuse("a plan with runs", "--resume to go on with it, or another folder");
+    }
+    if there == *plan { Ok(()) } else { folder.write_plan(plan) }
+}
+
+/// Runs that are to be made one after the other.
+struct Queue<'a> {
+    context: &'a Context<'a>,
+    folder: &'a Folder,
+    experiment: &'a Experiment<'a>,
+    left: &'a [Run],
+}
+
+impl Queue<'_> {
+    fn work(&self, interrupted: &AtomicBool) -> Result<()> {
+        let plan = self.experiment.plan;
+        let costs = self.costs()?;
+        let total: f64 = costs.iter().sum();
+        self.announce(&costs);
+        // In milliseconds of the estimate.
+        let mut progress = Progress::new("benchmark", (1e3 * total) as u64, 0);
+        let mut behind = 0.0;
+        for (index, (run, cost)) in self.left.iter().zip(&costs).enumerate() {
+            let begun = Instant::now();
+            let working = self.folder.working(&plan.key(run)?);
+            let outcome = self.experiment.perform(run, &working, &mut |share| {
+                // What has no steps to count is taken to need its time.
+                let gone = (share * cost).max(begun.elapsed().as_secs_f64().min(0.95 * cost));
+                progress.at((1e3 * (behind + gone)) as u64, || format!("run {} of {}: {run}", index + 1, self.left.len()));
+                !interrupted.load(Ordering::Relaxed)
+            })?;
+            self.folder.finish(plan, &outcome)?;
+            behind += cost;
+            self.context.say(format!("{:>4}/{}  {run}: {}", index + 1, self.left.len(), duration(begun.elapsed().as_secs_f64())));
+            if interrupted.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted { saved: "every finished run is in its file; go on with --resume".into() });
+            }
+        }
+        Ok(())
+    }
+
+    /// What is to be done, by method, with the time that it will take.
+    fn announce(&self, costs: &[f64]) {
+        self.context.say(format!("{} runs to do, about {} on this machine", self.left.len(), duration(costs.iter().sum())));
+        let mut methods: Vec<(&str, Vec<f64>)> = Vec::new();
+        for (run, cost) in self.left.iter().zip(costs) {
+            match methods.iter_mut().find(|(id, _)| *id == run.method) {
+                Some((_, known)) => known.push(*cost),
+                None => methods.push((&run.method, vec![*cost])),
+            }
+        }
+        for (id, costs) in methods {
+            let name = method(id).map_or(id, |method| method.name);
+            self.context.say(format!("{:>6} x {name}, {} in all", costs.len(), duration(costs.iter().sum())));
+        }
+    }
+
+    /// Seconds that each run will take, about.
+    fn costs(&self) -> Result<Vec<f64>> {
+        let Experiment { plan, flights, model, threads, .. } = self.experiment;
+        let history = plan.settings.phyture()?.history;
+        let split = Split::new(flights, &model.data.locked, &model.data.split, plan.settings.split_seed)?;
+        let training = windows(&split.training, history, plan.settings.training.stride).len();
+        let flight_s: f64 = split.training.iter().map(|span| (span.end - span.start) as f64 * plan.step_s).sum();
+        let mut known: BTreeMap<String, f64> = BTreeMap::new();
+        let mut costs = Vec::new();
+        for run in self.left {
+            let window_s = match (plan.training(run)?, known.get(&run.method)) {
+                (Some(_), Some(seconds)) => *seconds,
+                (Some(config), None) => {
+                    let seconds = estimate::window_s(&config, *threads)?;
+                    known.insert(run.method.clone(), seconds);
+                    seconds
+                }
+                (None, _) => 0.0,
+            };
+            let tested = match run.division {
+                Division::Benchmark => split.test.clone(),
+                Division::Fold(_) => flights
+                    .iter()
+                    .enumerate()
+                    .map(|(flight, log)| phyture::flight::Span { flight, start: 0, end: log.len() / plan.folds.len().max(1) })
+                    .collect(),
+            };
+            let test = windows(&tested, history, plan.settings.test_stride).len();
+            costs.push(estimate::run_s(plan, run, window_s, flight_s, training, test)?);
+        }
+        Ok(costs)
+    }
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        seconds if seconds < 120.0 => format!("{seconds:.0} s"),
+        seconds if seconds < 7200.0 => format!("{:.0} min", seconds / 60.0),
+        seconds => format!("{:.1} h", seconds / 3600.0),
+    }
+}
+
+/// Options of the command line that are not a task's: the script gives each its own.
+const NOT_OF_A_TASK: [&str; 4] = ["--emit", "--shards", "--threads", "--json"];
+
+/// Prints the script of a job array whose tasks are what this command line asks for.
+pub fn emit(context: &Context, output: &Path, shards: usize) -> Result<ExitCode> {
+    let program = std::env::current_exe().map_err(Error::io("phyture"))?;
+    let mut arguments = Vec::new();
+    let mut given = std::env::args().skip(1);
+    while let Some(argument) = given.next() {
+        let name = argument.split_once('=').map_or(argument.as_str(), |(name, _)| name);
+        if !NOT_OF_A_TASK.contains(&name) {
+            arguments.push(argument);
+        } else if name == argument {
+            // Its value is a word of its own.
+            given.next();
+        }
+    }
+    let cpus = context.common.threads.filter(|threads| *threads > 0);
+    let cpus = cpus.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
+    let program = program.to_string_lossy().into_owned();
+    let array = JobArray { program, arguments, shards, cpus, output: output.into(), time_limit: None };
+    context.say(array.script()?.trim_end());
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Takes over the runs of other folders and writes the tables of all runs that are done.
+pub fn collect(context: &Context, folder: &Path, from: &[PathBuf]) -> Result<ExitCode> {
+    if !folder.join("plan.json").exists() {
+        let (place, field) = (folder.display().to_string(), "plan.json".into());
+        return Err(Error::Config { place, field, found: "nothing".into(), expected: "the folder of a benchmark".into() });
+    }
+    let folder = Folder::create(folder)?;
+    let plan = folder.plan()?;
+    for other in from {
+        let taken = folder.merge(&plan, &Folder::create(other)?)?;
+        context.say(format!("{}: {taken} runs taken over", other.display()));
+    }
+    let finished = Finished::read(&folder)?;
+    text::write(&finished, &folder.tables())?;
+    write_page(&benchmark_page(&finished), &folder.tables())?;
+    for table in finished.tables() {
+        context.say(format!("\n{}", text::markdown(&finished, &table)));
+    }
+    context.say(format!("tables: {}", folder.tables().display()));
+    context.json(&finished.tables())?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,70 @@
+//! The loop: diagnose, add what is confirmed, calibrate, until nothing worthwhile is left. No file is written here: the caller is
+//! told of every round.
+
+use super::{Diagnosis, Options, diagnose};
+use crate::error::{Error, Result};
+use crate::flight::split::Split;
+use crate::flight::{Flight, Span};
+use crate::physics::{Effect, Model, calibrate};
+
+/// Rounds before the loop stops by itself.
+const MOST_ROUNDS: usize = 4;
+
+/// What the loop did.
+pub struct Amended {
+    /// Diagnoses, one a round; the last found nothing more.
+    pub rounds: Vec<Diagnosis>,
+    /// The calibrated model with all that was added.
+    pub model: Model,
+}
+
+/// What a search reads of a split: everything but the part that confirms.
+pub fn searched(split: &Split) -> Vec<Span> {
+    split.training.iter().chain(&split.validation).copied().collect()
+}
+
+/// The model without what is switched off, calibrated on what is searched; as it stands if the flights do not determine its
+/// coefficients.
+///
+/// # Errors
+/// As [`calibrate`], but for coefficients that the flights do not determine.
+pub fn calibrated(model: &Model, flights: &[Flight], split: &Split) -> Result<Model> {
+    let mut model = model.clone();
+    model.effects.retain(|effect| effect.enabled);
+    match calibrate(&model, flights, &searched(split)) {
+        Err(Error::Undetermined(_)) => Ok(model),
+        calibrated => Ok(calibrated?.0),
+    }
+}
+
+/// Diagnoses, adds and calibrates until nothing is found that the confirming flights confirm. `told` hears of every round, from 1,
+/// and may add to its diagnosis. Effects that are switched off stay in the model, switched off, unless they were found.
+///
+/// # Errors
+/// As [`diagnose`]; what `told` gives.
+pub fn amend(
+    flights: &[Flight],
+    model: &Model,
+    split: &Split,
+    options: &Options,
+    told: &mut dyn FnMut(usize, &mut Diagnosis) -> Result<()>,
+) -> Result<Amended> {
+    let off: Vec<_> = model.effects.iter().filter(|effect| !effect.enabled).cloned().collect();
+    let mut model = calibrated(model, flights, split)?;
+    model.effects.extend(off);
+    let mut rounds = Vec::new();
+    for round in 1..=MOST_ROUNDS {
+        let mut outcome = diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), options)?;
+        told(round, &mut outcome.diagnosis)?;
+        let confirmed = outcome.diagnosis.is_confirmed();
+        rounds.push(outcome.diagnosis);
+        if !confirmed {
+            break;
+        }
+        let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
+        let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
+        model = calibrated(&outcome.model, flights, split)?;
+        model.effects.extend(off);
+    }
+    Ok(Amended { rounds, model })
+}

@@ -1,0 +1,26 @@
+//! The paper's experiments: every method on the same splits, several seeds, and the tables that come of them.
+//!
+//! A [`Plan`] is a list of independent [`Run`]s. Each run trains at most one network and ends in one [`Outcome`], a file of sums of errors
+//! by ten-second segment; every table is arithmetic on outcomes. So runs may be made in any order, on any machine, and killed at any
+//! moment. Nothing here parses a command line or draws a page.
+
+pub mod estimate;
+pub mod folder;
+pub mod method;
+pub mod outcome;
+pub mod paper;
+pub mod perform;
+pub mod plan;
+pub mod settings;
+pub mod slurm;
+pub mod table;
+pub mod text;
+
+pub use folder::Folder;
+pub use method::{METHODS, Method, Predictor, method};
+pub use outcome::{Condition, Outcome, Segment, Trace};
+pub use perform::Experiment;
+pub use plan::{Division, Plan, Run, TableId, Treatment};
+pub use settings::Settings;
+pub use slurm::JobArray;
+pub use table::{Finished, Table, TableRow};

@@ -1,0 +1,454 @@
+//! Tables from outcomes: means and deviations over seeds. Arithmetic alone; how they are written is in `text`, what a run does in
+//! `perform`.
+
+use super::folder::Folder;
+use super::method::{Method, method};
+use super::outcome::{Condition, Outcome, Segment, Sums, Trace};
+use super::paper::{self, Printed};
+use super::plan::{ABLATION, COMPARISON, Division, FUSION, Plan, ROBUST, Run, SWEEP, TREATMENTS, TableId, Treatment};
+use crate::critique::PerChannel;
+use crate::error::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Mean over seeds and, with at least two, the standard deviation (divisor n − 1).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Cell {
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation over seeds.
+    pub deviation: Option<f64>,
+}
+
+impl TableRow {
+    /// Name and, where it is not the RMSE, measure.
+    pub fn title(&self) -> String {
+        if self.measure == RMSE.0 { self.name.clone() } else { format!("{}, {}", self.name, self.measure) }
+    }
+}
+
+impl Table {
+    /// What a reader has to know of the rows, a sentence each.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<String> =
+            self.rows.iter().filter_map(|row| Some(format!("{}: {}.", row.name, row.note.as_ref()?))).collect();
+        notes.dedup();
+        notes
+    }
+}
+
+impl Cell {
+    /// Of one value a seed; `None` of nothing.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        (!values.is_empty()).then(|| Self { mean, deviation: (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt()) })
+    }
+}
+
+/// A row: six channels in the order of the targets, then their mean. The mean is taken seed by seed, so that its deviation is that of a
+/// mean over channels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct TableRow {
+    /// Identifier of the method.
+    pub method: String,
+    /// As it stands in the table.
+    pub name: String,
+    /// What is measured: `RMSE`, `MAE`, `MaxAE`.
+    pub measure: &'static str,
+    /// What the reader has to know.
+    pub note: Option<String>,
+    /// The figures; `None` while no seed is done.
+    pub cells: [Option<Cell>; 7],
+    /// Seeds that are done.
+    pub seeds: usize,
+    /// Seeds of the plan; 1 for a method without randomness.
+    pub planned: usize,
+    /// Whether it predicts at all: the zero-phase difference looks ahead and competes with nobody.
+    pub competes: bool,
+    /// What the paper prints.
+    pub paper: Option<Printed>,
+}
+
+/// A table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Table {
+    /// Name of its files.
+    pub id: String,
+    /// Title.
+    pub title: String,
+    /// Rows in order.
+    pub rows: Vec<TableRow>,
+}
+
+/// The finished runs of a plan.
+pub struct Finished {
+    /// The plan.
+    pub plan: Plan,
+    /// Runs that are done, by key.
+    outcomes: BTreeMap<String, Outcome>,
+    /// Runs that are not.
+    pub missing: Vec<Run>,
+}
+
+/// One measure of the sums of errors.
+type Measure = (&'static str, fn(&Sums) -> PerChannel);
+const RMSE: Measure = ("RMSE", Sums::rmse);
+
+impl Finished {
+    /// Reads what is done of a folder's plan.
+    ///
+    /// # Errors
+    /// What reading gives.
+    pub fn read(folder: &Folder) -> Result<Self> {
+        let plan = folder.plan()?;
+        let (mut outcomes, mut missing) = (BTreeMap::new(), Vec::new());
+        for run in plan.runs()? {
+            match folder.outcome(&plan, &run)? {
+                Some(outcome) => {
+                    outcomes.insert(plan.key(&run)?, outcome);
+                }
+                None => missing.push(run),
+            }
+        }
+        Ok(Self { plan, outcomes, missing })
+    }
+
+    /// The outcome of a run, if it is done.
+    pub fn outcome(&self, run: &Run) -> Option<&Outcome> {
+        self.outcomes.get(&self.plan.key(run).ok()?)
+    }
+
+    /// Runs that are done.
+    pub fn done(&self) -> usize {
+        self.outcomes.len()
+    }
+
+    /// Finished outcomes of a method on the benchmark division, one a seed.
+    pub fn seeds(&self, id: &str, treatment: Treatment) -> Vec<&Outcome> {
+        let runs = self.plan.runs_of(id, Division::Benchmark, treatment);
+        runs.iter().filter_map(|run| self.outcome(run)).collect()
+    }
+
+    /// The stretch of test flight that every method of Table 1 was drawn on; of a network with several seeds, the first.
+    pub fn traces(&self) -> impl Iterator<Item = (&'static Method, &Trace)> {
+        let trace = move |id: &&'static str| {
+            let outcome = self.seeds(id, Treatment::Plain).into_iter().next()?;
+            Some((method(id)?, outcome.trace.as_ref()?))
+        };
+        COMPARISON.iter().filter_map(trace)
+    }
+
+    /// Every table of the plan.
+    pub fn tables(&self) -> Vec<Table> {
+        let mut tables = Vec::new();
+        for table in &self.plan.tables {
+            match table {
+                TableId::Paper(1) => tables.push(self.plain(1, "RMSE of every method, benchmark division", &COMPARISON)),
+                TableId::Paper(2) => tables.extend(self.worst_case()),
+                TableId::Paper(3) => tables.extend(self.folds()),
+                TableId::Paper(4) => tables.push(self.plain(4, "RMSE without one module each", &ABLATION)),
+                TableId::Paper(5) => tables.push(self.plain(5, "RMSE by width w of the moving average", &SWEEP)),
+                TableId::Paper(number) => tables.push(self.fusion(*number)),
+                TableId::Robustness => tables.push(self.robustness()),
+            }
+        }
+        tables
+    }
+
+    fn plain(&self, number: u8, title: &str, ids: &[&'static str]) -> Table {
+        let rows = self.plan.wanted(ids).filter_map(method).map(|method| {
+            let mut row = self.row(method, Treatment::Plain, Condition::Clean, RMSE);
+            row.paper = paper::printed(number, method.id);
+            row
+        });
+        Table { id: format!("table{number}"), title: title.into(), rows: rows.collect() }
+    }
+
+    /// A method on the benchmark division.
+    fn row(&self, method: &Method, treatment: Treatment, condition: Condition, measure: Measure) -> TableRow {
+        let outcomes = self.seeds(method.id, treatment);
+        let of = |outcome: &&Outcome| outcome.conditions.get(&condition).map(|segments| measure.1(&Sums::of(segments)));
+        let found: Vec<PerChannel> = outcomes.iter().filter_map(of).collect();
+        let planned = self.plan.runs_of(method.id, Division::Benchmark, treatment).len();
+        let effects = outcomes.first().filter(|_| method.predictor.amended()).map(|outcome| &outcome.effects);
+        row(method, measure.0, &found, planned, effects)
+    }
+
+    /// Table 6: its third row is a row of Table 4 under another name.
+    fn fusion(&self, number: u8) -> Table {
+        let mut table = self.plain(number, "RMSE by the way physics enters", &FUSION);
+        for row in table.rows.iter_mut().filter(|row| row.method == "without_paf") {
+            "Residual Correction".clone_into(&mut row.name);
+            row.note = Some("the same run as Without PAF".into());
+        }
+        table
+    }
+
+    /// Table 2: Phy-Ture and the best of the paper's other methods in Table 1. `None` until both have a run.
+    fn worst_case(&self) -> Option<Table> {
+        let rivals = self.plan.wanted(&COMPARISON).filter(|id| *id != "phyture" && paper::printed(1, id).is_some());
+        let mean = |id: &'static str| {
+            let row = self.row(method(id)?, Treatment::Plain, Condition::Clean, RMSE);
+            Some((id, row.cells[6]?.mean))
+        };
+        let (strongest, _) = rivals.filter_map(mean).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let measures: [Measure; 2] = [("MAE", Sums::mae), ("MaxAE", Sums::max_abs)];
+        let rows = [strongest, "phyture"].into_iter().filter_map(method).flat_map(|method| {
+            measures.map(|measure| {
+                let mut row = self.row(method, Treatment::Plain, Condition::Clean, measure);
+                row.paper = paper::printed_worst(method.id, measure.0);
+                row
+            })
+        });
+        let title = "MAE and MaxAE of Phy-Ture and of the method next to it in Table 1".into();
+        Some(Table { id: "table2".into(), title, rows: rows.collect() })
+    }
+
+    /// Table 3 twice: squared errors pooled over the folds, and the mean of the folds' errors.
+    fn folds(&self) -> [Table; 2] {
+        let pooled = |segments: &[Vec<Segment>]| Sums::of(segments.iter().flatten()).rmse();
+        let averaged = |segments: &[Vec<Segment>]| {
+            let errors: Vec<PerChannel> = segments.iter().map(|fold| Sums::of(fold).rmse()).collect();
+            let mean = |channel: usize| {
+                let values: Option<Vec<f64>> = errors.iter().map(|error| error.channels()[channel]).collect();
+                values.filter(|values| !values.is_empty()).map(|values| values.iter().sum::<f64>() / values.len() as f64)
+            };
+            PerChannel::new(std::array::from_fn(mean))
+        };
+        let table = |id: &str, title: &str, combine: &dyn Fn(&[Vec<Segment>]) -> PerChannel, printed: bool| {
+            let rows = self.plan.wanted(&COMPARISON).filter_map(method).map(|method| {
+                let (found, planned) = self.over_folds(method, combine);
+                let mut row = row(method, "RMSE", &found, planned, None);
+                row.paper = paper::printed(3, method.id).filter(|_| printed);
+                row
+            });
+            Table { id: id.into(), title: title.into(), rows: rows.collect() }
+        };
+        let count = self.plan.folds.len();
+        [
+            table("table3", &format!("RMSE on manoeuvre classes held out, {count} folds, squared errors pooled"), &pooled, true),
+            table("table3_fold_mean", &format!("RMSE on manoeuvre classes held out, mean of {count} folds"), &averaged, false),
+        ]
+    }
+
+    /// One figure a seed of which all folds are done, and the seeds planned.
+    fn over_folds(&self, method: &Method, combine: &dyn Fn(&[Vec<Segment>]) -> PerChannel) -> (Vec<PerChannel>, usize) {
+        let folds: Vec<Vec<Run>> =
+            (0..self.plan.folds.len()).map(|fold| self.plan.runs_of(method.id, Division::Fold(fold), Treatment::Plain)).collect();
+        let planned = folds.first().map_or(0, Vec::len);
+        let of_seed = |seed: usize| {
+            let clean = |runs: &Vec<Run>| self.outcome(runs.get(seed)?)?.conditions.get(&Condition::Clean).cloned();
+            let folds: Option<Vec<Vec<Segment>>> = folds.iter().map(clean).collect();
+            folds.map(|folds| combine(&folds))
+        };
+        ((0..planned).filter_map(of_seed).collect(), planned)
+    }
+
+    fn robustness(&self) -> Table {
+        let mut rows = Vec::new();
+        for method in self.plan.wanted(&ROBUST).filter_map(method) {
+            let mut add = |treatment: Treatment, condition: Condition, words: String| {
+                let mut row = self.row(method, treatment, condition, RMSE);
+                row.name = format!("{}, {words}", method.name);
+                rows.push(row);
+            };
+            for treatment in TREATMENTS {
+                match treatment {
+                    Treatment::Plain => {
+                        add(treatment, Condition::Clean, "as recorded".into());
+                        add(treatment, Condition::StateNoise, "noise on the states".into());
+                        add(treatment, Condition::ControlNoise, "noise on the controls".into());
+                    }
+                    Treatment::CoefficientsOff(percent) => {
+                        add(treatment, Condition::Clean, format!("coefficients {percent} % too large"));
+                    }
+                    Treatment::TrainingShare(percent) => {
+                        add(treatment, Condition::Clean, format!("{percent} % of the training data"))
+                    }
+                }
+            }
+        }
+        Table { id: "robustness".into(), title: "RMSE with noise, wrong coefficients, less data".into(), rows }
+    }
+
+    /// Mean RMSE over the seeds of every method of Table 1 on every part of the test flights that `part` names (Figure 6 and the errors by
+    /// manoeuvre). Parts are in the order of their names, methods in the order of the table.
+    pub fn by_part(&self, part: impl Fn(&Segment) -> String) -> BTreeMap<String, Vec<(&'static Method, PerChannel)>> {
+        let mut parts: BTreeMap<String, Vec<(&'static Method, PerChannel)>> = BTreeMap::new();
+        for method in self.plan.wanted(&COMPARISON).filter_map(method) {
+            let mut errors: BTreeMap<String, Vec<PerChannel>> = BTreeMap::new();
+            for outcome in self.seeds(method.id, Treatment::Plain) {
+                let mut groups: BTreeMap<String, Vec<&Segment>> = BTreeMap::new();
+                for segment in outcome.conditions.get(&Condition::Clean).into_iter().flatten() {
+                    groups.entry(part(segment)).or_default().push(segment);
+                }
+                for (name, group) in groups {
+                    errors.entry(name).or_default().push(Sums::of(group).rmse());
+                }
+            }
+            for (name, errors) in errors {
+                let [channels @ .., _] = cells(&errors).map(|cell| cell.map(|cell| cell.mean));
+                parts.entry(name).or_default().push((method, PerChannel::new(channels)));
+            }
+        }
+        parts
+    }
+}
+
+/// Six channels and their mean, over seeds.
+fn cells(found: &[PerChannel]) -> [Option<Cell>; 7] {
+    std::array::from_fn(|column| {
+        let value = |errors: &PerChannel| if column < 6 { errors.channels()[column] } else { errors.mean };
+        let values: Option<Vec<f64>> = found.iter().map(value).collect();
+        Cell::of(&values?)
+    })
+}
+
+fn row(method: &Method, measure: &'static str, found: &[PerChannel], planned: usize, effects: Option<&Vec<String>>) -> TableRow {
+    let added =
+        effects.map(|effects| if effects.is_empty() { "added: nothing".into() } else { format!("added: {}", effects.join(", ")) });
+    let note = [method.note.map(str::to_owned), added].into_iter().flatten().collect::<Vec<_>>().join("; ");
+    TableRow {
+        method: method.id.into(),
+        name: method.name.into(),
+        measure,
+        note: (!note.is_empty()).then_some(note),
+        cells: cells(found),
+        seeds: found.len(),
+        planned,
+        competes: method.id != "centred_difference",
+        paper: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::tests::plan;
+    use super::*;
+    use phyture_kernels::Tolerance;
+
+    /// Errors that are known: `scale` times the seed in flight a, twice that in flight b, which has three windows.
+    fn outcome(run: &Run, scale: f64) -> Outcome {
+        let error = scale * (run.seed.max(1) as f64);
+        let segment = |flight: &str, windows: usize, error: f64| Segment {
+            flight: flight.into(),
+            manoeuvre: flight.into(),
+            start_s: 0.0,
+            windows,
+            squares: [error * error * windows as f64; 6],
+            absolutes: [error * windows as f64; 6],
+            largest: [error; 6],
+        };
+        let segments = vec![segment("a", 1, error), segment("b", 3, 2.0 * error)];
+        Outcome {
+            run: run.clone(),
+            parameters: 0,
+            training_windows: 0,
+            steps: 0,
+            effects: vec!["drag".into()],
+            conditions: BTreeMap::from([(Condition::Clean, segments)]),
+            trace: None,
+        }
+    }
+
+    fn finished(tables: &[TableId], scale: impl Fn(&Run) -> Option<f64>) -> Result<Finished> {
+        let plan = plan(tables);
+        let (mut outcomes, mut missing) = (BTreeMap::new(), Vec::new());
+        for run in plan.runs()? {
+            match scale(&run) {
+                Some(scale) => {
+                    outcomes.insert(plan.key(&run)?, outcome(&run, scale));
+                }
+                None => missing.push(run),
+            }
+        }
+        Ok(Finished { plan, outcomes, missing })
+    }
+
+    fn close(found: Option<Cell>, mean: f64, deviation: Option<f64>) -> bool {
+        let near = |a: f64, b: f64| (a - b).abs() <= Tolerance::Close.relative_f64() * b.abs();
+        found.is_some_and(|cell| {
+            near(cell.mean, mean)
+                && cell.deviation.is_some() == deviation.is_some()
+                && near(cell.deviation.unwrap_or(0.0), deviation.unwrap_or(0.0))
+        })
+    }
+
+    #[test]
+    fn a_row_is_the_mean_over_seeds_of_the_error_of_each() -> Result<()> {
+        let finished = finished(&[TableId::Paper(1)], |_| Some(1.0))?;
+        let table = &finished.tables()[0];
+        // √((1 + 3·4)/4) for seed 1, twice and three times that for the others.
+        let one = (13.0_f64 / 4.0).sqrt();
+        let phyture = table.rows.iter().find(|row| row.method == "phyture");
+        assert!(phyture.is_some_and(|row| row.seeds == 3 && row.cells.iter().all(|cell| close(*cell, 2.0 * one, Some(one)))));
+        let physics = table.rows.iter().find(|row| row.method == "physical_baseline");
+        assert!(physics.is_some_and(|row| row.planned == 1 && close(row.cells[0], one, None) && row.paper.is_some()));
+        let amended = table.rows.iter().find(|row| row.method == "amended_physics");
+        assert!(amended.and_then(|row| row.note.clone()).is_some_and(|note| note.ends_with("added: drag")));
+        Ok(())
+    }
+
+    #[test]
+    fn table_2_names_the_strongest_of_the_papers_methods() -> Result<()> {
+        let finished = finished(&[TableId::Paper(2)], |run| {
+            Some(match run.method.as_str() {
+                "tcn" => 0.25,
+                "ridge" | "phyture_amended" => 0.1,
+                _ => 1.0,
+            })
+        })?;
+        let rows = &finished.tables()[0].rows;
+        assert_eq!(
+            rows.iter().map(|row| (row.method.as_str(), row.measure)).collect::<Vec<_>>(),
+            [("tcn", "MAE"), ("tcn", "MaxAE"), ("phyture", "MAE"), ("phyture", "MaxAE")]
+        );
+        assert!(close(rows[1].cells[0], 1.0, Some(0.5)), "largest errors are 2·0.25·seed");
+        Ok(())
+    }
+
+    #[test]
+    fn folds_are_pooled_and_averaged_and_a_seed_with_a_fold_missing_does_not_count() -> Result<()> {
+        let finished = finished(&[TableId::Paper(3)], |run| match run.division {
+            Division::Fold(1) if run.seed == 3 => None,
+            Division::Fold(1) => Some(3.0),
+            _ => Some(1.0),
+        })?;
+        let [pooled, averaged] = finished.folds();
+        let find = |table: &Table| table.rows.iter().find(|row| row.method == "tcn").cloned();
+        let (Some(pooled), Some(averaged)) = (find(&pooled), find(&averaged)) else { panic!("no row of the TCN") };
+        assert_eq!((pooled.seeds, pooled.planned, finished.missing.is_empty()), (2, 3, false));
+        let one = (13.0_f64 / 4.0).sqrt();
+        let (both, mean) = (one * 5.0_f64.sqrt(), 2.0 * one);
+        assert!(close(pooled.cells[6], 1.5 * both, Some(both * 0.5_f64.sqrt())));
+        assert!(close(averaged.cells[6], 1.5 * mean, Some(mean * 0.5_f64.sqrt())));
+        Ok(())
+    }
+
+    #[test]
+    fn what_is_not_done_is_empty_and_every_table_has_its_rows() -> Result<()> {
+        let nothing = finished(&TableId::ALL, |_| None)?;
+        assert!(nothing.tables().iter().flat_map(|table| &table.rows).all(|row| row.seeds == 0 && row.cells == [None; 7]));
+        let all = finished(&TableId::ALL, |_| Some(1.0))?;
+        let names: Vec<String> = all.tables().into_iter().map(|table| table.id).collect();
+        assert_eq!(names, ["table1", "table2", "table3", "table3_fold_mean", "table4", "table5", "table6", "robustness"]);
+        let tables = all.tables();
+        let residual = tables[6].rows.iter().find(|row| row.name == "Residual Correction");
+        let without = tables[4].rows.iter().find(|row| row.name == "Without PAF");
+        assert_eq!(residual.map(|row| row.cells), without.map(|row| row.cells));
+        Ok(())
+    }
+
+    #[test]
+    fn errors_by_manoeuvre_are_means_over_seeds() -> Result<()> {
+        let finished = finished(&[TableId::Paper(1)], |_| Some(1.0))?;
+        let parts = finished.by_part(|segment| segment.manoeuvre.clone());
+        assert_eq!(parts.keys().collect::<Vec<_>>(), ["a", "b"]);
+        assert!(parts.values().all(|methods| methods.len() == COMPARISON.len()));
+        let tcn = parts["b"].iter().find(|(method, _)| method.id == "tcn");
+        assert!(tcn.is_some_and(|(_, error)| close(Cell::of(&[error.vx_dot.unwrap_or_default()]), 4.0, None)));
+        Ok(())
+    }
+}

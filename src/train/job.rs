@@ -1,0 +1,64 @@
+//! What a training run learns from, and the hybrid it will end in but for its weights: windows, inputs and scales, all from the
+//! training part alone. No optimiser and no files here.
+
+use super::config::TrainConfig;
+use crate::blocks::Blocks;
+use crate::error::Result;
+use crate::flight::split::Split;
+use crate::flight::windows::windows;
+use crate::flight::{Flight, Window};
+use crate::hybrid::{Description, Hybrid, sequence};
+use crate::physics::Model;
+use crate::tape::Threads;
+
+/// Training data, prepared once a run.
+pub struct Job {
+    /// The hybrid but for its weights.
+    pub description: Description,
+    /// All flights as the network sees them.
+    pub sequences: Vec<sequence::Sequence>,
+    /// Windows that train.
+    pub windows: Vec<Window>,
+    /// Windows kept from training, for the gate; empty without one.
+    pub gate_windows: Vec<Window>,
+}
+
+impl Job {
+    /// Prepares the training part of `split` for the residual (or acceleration) of `model`.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::check`], [`sequence::sequences`] and [`sequence::linear`].
+    pub fn new(flights: &[Flight], split: &Split, model: &Model, config: &TrainConfig) -> Result<Self> {
+        config.check()?;
+        let spans = &split.training;
+        let linear = config.linear.as_ref().map(|linear| sequence::linear(flights, spans, model, linear)).transpose()?;
+        let description = Description {
+            model: model.clone(),
+            config: config.network.clone(),
+            inputs: config.inputs.clone(),
+            scaling: sequence::scaling(flights, spans, model, &config.inputs, linear.as_ref(), &config.network)?,
+            linear,
+            gate: [1.0; 6],
+            step_s: flights.first().map_or(0.01, |flight| flight.step_s),
+        };
+        let sequences = sequence::sequences(flights, &description)?;
+        let all = windows(spans, config.network.history(), config.stride);
+        let blocks = Blocks::new(flights, &all).of_window;
+        let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
+        let choose =
+            |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
+        Ok(Self { description, sequences, windows: choose(false).collect(), gate_windows: choose(true).collect() })
+    }
+
+    /// The hybrid with these weights, its gate fitted where windows were kept for one.
+    ///
+    /// # Errors
+    /// As [`Hybrid::new`] and [`Hybrid::fit_gate`].
+    pub fn hybrid(self, flights: &[Flight], parameters: Vec<f32>, threads: Threads) -> Result<Hybrid> {
+        let mut hybrid = Hybrid::new(self.description, parameters)?;
+        if !self.gate_windows.is_empty() {
+            hybrid.fit_gate(flights, &self.gate_windows, threads)?;
+        }
+        Ok(hybrid)
+    }
+}

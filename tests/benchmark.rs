@@ -1,0 +1,126 @@
+//! The benchmark as a user runs it: killed at any moment and gone on with, cut into shards and put together again, the tables are the
+//! same bytes.
+#![cfg(all(feature = "cli", unix))]
+
+use phyture::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::Duration;
+
+/// Little enough that a run takes a fraction of a second; every method is in it.
+const CONFIG: &str =
+    "epochs = 2\nstride = 250\ncheckpoint_s = 0.0\n\n[network]\nhistory = 64\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\n";
+
+fn command(folder: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
+    command.args(arguments).current_dir(folder);
+    command
+}
+
+fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
+    command(folder, arguments).output().map_err(Error::io("phyture"))
+}
+
+fn succeed(folder: &Path, arguments: &[&str]) -> Result<String> {
+    let output = phyture(folder, arguments)?;
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Flights of four classes and the configuration.
+fn place() -> Result<tempfile::TempDir> {
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    succeed(place.path(), &["simulate", "flights", "--minutes", "3", "--seed", "51"])?;
+    std::fs::write(place.path().join("train.toml"), CONFIG).map_err(Error::io("train.toml"))?;
+    Ok(place)
+}
+
+/// Names and contents of the files of a folder; a kill may leave a temporary file, whose name begins with a dot.
+fn files(folder: &Path) -> Result<BTreeMap<String, Vec<u8>>> {
+    let entries = std::fs::read_dir(folder).map_err(Error::io(folder))?;
+    let entries = entries.filter(|entry| !entry.as_ref().is_ok_and(|entry| entry.file_name().to_string_lossy().starts_with('.')));
+    entries
+        .map(|entry| {
+            let path = entry.map_err(Error::io(folder))?.path();
+            let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            Ok((name, std::fs::read(&path).map_err(Error::io(&path))?))
+        })
+        .collect()
+}
+
+const PLAN: [&str; 11] =
+    ["benchmark", "flights", "--plan", "quick", "--config", "train.toml", "--table", "1", "--table", "4", "-o"];
+
+fn planned<'a>(folder: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    PLAN.into_iter().chain([folder]).chain(more.iter().copied()).collect()
+}
+
+#[test]
+fn killed_ten_times_cut_into_shards_or_left_alone_the_tables_are_the_same_bytes() -> Result<()> {
+    let place = place()?;
+    let at = place.path();
+    succeed(at, &planned("whole", &["--seeds", "2"]))?;
+    let said = succeed(at, &["benchmark", "collect", "whole"])?;
+    assert!(said.contains("SCALED DOWN") && said.contains("Conv–Informer") && said.contains("As the paper prints it"), "{said}");
+
+    // Moments spread over the length of the work by a fixed rule, from the first file on.
+    for kill in 0..10_u64 {
+        let mut child = command(at, &planned("killed", &["--seeds", "2", "--resume"]))
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .map_err(Error::io("phyture"))?;
+        std::thread::sleep(Duration::from_millis(150 + kill * 977 % 1400));
+        child.kill().and_then(|()| child.wait()).map_err(Error::io("phyture"))?;
+    }
+    succeed(at, &planned("killed", &["--seeds", "2", "--resume", "--threads", "1"]))?;
+    succeed(at, &["benchmark", "collect", "killed"])?;
+
+    for shard in ["1/3", "2/3", "3/3"] {
+        succeed(at, &planned(&format!("part-{}", &shard[..1]), &["--seeds", "2", "--shard", shard]))?;
+    }
+    let said = succeed(at, &["benchmark", "collect", "part-1"])?;
+    assert!(said.contains("INCOMPLETE"), "a part says that it is one: {said}");
+    succeed(at, &["benchmark", "collect", "part-1", "part-2", "part-3"])?;
+
+    let whole = files(&at.join("whole/tables"))?;
+    let names: Vec<&str> = whole.keys().map(String::as_str).collect();
+    for name in ["table1.md", "table4.csv", "tables.json", "figure6.csv", "figures7_8.csv", "by_manoeuvre.csv", "report.html"] {
+        assert!(names.contains(&name), "{name} is not among {names:?}");
+    }
+    for other in ["killed", "part-1"] {
+        let other = files(&at.join(other).join("tables"))?;
+        assert!(other.keys().eq(whole.keys()));
+        let differing: Vec<&String> =
+            whole.iter().filter(|(name, content)| other.get(*name) != Some(*content)).map(|(name, _)| name).collect();
+        assert!(differing.is_empty(), "{differing:?} differ");
+    }
+    assert_eq!(files(&at.join("whole/runs"))?, files(&at.join("killed/runs"))?);
+    Ok(())
+}
+
+#[test]
+fn folders_of_other_plans_and_impossible_requests_are_refused() -> Result<()> {
+    let place = place()?;
+    let at = place.path();
+    let first =
+        ["benchmark", "flights", "--plan", "quick", "--config", "train.toml", "--table", "5", "--shard", "1/40", "-o", "out"];
+    succeed(at, &first)?;
+    let refusals = [
+        (planned("out", &["--seed", "5"]), "another plan"),
+        (first[..8].iter().copied().chain(["-o", "out"]).collect(), "--resume to go on"),
+        (vec!["benchmark", "collect", "flights"], "the folder of a benchmark"),
+        (planned("new", &["--shard", "4/3"]), "I from 1 to N"),
+        (planned("new", &["--table", "8"]), "`robustness`"),
+        (planned("new", &["--seeds", "0"]), "`seeds` is 0"),
+        (vec!["benchmark", "flights"], "--output"),
+    ];
+    for (arguments, message) in refusals {
+        let output = phyture(at, &arguments)?;
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
+        assert!(text.contains(message), "{arguments:?}: {text}");
+    }
+    Ok(())
+}
