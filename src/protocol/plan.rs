@@ -119,6 +119,9 @@ pub(super) const FUSION: [&str; 4] = ["state_control_only", "direct_concatenatio
 /// Methods of the robustness table.
 pub(super) const ROBUST: [&str; 3] = ["physical_baseline", "cnn_lstm", "phyture"];
 
+/// Yardsticks that stand in it under noise only: nothing else that it does reaches them.
+pub(super) const ROBUST_YARDSTICKS: [&str; 2] = ["backward_difference", "ridge"];
+
 /// Treatments of the robustness table; noise is a condition of every outcome.
 pub(super) const TREATMENTS: [Treatment; 5] = [
     Treatment::Plain,
@@ -250,10 +253,12 @@ impl Plan {
                 TableId::Paper(4) => plain(&ABLATION, Division::Benchmark),
                 TableId::Paper(5) => plain(&SWEEP, Division::Benchmark),
                 TableId::Paper(_) => plain(&FUSION, Division::Benchmark),
-                TableId::Robustness => TREATMENTS
-                    .into_iter()
-                    .flat_map(|treatment| self.wanted(&ROBUST).flat_map(move |id| self.runs_of(id, Division::Benchmark, treatment)))
-                    .collect(),
+                TableId::Robustness => {
+                    let treated = TREATMENTS.into_iter().flat_map(|treatment| {
+                        self.wanted(&ROBUST).flat_map(move |id| self.runs_of(id, Division::Benchmark, treatment))
+                    });
+                    treated.chain(plain(&ROBUST_YARDSTICKS, Division::Benchmark)).collect()
+                }
             });
         }
         // Stable: within a seed, the order of the tables.

@@ -5,7 +5,9 @@ use super::folder::Folder;
 use super::method::{Method, method};
 use super::outcome::{Condition, Outcome, Segment, Sums, Trace};
 use super::paper::{self, Printed};
-use super::plan::{ABLATION, COMPARISON, Division, FUSION, Plan, ROBUST, Run, SWEEP, TREATMENTS, TableId, Treatment};
+use super::plan::{
+    ABLATION, COMPARISON, Division, FUSION, Plan, ROBUST, ROBUST_YARDSTICKS, Run, SWEEP, TREATMENTS, TableId, Treatment,
+};
 use crate::critique::PerChannel;
 use crate::error::Result;
 use serde::Serialize;
@@ -248,29 +250,30 @@ impl Finished {
 
     fn robustness(&self) -> Table {
         let mut rows = Vec::new();
-        for method in self.plan.wanted(&ROBUST).filter_map(method) {
-            let mut add = |treatment: Treatment, condition: Condition, words: String| {
-                let mut row = self.row(method, treatment, condition, RMSE);
-                row.name = format!("{}, {words}", method.name);
-                rows.push(row);
-            };
-            for treatment in TREATMENTS {
-                match treatment {
-                    Treatment::Plain => {
-                        add(treatment, Condition::Clean, "as recorded".into());
-                        add(treatment, Condition::StateNoise, "noise on the states".into());
-                        add(treatment, Condition::ControlNoise, "noise on the controls".into());
-                    }
-                    Treatment::CoefficientsOff(percent) => {
-                        add(treatment, Condition::Clean, format!("coefficients {percent} % too large"));
-                    }
-                    Treatment::TrainingShare(percent) => {
-                        add(treatment, Condition::Clean, format!("{percent} % of the training data"))
-                    }
-                }
+        let mut add = |method: &Method, treatment: Treatment, condition: Condition, words: String| {
+            let mut row = self.row(method, treatment, condition, RMSE);
+            row.name = format!("{}, {words}", method.name);
+            rows.push(row);
+        };
+        for method in self.plan.wanted(&ROBUST).chain(self.plan.wanted(&ROBUST_YARDSTICKS)).filter_map(method) {
+            add(method, Treatment::Plain, Condition::Clean, "as recorded".into());
+            add(method, Treatment::Plain, Condition::StateNoise, "noise on the states".into());
+            add(method, Treatment::Plain, Condition::ControlNoise, "noise on the controls".into());
+            let treatments: &[Treatment] = if ROBUST.contains(&method.id) { &TREATMENTS } else { &[] };
+            for treatment in treatments {
+                let words = match treatment {
+                    Treatment::Plain => continue,
+                    Treatment::CoefficientsOff(percent) => format!("coefficients {percent} % too large"),
+                    Treatment::TrainingShare(percent) => format!("{percent} % of the training data"),
+                };
+                add(method, *treatment, Condition::Clean, words);
             }
         }
-        Table { id: "robustness".into(), title: "RMSE with noise, wrong coefficients, less data".into(), rows }
+        Table {
+            id: "robustness".into(),
+            title: "RMSE with noise (1 % of each column's deviation, test flights only), wrong coefficients, less data".into(),
+            rows,
+        }
     }
 
     /// Mean RMSE over the seeds of every method of Table 1 on every part of the test flights that `part` names (Figure 6 and the errors by
