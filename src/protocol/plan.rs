@@ -324,13 +324,24 @@ impl Plan {
         Ok(Sha256::digest(text).iter().take(8).map(|byte| format!("{byte:02x}")).collect())
     }
 
-    /// The runs of shard `shard` of `shards`, from 1: every `shards`-th.
+    /// The runs of shard `shard` of `shards`, from 1: every `shards`-th in the order of their keys, which is a random one. In the order
+    /// of the plan the same method would fall to the same shard again and again.
     ///
     /// # Errors
     /// As [`Plan::runs`].
     pub fn shard(&self, shard: usize, shards: usize) -> Result<Vec<Run>> {
-        let runs = self.runs()?.into_iter().enumerate();
-        Ok(runs.filter(|(index, _)| index % shards.max(1) == shard.saturating_sub(1)).map(|(_, run)| run).collect())
+        let runs = self.runs()?;
+        let mut keyed = runs.iter().map(|run| Ok((self.key(run)?, run))).collect::<Result<Vec<_>>>()?;
+        keyed.sort_unstable_by(|left, right| left.0.cmp(&right.0));
+        let mine: BTreeSet<&str> =
+            keyed.iter().skip(shard.saturating_sub(1)).step_by(shards.max(1)).map(|(key, _)| key.as_str()).collect();
+        let mut chosen = Vec::new();
+        for run in &runs {
+            if mine.contains(self.key(run)?.as_str()) {
+                chosen.push(run.clone());
+            }
+        }
+        Ok(chosen)
     }
 }
 
@@ -437,6 +448,18 @@ pub(super) mod tests {
             all.sort_unstable();
             prop_assert_eq!(found, all);
         }
+    }
+
+    #[test]
+    fn no_shard_gets_one_method_alone() -> Result<()> {
+        let plan = plan(&TableId::ALL);
+        for shards in 2..=9 {
+            for shard in 1..=shards {
+                let methods: BTreeSet<String> = plan.shard(shard, shards)?.into_iter().map(|run| run.method).collect();
+                assert!(methods.len() > 5, "shard {shard}/{shards} has {methods:?}");
+            }
+        }
+        Ok(())
     }
 
     #[test]
