@@ -13,8 +13,11 @@ mod parameter;
 mod plan;
 mod session;
 mod shape;
+mod slab;
+mod threads;
 
 pub use graph::{Graph, MAX_INPUTS, Var};
 pub use parameter::{Parameter, Storage};
-pub use session::{DropoutKey, Fill, SHARDS, Session, Threads};
+pub use session::{DropoutKey, Fill, SHARDS, Session};
 pub use shape::{MAX_RANK, Shape};
+pub use threads::Threads;

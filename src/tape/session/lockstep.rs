@@ -4,9 +4,12 @@
 //! and all go on; likewise backward. Shards, their gradients and the order of summation are those of the session, so that again the
 //! number of threads changes no bit.
 
-use super::{Replay, Shard, Slab, join};
+use super::replay::Replay;
+use super::shards::Shard;
 use crate::tape::op::{Coupled, Pass};
 use crate::tape::plan::{Plan, Step};
+use crate::tape::slab::Slab;
+use crate::tape::threads::join;
 use phyture_kernels::Real;
 use std::ops::Range;
 
