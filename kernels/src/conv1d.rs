@@ -52,6 +52,9 @@ pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
     packed_len(geometry, inputs, outputs).max(input)
 }
 
+/// Where y may be cut for [`forward_rows`]: at multiples of this many rows, every row is computed by the same instructions as uncut.
+pub const CUT: usize = tile::CUT;
+
 /// y = dropout(f(conv(x) + b)).
 ///
 /// # Panics
@@ -67,6 +70,25 @@ pub fn forward<T: Real>(
     scratch: &mut [T],
 ) {
     assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
+    forward_rows(level, geometry, x, weight, bias, epilogue, 0, y, scratch);
+}
+
+/// Rows `first…` of what [`forward`] gives, as many as y `[≤ n′ − first, out]` has; x and the dropout mask are those of the whole.
+///
+/// # Panics
+/// If shapes disagree.
+pub fn forward_rows<T: Real>(
+    level: Level,
+    geometry: Geometry,
+    x: Rows<'_, T>,
+    weight: Weight<'_, T>,
+    bias: Option<&[T]>,
+    epilogue: Epilogue,
+    first: usize,
+    y: RowsMut<'_, T>,
+    scratch: &mut [T],
+) {
+    assert!(first + y.rows() <= geometry.output_rows(x.rows()), "conv1d: rows of y");
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
     let packed = match weight {
         Weight::Packed(packed) => packed,
@@ -75,7 +97,7 @@ pub fn forward<T: Real>(
             scratch
         }
     };
-    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, y });
+    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, first, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -84,6 +106,7 @@ pub(crate) struct Forward<'a, T> {
     packed: &'a [T],
     bias: Option<&'a [T]>,
     epilogue: Epilogue,
+    first: usize,
     y: RowsMut<'a, T>,
 }
 
@@ -93,24 +116,25 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
         let Geometry { taps, left, .. } = self.geometry;
         let (inputs, outputs) = (self.x.cols(), self.y.cols());
         let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
-        let shifted = Shifted { x: self.x, taps, left, rows: self.y.rows() };
-        let mut sink = Finish::new(self.y, self.bias, self.epilogue);
+        let shifted = Shifted { x: self.x, taps, left, first: self.first, rows: self.y.rows() };
+        let mut sink = Finish::new(self.first, self.y, self.bias, self.epilogue);
         tile::rows::<T, I, _, _, MR, NR>(&shifted, outputs, panels, &mut sink);
     }
 }
 
-/// Output row t, tap j ↦ x[clamp(t + j − left)].
+/// Row i, tap j ↦ x[clamp(t + j − left)] for output row t = first + i.
 struct Shifted<'a, T> {
     x: Rows<'a, T>,
     taps: usize,
     left: usize,
+    first: usize,
     rows: usize,
 }
 
 impl<T> Shifted<'_, T> {
     #[inline(always)]
-    fn source(&self, t: usize, j: usize) -> usize {
-        (t + j).saturating_sub(self.left).min(self.x.rows() - 1)
+    fn source(&self, i: usize, j: usize) -> usize {
+        (self.first + i + j).saturating_sub(self.left).min(self.x.rows() - 1)
     }
 }
 
@@ -138,7 +162,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::testing::{Matrix, assert_near, check_writes, inner, numbers};
+    use crate::activation::Activation;
+    use crate::dropout::Mask;
+    use crate::random::Stream;
+    use crate::testing::{Matrix, assert_near, bits, check_writes, inner, numbers};
     use crate::tolerance::Tolerance;
     use crate::{Write, linear, reference};
 
@@ -199,12 +226,41 @@ mod tests {
         }
     }
 
+    fn check_pieces<T: Real>(p: Problem, epilogue: Epilogue, step: usize) {
+        let Problem { geometry, rows, inputs, outputs, seed } = p;
+        let after = geometry.output_rows(rows);
+        let x = Matrix::<T>::random(seed, (rows, inputs));
+        let (weight, bias) = (numbers::<T>(seed + 1, geometry.taps * inputs * outputs), numbers::<T>(seed + 2, outputs));
+        for level in Level::available() {
+            let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
+            let mut found = |step: usize| {
+                let mut y = Matrix::<T>::poisoned(seed, (after, outputs));
+                for first in (0..after).step_by(step) {
+                    let y = y.view_mut().range(first, after.min(first + step));
+                    let weight = Weight::Plain(&weight);
+                    forward_rows(level, geometry, x.view(), weight, Some(&bias), epilogue, first, y, &mut scratch);
+                }
+                y.check_gaps();
+                bits(&y.to_vec())
+            };
+            assert!(found(step) == found(after.max(1)), "{p:?} in pieces of {step} at {level}");
+        }
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(64))]
         #[test]
         fn equals_its_sums(p in problem()) {
             check::<f32>(p);
             check::<f64>(p);
+        }
+
+        #[test]
+        fn pieces_have_the_bits_of_the_whole(p in problem(), which in 0_usize..3, rate in prop_oneof![Just(None), Just(Some(0.2))], cuts in 1_usize..5) {
+            let activation = [Activation::Identity, Activation::LeakyRelu { slope: 0.01 }, Activation::Tanh][which];
+            let epilogue = Epilogue { activation, dropout: rate.map(|rate| Mask::new(Stream::new(p.seed, 1, 2, 3), rate)) };
+            check_pieces::<f32>(p, epilogue, cuts * CUT);
+            check_pieces::<f64>(p, epilogue, cuts * CUT);
         }
 
         #[test]
@@ -229,7 +285,9 @@ mod tests {
     fn sizes_of_the_network() {
         for (rows, taps, pad) in [(500, 5, 3), (502, 3, 0), (125, 5, 3)] {
             let geometry = Geometry { taps, left: pad, right: pad };
-            check::<f32>(Problem { geometry, rows, inputs: 64, outputs: 64, seed: 1 });
+            let problem = Problem { geometry, rows, inputs: 64, outputs: 64, seed: 1 };
+            check::<f32>(problem);
+            check_pieces::<f32>(problem, Epilogue { activation: Activation::Tanh, dropout: None }, 5 * CUT);
         }
     }
 

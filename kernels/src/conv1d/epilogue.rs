@@ -23,8 +23,9 @@ impl Epilogue {
     pub const NONE: Self = Self { activation: Activation::Identity, dropout: None };
 }
 
-/// y = dropout(f(sums + b)).
+/// y = dropout(f(sums + b)), rows `first…`.
 pub(super) struct Finish<'a, T> {
+    first: usize,
     y: RowsMut<'a, T>,
     bias: Option<&'a [T]>,
     epilogue: Epilogue,
@@ -33,8 +34,8 @@ pub(super) struct Finish<'a, T> {
 
 impl<'a, T: Real> Finish<'a, T> {
     #[inline(always)]
-    pub(super) fn new(y: RowsMut<'a, T>, bias: Option<&'a [T]>, epilogue: Epilogue) -> Self {
-        Self { y, bias, epilogue, scale: T::of(epilogue.dropout.map_or(1.0, Mask::scale)) }
+    pub(super) fn new(first: usize, y: RowsMut<'a, T>, bias: Option<&'a [T]>, epilogue: Epilogue) -> Self {
+        Self { first, y, bias, epilogue, scale: T::of(epilogue.dropout.map_or(1.0, Mask::scale)) }
     }
 
     /// Row `i`, columns `j…` of z without its bias becomes y. The numbers are a variable of the caller's own, which nothing else can
@@ -51,7 +52,7 @@ impl<'a, T: Real> Finish<'a, T> {
             activation::map::<T, I>(self.epilogue.activation, z);
         }
         if let Some(mask) = self.epilogue.dropout {
-            let mask = mask.row(i);
+            let mask = mask.row(self.first + i);
             z.iter_mut().enumerate().for_each(|(c, z)| *z = if mask.keeps(j + c) { *z * self.scale } else { T::ZERO });
         }
     }
