@@ -10,6 +10,7 @@ pub mod ops;
 
 mod graph;
 mod parameter;
+mod parts;
 mod plan;
 mod session;
 mod shape;
@@ -18,6 +19,7 @@ mod threads;
 
 pub use graph::{Graph, MAX_INPUTS, Var};
 pub use parameter::{Parameter, Storage};
+pub use parts::Parts;
 pub use session::{DropoutKey, Fill, SHARDS, Session};
 pub use shape::{MAX_RANK, Shape};
 pub use threads::Threads;

@@ -1,7 +1,8 @@
 //! Replaying a plan: one sample at a time, one worker a core, the same bits on any number of threads.
 //!
 //! The batch is the outermost loop. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
-//! gradient slab of its own; shards are summed in order. So neither the number of threads nor their timing can change a bit.
+//! gradient slab of its own; shards are summed in order. Where there are fewer samples than threads, large operations work on pieces
+//! of their rows, which have the bits of the whole. So neither the number of threads nor their timing can change a bit.
 //! In the steady state (no more samples than in an earlier call) nothing is allocated.
 //!
 //! This file owns the memory and is the interface; what happens in a step is in `packing`, `replay` (or `lockstep`) and `shards`.
@@ -9,10 +10,8 @@
 use super::graph::{Graph, Var};
 use super::op::Pass;
 use super::plan::Plan;
-use super::slab::Slab;
-#[cfg(feature = "rayon")]
-use super::threads::pool;
-use super::threads::{Threads, join};
+use super::slab::{Slab, Slabs};
+use super::threads::{Threads, Workers};
 use crate::error::{Error, Result};
 use lockstep::Lockstep;
 use packing::pack;
@@ -21,7 +20,6 @@ use phyture_kernels::level::Level;
 use replay::Replay;
 pub use shards::SHARDS;
 use shards::{Shard, reduce};
-use std::sync::Mutex;
 
 mod lockstep;
 mod packing;
@@ -45,7 +43,8 @@ pub struct Session<T> {
     plan: Plan<T>,
     level: Level,
     poison: bool,
-    slabs: Mutex<Vec<Slab<T>>>,
+    /// One for each thread that may work on samples.
+    slabs: Slabs<T>,
     /// Weights as the forward and the backward calls of a step want them.
     packed: [Slab<T>; 2],
     shards: Vec<Shard<T>>,
@@ -55,8 +54,7 @@ pub struct Session<T> {
     results: Vec<T>,
     /// All samples of a step at once, for a plan that couples them.
     lockstep: Option<Lockstep<T>>,
-    #[cfg(feature = "rayon")]
-    pool: Option<rayon::ThreadPool>,
+    workers: Workers,
 }
 
 impl<T: Real> Session<T> {
@@ -85,8 +83,7 @@ impl<T: Real> Session<T> {
             expected: "a level of this processor, or nothing".into(),
         })?;
         let trains = plan.loss.is_some();
-        let count = if threads.0 == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { threads.0 };
-        let count = if cfg!(feature = "rayon") { count } else { 1 };
+        let count = threads.count();
         // Inference has nothing to sum, so its number of shards is free.
         let shards = if trains { SHARDS } else { SHARDS.max(count) };
         let gradient_len = if trains { plan.parameter_len } else { 0 };
@@ -94,14 +91,13 @@ impl<T: Real> Session<T> {
             level,
             poison: false,
             packed: plan.packed_len.map(Slab::new),
-            slabs: Mutex::new((0..count.min(shards)).map(|_| Slab::new(plan.slab_len)).collect()),
+            slabs: Slabs::new(count.min(shards), plan.slab_len),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
             losses: Vec::new(),
             results: Vec::new(),
             lockstep: plan.forward.iter().any(|step| step.op.coupling().is_some()).then(Lockstep::default),
-            #[cfg(feature = "rayon")]
-            pool: if count > 1 { Some(pool(count)?) } else { None },
+            workers: Workers::new(count)?,
             plan,
         })
     }
@@ -138,34 +134,38 @@ impl<T: Real> Session<T> {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
-        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, .. } = self;
+        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
-        let mut work = || {
+        workers.run(|parallelism| {
             let [forward, backward] = packed.each_mut().map(Slab::aligned);
-            join(
-                || pack(&plan.forward, Pass::Forward, level, parameters, 0, forward),
-                || pack(&plan.backward, Pass::Backward, level, parameters, 0, backward),
+            parallelism.join(
+                || pack(parallelism, &plan.forward, Pass::Forward, level, parameters, 0, forward),
+                || pack(parallelism, &plan.backward, Pass::Backward, level, parameters, 0, backward),
             );
-            let packed = [&*forward, &*backward];
-            let replay =
-                Replay { plan, level, poison, slabs, packed, parameters, dropout, fill, samples, result_len, shards: count };
+            let replay = Replay {
+                plan,
+                level,
+                poison,
+                parallelism,
+                slabs,
+                packed: [&*forward, &*backward],
+                parameters,
+                dropout,
+                fill,
+                samples,
+                result_len,
+                shards: count,
+            };
             match lockstep.as_mut().filter(|_| dropout.is_some()) {
                 Some(lockstep) => lockstep.run(&replay, shards, losses_mut, results),
                 None => replay.work(shards, 0, losses_mut, results),
             }
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
-            reduce(gradients, shards, &used, 0);
-        };
-        #[cfg(feature = "rayon")]
-        match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
-        #[cfg(not(feature = "rayon"))]
-        work();
+            reduce(parallelism, gradients, shards, &used, 0);
+        });
         for range in &self.plan.unreached {
             if let Some(gradients) = self.gradients.get_mut(range.clone()) {
                 gradients.fill(T::ZERO);

@@ -2,12 +2,20 @@
 
 use crate::tape::op::{Pack, Pass};
 use crate::tape::plan::Step;
-use crate::tape::threads::join;
+use crate::tape::threads::Parallelism;
 use phyture_kernels::Real;
 use phyture_kernels::level::Level;
 
 /// Packs the weights of a list of steps, whose packed forms lie one after another from `start` on.
-pub(super) fn pack<T: Real>(steps: &[Step<T>], pass: Pass, level: Level, parameters: &[T], start: usize, packed: &mut [T]) {
+pub(super) fn pack<T: Real>(
+    parallelism: Parallelism,
+    steps: &[Step<T>],
+    pass: Pass,
+    level: Level,
+    parameters: &[T],
+    start: usize,
+    packed: &mut [T],
+) {
     match steps {
         [] => {}
         [step] => {
@@ -20,9 +28,9 @@ pub(super) fn pack<T: Real>(steps: &[Step<T>], pass: Pass, level: Level, paramet
             let (low, high) = steps.split_at(steps.len() / 2);
             let middle = low.iter().rev().find_map(|step| step.packed.as_ref()).map_or(start, |(_, range)| range.end);
             let (low_packed, high_packed) = packed.split_at_mut(middle - start);
-            join(
-                || pack(low, pass, level, parameters, start, low_packed),
-                || pack(high, pass, level, parameters, middle, high_packed),
+            parallelism.join(
+                || pack(parallelism, low, pass, level, parameters, start, low_packed),
+                || pack(parallelism, high, pass, level, parameters, middle, high_packed),
             );
         }
     }

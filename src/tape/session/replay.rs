@@ -6,20 +6,21 @@ use super::shards::Shard;
 use super::{DropoutKey, Fill};
 use crate::tape::graph::MAX_INPUTS;
 use crate::tape::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS};
+use crate::tape::parts::Parts;
 use crate::tape::plan::{Piece, Plan, Role, Step};
-use crate::tape::slab::Slab;
-use crate::tape::threads::join;
+use crate::tape::slab::Slabs;
+use crate::tape::threads::Parallelism;
 use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Write};
-use std::sync::{Mutex, PoisonError};
 
 /// What all workers of one step share.
 pub(super) struct Replay<'a, T> {
     pub plan: &'a Plan<T>,
     pub level: Level,
     pub poison: bool,
-    pub slabs: &'a Mutex<Vec<Slab<T>>>,
+    pub parallelism: Parallelism,
+    pub slabs: &'a Slabs<T>,
     pub packed: [&'a [T]; 2],
     pub parameters: &'a [T],
     pub dropout: Option<DropoutKey>,
@@ -45,7 +46,8 @@ impl<T: Real> Replay<'_, T> {
                 let samples = self.first_sample(middle) - self.first_sample(first);
                 let (low_losses, high_losses) = losses.split_at_mut(samples);
                 let (low_results, high_results) = results.split_at_mut(samples * self.result_len);
-                join(|| self.work(low, first, low_losses, low_results), || self.work(high, middle, high_losses, high_results));
+                self.parallelism
+                    .join(|| self.work(low, first, low_losses, low_results), || self.work(high, middle, high_losses, high_results));
             }
         }
     }
@@ -54,14 +56,12 @@ impl<T: Real> Replay<'_, T> {
         if losses.is_empty() {
             return;
         }
-        let lock = || self.slabs.lock().unwrap_or_else(PoisonError::into_inner);
-        // There are as many slabs as threads, and a thread holds one at a time.
-        let mut slab = lock().pop().unwrap_or_else(|| Slab::new(self.plan.slab_len));
-        for (index, loss) in losses.iter_mut().enumerate() {
-            let result = &mut results[index * self.result_len..][..self.result_len];
-            *loss = self.sample(slab.aligned(), &mut shard.gradients, first + index, index == 0, result);
-        }
-        lock().push(slab);
+        self.slabs.lend(|slab| {
+            for (index, loss) in losses.iter_mut().enumerate() {
+                let result = &mut results[index * self.result_len..][..self.result_len];
+                *loss = self.sample(slab, &mut shard.gradients, first + index, index == 0, result);
+            }
+        });
     }
 
     /// Fills the inputs of a sample.
@@ -128,6 +128,7 @@ impl<T: Real> Replay<'_, T> {
             packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[0][range.clone()]),
             shapes: &step.shapes,
             level: self.level,
+            parts: Parts::of(self.parallelism, self.slabs, self.samples),
             stream: self.stream(step, sample),
             coupled,
         };
