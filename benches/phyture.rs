@@ -1,4 +1,4 @@
-//! The program at the sizes its users have: a training step, a forward pass, one window on one thread, and the calibration and
+//! The program at the sizes its users have: a training step, a forward pass, one window on one thread and on two, and the calibration and
 //! the search of 7376 s at 100 Hz. Times depend on the machine; the ids are stable.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
@@ -57,8 +57,11 @@ fn training(criterion: &mut Criterion) -> Result<()> {
 fn inference(criterion: &mut Criterion) -> Result<()> {
     let network = network(1000)?;
     let parameters = network.initial(0);
-    for (group, id, threads, samples) in [("forward", "phyture_h1000_b32", 0, BATCH), ("latency", "phyture_h1000_b1_1thread", 1, 1)]
-    {
+    for (group, id, threads, samples) in [
+        ("forward", "phyture_h1000_b32", 0, BATCH),
+        ("latency", "phyture_h1000_b1_1thread", 1, 1),
+        ("latency", "phyture_h1000_b1_2threads", 2, 1),
+    ] {
         let mut group = criterion.benchmark_group(group);
         group.sample_size(10).measurement_time(Duration::from_secs(10));
         let mut session = Session::infer(network.graph(), &[network.output()], Threads(threads))?;

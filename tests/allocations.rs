@@ -1,4 +1,5 @@
-//! Steady-state training allocates nothing: a counting allocator sees no request in steps 3 to 10, on one thread and on two.
+//! The steady state allocates nothing: a counting allocator sees no request in steps 3 to 10, on one thread and on two, neither in
+//! training nor in the prediction of one window, whose large operations two threads share.
 //!
 //! A file of its own, because the allocator counts for the whole program.
 
@@ -31,19 +32,26 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn the_steady_state_allocates_nothing() -> Result<()> {
-    let config = PhyTureConfig { history: 32, d_model: 16, moving_average: 5, ..PhyTureConfig::default() };
-    let network = Network::<f32>::new(&config, &OutputScale::unit(6), false)?;
-    let parameters = network.initial(1);
-    let fill = |sample: usize, inputs: &mut [&mut [f32]]| inputs.iter_mut().for_each(|input| input.fill(0.1 * sample as f32));
-    for threads in [1, 2] {
-        let mut session = Session::train(network.graph(), network.loss(), &[network.output()], Threads(threads))?;
-        for step in 0..10 {
-            let before = REQUESTS.load(Ordering::Relaxed);
-            session.step(&parameters, 9, Some(DropoutKey { seed: 1, step }), &fill)?;
-            let requests = REQUESTS.load(Ordering::Relaxed) - before;
-            // Entering a thread pool from outside may grow one of its queues once in a while; a step makes no other request.
-            let allowed = usize::from(threads > 1);
-            assert!(step < 2 || requests <= allowed, "step {step} on {threads} threads: {requests} allocations");
+    for (history, samples, trains) in [(32, 9, true), (240, 1, false)] {
+        let config = PhyTureConfig { history, d_model: 16, moving_average: 5, ..PhyTureConfig::default() };
+        let network = Network::<f32>::new(&config, &OutputScale::unit(6), false)?;
+        let parameters = network.initial(1);
+        let fill = |sample: usize, inputs: &mut [&mut [f32]]| inputs.iter_mut().for_each(|input| input.fill(0.1 * sample as f32));
+        for threads in [1, 2] {
+            let (graph, outputs, threads) = (network.graph(), [network.output()], Threads(threads));
+            let mut session = if trains {
+                Session::train(graph, network.loss(), &outputs, threads)?
+            } else {
+                Session::infer(graph, &outputs, threads)?
+            };
+            for step in 0..10 {
+                let before = REQUESTS.load(Ordering::Relaxed);
+                session.step(&parameters, samples, trains.then_some(DropoutKey { seed: 1, step }), &fill)?;
+                let requests = REQUESTS.load(Ordering::Relaxed) - before;
+                // Entering a thread pool from outside may grow one of its queues once in a while; a step makes no other request.
+                let allowed = usize::from(threads.0 > 1);
+                assert!(step < 2 || requests <= allowed, "step {step}, {samples} samples, {threads:?}: {requests} allocations");
+            }
         }
     }
     Ok(())

@@ -100,6 +100,30 @@ fn one_thread_and_many_give_the_same_bits() -> Result<()> {
     Ok(())
 }
 
+/// Long enough for attention and convolutions to be cut.
+#[test]
+fn pieces_of_one_window_give_the_bits_of_the_whole() -> Result<()> {
+    let config = PhyTureConfig { history: 304, ..small(Variant::PhyTure) };
+    let network = Network::<f32>::new(&config, &scale(), false)?;
+    let parameters = network.initial(4);
+    let bits = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+    for samples in [1, 2] {
+        let run = |threads| -> Result<_> {
+            let mut infer = Session::infer(network.graph(), &[network.output()], Threads(threads))?;
+            infer.step(&parameters, samples, None, &fill)?;
+            let outputs: Vec<_> = (0..samples).map(|sample| bits(infer.output(0, sample))).collect();
+            let mut train = Session::train(network.graph(), network.loss(), &[], Threads(threads))?;
+            let loss = train.step(&parameters, samples, Some(KEY), &fill)?;
+            Ok((outputs, loss.to_bits(), bits(train.gradients())))
+        };
+        let whole = run(1)?;
+        for threads in [2, 3, 4] {
+            assert!(run(threads)? == whole, "{samples} samples on {threads} threads");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn f32_follows_f64() -> Result<()> {
     let config = small(Variant::PhyTure);

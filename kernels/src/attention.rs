@@ -5,13 +5,7 @@
 //! ```
 //!
 //! q, o `[queries, heads·d_k]`; k, v `[keys, heads·d_k]`; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of
-//! keys with an online softmax and keeps only ℓ = log Σ eˢ, `[heads, queries]`. The backward pass makes p = e^(s − ℓ) and the
-//! dropout mask m again, block by block (Dao 2023, FlashAttention-2):
-//!
-//! ```text
-//! D = rowsum(do∘o),  dp = m∘(do·vᵀ)/(1 − rate),  ds = p∘(dp − D)
-//! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do
-//! ```
+//! keys with an online softmax and keeps only ℓ = log Σ eˢ, `[queries, heads]`, for the gradients, which are in `backward`.
 //!
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
@@ -21,8 +15,16 @@ use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
 
+mod backward;
+
+pub(crate) use backward::Backward;
+pub use backward::{Gradients, backward};
+
 /// Queries of a block: one lane each. A multiple of every level's tile in both directions.
 const QUERIES: usize = 96;
+
+/// Where o may be cut for [`forward_rows`]: at multiples of this many queries, every query is in the same block as uncut.
+pub const CUT: usize = QUERIES;
 
 /// Keys of a block. A block of scores, at most 96 x 64 numbers, stays in the first-level cache.
 const KEYS: usize = 64;
@@ -37,7 +39,7 @@ const fn block_of_queries<const NR: usize>() -> usize {
     if NR > 16 { QUERIES } else { QUERIES / 2 }
 }
 
-/// Scratch, in numbers, that [`forward`] and [`backward`] need.
+/// Scratch, in numbers, that [`forward`] and [`backward()`] need.
 pub fn scratch_len(heads: usize, queries: usize, keys: usize, head_size: usize) -> usize {
     let _ = (heads, queries);
     let wide = padded(head_size);
@@ -54,16 +56,16 @@ struct Shape {
 }
 
 impl Shape {
-    fn of<T>(heads: usize, q: &Rows<'_, T>, k: &Rows<'_, T>, v: &Rows<'_, T>, o: &Rows<'_, T>, log_sum_exp: usize) -> Self {
+    fn of<T>(heads: usize, q: &Rows<'_, T>, k: &Rows<'_, T>, v: &Rows<'_, T>, o: &Rows<'_, T>, log_sum_exp: &[T]) -> Self {
         assert!(
             heads > 0 && q.cols() > 0 && q.cols().is_multiple_of(heads),
             "attention: {heads} heads do not divide {} columns",
             q.cols()
         );
         assert!(q.cols() == k.cols() && q.cols() == v.cols() && q.cols() == o.cols(), "attention: widths differ");
-        assert!(k.rows() == v.rows() && q.rows() == o.rows(), "attention: rows of k and v, or of q and o, differ");
+        assert!(k.rows() == v.rows(), "attention: rows of k and v differ");
         assert!(k.rows() > 0, "attention: softmax over no key");
-        assert_eq!(log_sum_exp, heads * q.rows(), "attention: length of the log-sum-exp");
+        assert_eq!(log_sum_exp.len(), o.rows() * heads, "attention: length of the log-sum-exp");
         Self { heads, queries: q.rows(), keys: k.rows(), size: q.cols() / heads }
     }
 
@@ -107,6 +109,14 @@ fn lanes<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, panels: &mut [T]) 
     }
 }
 
+/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block`, times `factor`; missing rows are zero.
+#[inline(always)]
+fn panels<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, block: usize, panels: &mut [T]) {
+    for (panel, c) in panels.chunks_exact_mut(block * NR).zip((0..).step_by(NR)) {
+        pad(x.columns(c, NR.min(x.cols() - c)), factor, NR, panel);
+    }
+}
+
 /// c {=, +=} rows·panels.
 #[inline(always)]
 fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>, panels: &[T], c: RowsMut<'_, T>, write: Write) {
@@ -128,7 +138,7 @@ fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(
     }
 }
 
-/// o and `log_sum_exp` `[heads, queries]` from q, k, v.
+/// o and `log_sum_exp` `[queries, heads]` from q, k, v.
 ///
 /// # Panics
 /// If shapes disagree, `heads` does not divide the width, or there is no key.
@@ -143,8 +153,30 @@ pub fn forward<T: Real>(
     log_sum_exp: &mut [T],
     scratch: &mut [T],
 ) {
-    let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp.len());
-    T::attention_forward(level, Forward { shape, q, k, v, dropout, o, log_sum_exp, scratch });
+    assert_eq!(q.rows(), o.rows(), "attention: rows of q and o");
+    forward_rows(level, heads, q, k, v, dropout, 0, o, log_sum_exp, scratch);
+}
+
+/// Rows `first…` of what [`forward`] gives, as many as o `[≤ queries − first, heads·d_k]` has, with their rows of `log_sum_exp`; q, k, v
+/// and the dropout mask are those of the whole.
+///
+/// # Panics
+/// As [`forward`].
+pub fn forward_rows<T: Real>(
+    level: Level,
+    heads: usize,
+    q: Rows<'_, T>,
+    k: Rows<'_, T>,
+    v: Rows<'_, T>,
+    dropout: Option<Mask>,
+    first: usize,
+    o: RowsMut<'_, T>,
+    log_sum_exp: &mut [T],
+    scratch: &mut [T],
+) {
+    assert!(first + o.rows() <= q.rows(), "attention: rows of o");
+    let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp);
+    T::attention_forward(level, Forward { shape, q, k, v, dropout, first, o, log_sum_exp, scratch });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -153,6 +185,7 @@ pub(crate) struct Forward<'a, T> {
     k: Rows<'a, T>,
     v: Rows<'a, T>,
     dropout: Option<Mask>,
+    first: usize,
     o: RowsMut<'a, T>,
     log_sum_exp: &'a mut [T],
     scratch: &'a mut [T],
@@ -172,11 +205,12 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
         let total = take(&mut scratch, block);
         let factor = take(&mut scratch, block);
         let keep_scale = T::of(self.dropout.map_or(1.0, Mask::scale));
+        let stop = self.first + self.o.rows();
         for h in 0..heads {
             let (q, k) = (self.q.columns(h * size, size), self.k.columns(h * size, size));
             panels::<T, NR>(self.v.columns(h * size, size), T::ONE, keys, values);
-            for first in (0..queries).step_by(block) {
-                let end = queries.min(first + block);
+            for first in (self.first..stop).step_by(block) {
+                let end = stop.min(first + block);
                 lanes::<T, NR>(q.range(first, end), self.shape.scale(), query_lanes);
                 let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
                 largest.fill(T::NEG_INFINITY);
@@ -198,11 +232,11 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
                     let scores = Rows::packed(scores, key_end - key, block);
                     transposed_product::<T, I, MR, NR>(scores, (values, keys, key), RowsMut::packed(sums, block, wide));
                 }
-                for i in first..end {
-                    let (lane, target) = (i - first, &mut self.o.row_mut(i)[h * size..][..size]);
+                for (lane, i) in (first - self.first..end - self.first).enumerate() {
+                    let target = &mut self.o.row_mut(i)[h * size..][..size];
                     let normalise = keep_scale / total[lane];
                     target.iter_mut().zip(&sums[lane * wide..]).for_each(|(o, x)| *o = *x * normalise);
-                    self.log_sum_exp[h * queries + i] = largest[lane] + total[lane].ln();
+                    self.log_sum_exp[i * heads + h] = largest[lane] + total[lane].ln();
                 }
             }
         }
@@ -261,183 +295,6 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
     }
 }
 
-/// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
-#[derive(Debug)]
-pub struct Gradients<'a, T> {
-    /// Gradient of q, `[queries, heads·d_k]`.
-    pub dq: RowsMut<'a, T>,
-    /// Gradient of k, `[keys, heads·d_k]`.
-    pub dk: RowsMut<'a, T>,
-    /// Gradient of v, `[keys, heads·d_k]`.
-    pub dv: RowsMut<'a, T>,
-    /// Set or add for dq.
-    pub write_q: Write,
-    /// Set or add for dk.
-    pub write_k: Write,
-    /// Set or add for dv.
-    pub write_v: Write,
-}
-
-/// dq, dk, dv {=, +=} from do and what the forward pass took and gave.
-///
-/// # Panics
-/// As [`forward`].
-pub fn backward<T: Real>(
-    level: Level,
-    heads: usize,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
-    dropout: Option<Mask>,
-    o: Rows<'_, T>,
-    log_sum_exp: &[T],
-    d_o: Rows<'_, T>,
-    gradients: Gradients<'_, T>,
-    scratch: &mut [T],
-) {
-    let shape = Shape::of(heads, &q, &k, &v, &o, log_sum_exp.len());
-    crate::rows::same_shape(&o, &d_o);
-    crate::rows::same_shape(&q, &gradients.dq.view());
-    crate::rows::same_shape(&k, &gradients.dk.view());
-    crate::rows::same_shape(&v, &gradients.dv.view());
-    T::attention_backward(level, Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
-}
-
-pub(crate) struct Backward<'a, T> {
-    shape: Shape,
-    q: Rows<'a, T>,
-    k: Rows<'a, T>,
-    v: Rows<'a, T>,
-    dropout: Option<Mask>,
-    o: Rows<'a, T>,
-    log_sum_exp: &'a [T],
-    d_o: Rows<'a, T>,
-    gradients: Gradients<'a, T>,
-    scratch: &'a mut [T],
-}
-
-impl<T: Real> Tiled<T> for Backward<'_, T> {
-    #[inline(always)]
-    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let Shape { heads, queries, keys, size } = self.shape;
-        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
-        let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
-        let mut scratch = self.scratch;
-        let key_panels = take(&mut scratch, keys * wide);
-        let key_sums = take(&mut scratch, keys * wide);
-        let value_sums = take(&mut scratch, keys * wide);
-        let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * block));
-        let [query_panels, output_panels, query_sums] = [(); 3].map(|()| take(&mut scratch, block * wide));
-        let [scores, d_scores] = [(); 2].map(|()| take(&mut scratch, KEYS * block));
-        let [log_sum_exp, means] = [(); 2].map(|()| take(&mut scratch, block));
-        let (scale, keep_scale) = (self.shape.scale::<T>(), T::of(self.dropout.map_or(1.0, Mask::scale)));
-        for h in 0..heads {
-            let (q, k, v) = (self.q.columns(h * size, size), self.k.columns(h * size, size), self.v.columns(h * size, size));
-            let (o, d_o) = (self.o.columns(h * size, size), self.d_o.columns(h * size, size));
-            panels::<T, NR>(k, scale, keys, key_panels);
-            key_sums.fill(T::ZERO);
-            value_sums.fill(T::ZERO);
-            for first in (0..queries).step_by(block) {
-                let end = queries.min(first + block);
-                let (q_block, d_block) = (q.range(first, end), d_o.range(first, end));
-                // The dropout scale rides on do, the score scale on q and k.
-                lanes::<T, NR>(q_block, scale, query_lanes);
-                lanes::<T, NR>(d_block, keep_scale, output_lanes);
-                panels::<T, NR>(q_block, scale, block, query_panels);
-                panels::<T, NR>(d_block, keep_scale, block, output_panels);
-                log_sum_exp.fill(T::ZERO);
-                log_sum_exp[..end - first].copy_from_slice(&self.log_sum_exp[h * queries + first..h * queries + end]);
-                means.fill(T::ZERO);
-                for (lane, mean) in means[..end - first].iter_mut().enumerate() {
-                    *mean = o.row(first + lane).iter().zip(d_block.row(lane)).map(|(o, d)| *o * *d).sum();
-                }
-                let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
-                query_sums.fill(T::ZERO);
-                for key in (0..keys).step_by(KEYS) {
-                    let (key_end, count) = (keys.min(key + KEYS), KEYS.min(keys - key));
-                    let scores = &mut scores[..count * block];
-                    let d_scores = &mut d_scores[..count * block];
-                    product::<T, I, MR, NR>(k.range(key, key_end), query_lanes, RowsMut::packed(scores, count, block), Write::Set);
-                    product::<T, I, MR, NR>(
-                        v.range(key, key_end),
-                        output_lanes,
-                        RowsMut::packed(d_scores, count, block),
-                        Write::Set,
-                    );
-                    gradient_block::<T, I, NR>(block, key, mask.as_ref(), scores, d_scores, log_sum_exp, means);
-                    let target = |sums| RowsMut::packed(sums, count, wide);
-                    let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
-                    product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
-                    product::<T, I, MR, NR>(ds, query_panels, target(&mut key_sums[key * wide..key_end * wide]), Write::Add);
-                    transposed_product::<T, I, MR, NR>(ds, (key_panels, keys, key), RowsMut::packed(query_sums, block, wide));
-                }
-                emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
-            }
-            emit(key_sums, wide, keys, dk.reborrow().columns(h * size, size), write_k);
-            emit(value_sums, wide, keys, dv.reborrow().columns(h * size, size), write_v);
-        }
-    }
-}
-
-/// Over a block `[keys, lanes]` from key `first_key`, which is even: scores become m∘p, and the gradients of m∘p become those of the
-/// scores, p∘(m∘dp − D).
-#[inline(always)]
-fn gradient_block<T: Real, I: Isa, const NR: usize>(
-    block: usize,
-    first_key: usize,
-    mask: Option<&MaskLanes<QUERIES>>,
-    scores: &mut [T],
-    d_scores: &mut [T],
-    log_sum_exp: &[T],
-    means: &[T],
-) {
-    let lanes = log_sum_exp.as_chunks::<NR>().0.iter().zip(means.as_chunks::<NR>().0);
-    for (chunk, (&log_sum_exp, &means)) in lanes.enumerate() {
-        let pairs = scores.chunks_mut(2 * block).zip(d_scores.chunks_mut(2 * block));
-        for ((rows, d_rows), key) in pairs.zip((first_key..).step_by(2)) {
-            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
-            for (i, (row, d_row)) in rows.chunks_exact_mut(block).zip(d_rows.chunks_exact_mut(block)).enumerate() {
-                let (row, d_row) = (&mut row.as_chunks_mut::<NR>().0[chunk], &mut d_row.as_chunks_mut::<NR>().0[chunk]);
-                // In variables of their own, which nothing else can point to.
-                let (mut p, mut ds) = (*row, *d_row);
-                for (p, l) in p.iter_mut().zip(&log_sum_exp) {
-                    *p = exp_negative::<T, I>(*p - *l);
-                }
-                if let Some(keeps) = &keeps {
-                    ds.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
-                }
-                for ((ds, p), mean) in ds.iter_mut().zip(&p).zip(&means) {
-                    *ds = *p * (*ds - *mean);
-                }
-                if let Some(keeps) = &keeps {
-                    p.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
-                }
-                (*row, *d_row) = (p, ds);
-            }
-        }
-    }
-}
-
-/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block`, times `factor`; missing rows are zero.
-#[inline(always)]
-fn panels<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, block: usize, panels: &mut [T]) {
-    for (panel, c) in panels.chunks_exact_mut(block * NR).zip((0..).step_by(NR)) {
-        pad(x.columns(c, NR.min(x.cols() - c)), factor, NR, panel);
-    }
-}
-
-/// Stores the first `rows` of padded sums.
-#[inline(always)]
-fn emit<T: Real>(sums: &[T], wide: usize, rows: usize, mut y: RowsMut<'_, T>, write: Write) {
-    for (i, sums) in sums.chunks_exact(wide).take(rows).enumerate() {
-        let pairs = y.row_mut(i).iter_mut().zip(sums);
-        match write {
-            Write::Set => pairs.for_each(|(y, x)| *y = *x),
-            Write::Add => pairs.for_each(|(y, x)| *y += *x),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -445,7 +302,7 @@ mod tests {
     use super::*;
     use crate::random::Stream;
     use crate::reference;
-    use crate::testing::{Matrix, WRITES, assert_near, numbers};
+    use crate::testing::{Matrix, WRITES, assert_near, bits, numbers};
     use crate::tolerance::Tolerance;
 
     fn check<T: Real>((heads, size): (usize, usize), (queries, keys): (usize, usize), rate: Option<f64>, seed: u64) {
@@ -508,6 +365,36 @@ mod tests {
         {
             check::<f32>((2, size), (queries, keys), Some(0.2), 5);
             check::<f64>((2, size), (queries, keys), None, 5);
+        }
+    }
+
+    fn check_pieces<T: Real>((heads, size): (usize, usize), (queries, keys): (usize, usize), step: usize) {
+        let width = heads * size;
+        let q = Matrix::<T>::random(1, (queries, width));
+        let (k, v) = (Matrix::<T>::random(2, (keys, width)), Matrix::<T>::random(3, (keys, width)));
+        for dropout in [None, Some(Mask::new(Stream::new(4, 0, 0, 0), 0.2))] {
+            for level in Level::available() {
+                let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
+                let found = |step: usize, scratch: &mut [T]| {
+                    let (mut o, mut lse) = (Matrix::<T>::poisoned(5, (queries, width)), vec![T::NAN; queries * heads]);
+                    for (first, lse) in (0..queries).step_by(step).zip(lse.chunks_mut(step * heads)) {
+                        let o = o.view_mut().range(first, queries.min(first + step));
+                        forward_rows(level, heads, q.view(), k.view(), v.view(), dropout, first, o, lse, scratch);
+                    }
+                    o.check_gaps();
+                    (bits(&o.to_vec()), bits(&lse))
+                };
+                let (whole, pieces) = (found(queries, &mut scratch), found(step, &mut scratch));
+                assert!(pieces == whole, "{queries} queries in pieces of {step} at {level}");
+            }
+        }
+    }
+
+    #[test]
+    fn pieces_have_the_bits_of_the_whole() {
+        for (queries, keys, step) in [(97, 70, CUT), (192, 64, CUT), (250, 33, CUT), (250, 130, 2 * CUT)] {
+            check_pieces::<f32>((2, 16), (queries, keys), step);
+            check_pieces::<f64>((3, 5), (queries, keys), step);
         }
     }
 

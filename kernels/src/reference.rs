@@ -104,7 +104,7 @@ pub fn erf(x: f64) -> f64 {
     total * (-x * x).exp() * std::f64::consts::FRAC_2_SQRT_PI
 }
 
-/// o = dropout(softmax(q·kᵀ/√d_k))·v a head, every map stored; also the row log-sum-exp `[heads, queries]`.
+/// o = dropout(softmax(q·kᵀ/√d_k))·v a head, every map stored; also the row log-sum-exp `[queries, heads]`.
 pub fn attention<T: Real>(
     heads: usize,
     q: Rows<'_, T>,
@@ -118,7 +118,7 @@ pub fn attention<T: Real>(
     for h in 0..heads {
         let (dropped, lse) = probabilities(heads, h, q, k, dropout);
         for i in 0..q.rows() {
-            log_sum_exp[h * q.rows() + i] = T::of(lse[i]);
+            log_sum_exp[i * heads + h] = T::of(lse[i]);
             for c in 0..size {
                 o.row_mut(i)[h * size + c] = sum((0..k.rows()).map(|j| dropped[i][j].1 * v.row(j)[h * size + c].f64()));
             }

@@ -98,6 +98,11 @@ pub(crate) fn assert_near<T: Real>(what: &str, found: &[T], expected: &[T], tole
     }
 }
 
+/// The numbers as bits (of their exact widening), for comparisons that tell −0 from 0.
+pub(crate) fn bits<T: Real>(numbers: &[T]) -> Vec<u64> {
+    numbers.iter().map(|number| number.f64().to_bits()).collect()
+}
+
 /// Σ x∘y in f64, to compare both sides of <A x, y> = <x, Aᵀ y>.
 pub(crate) fn inner<T: Real>(x: &[T], y: &[T]) -> f64 {
     assert_eq!(x.len(), y.len());

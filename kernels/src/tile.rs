@@ -20,6 +20,9 @@ pub(crate) const WIDEST: usize = 32;
 /// Rows of the left operand that pass over one panel before the next panel is taken: they stay in the second-level cache.
 const ROW_BLOCK: usize = 240;
 
+/// A multiple of the height of every tile of this architecture: cut here, rows are in the same tiles as uncut.
+pub(crate) const CUT: usize = if cfg!(target_arch = "aarch64") { 8 } else { 12 };
+
 /// Lines of a panel that the column form takes at a time: with a left operand of 64 columns, 30 KiB in f32.
 pub(crate) const COLUMN_DEPTH: usize = 96;
 
@@ -246,6 +249,7 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     panels: &[T],
     sink: &mut S,
 ) {
+    const { assert!(CUT.is_multiple_of(MR) && ROW_BLOCK.is_multiple_of(CUT), "a cut, or a block, ends inside a tile") };
     let (m, lines) = (left.rows(), left.taps() * left.depth());
     if lines == 0 {
         for (i, j) in (0..m).flat_map(|i| (0..n).step_by(NR).map(move |j| (i, j))) {

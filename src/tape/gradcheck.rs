@@ -1,13 +1,15 @@
 //! Checks of backward passes against differences of the forward pass, in f64, and of what every backward pass must satisfy.
 //!
 //! For one operation ([`operation`]): the full Jacobian for small shapes and directional derivatives otherwise, `Set` and `Add`,
-//! linearity in dy, f32 against f64, every instruction-set level, and buffers full of NaN where nothing may be read. For a
+//! linearity in dy, f32 against f64, every instruction-set level, the forward pass in pieces, and buffers full of NaN where nothing may be read. For a
 //! whole graph ([`graph`]): directional derivatives along every parameter tensor. The numeric derivative is the four-point
 //! central difference (Richardson's extrapolation of the two-point one) at two steps; where the two disagree there is a kink
 //! between the points, and another point is drawn. This file knows no operation.
 
 use super::op::{Backward, Differentiable, Forward, Gradient, MAX_OPERANDS, Op};
-use super::{DropoutKey, Fill, Graph, Session, Shape, Threads, Var};
+use super::slab::Slabs;
+use super::threads::Parallelism;
+use super::{DropoutKey, Fill, Graph, Parts, Session, Shape, Threads, Var};
 use crate::error::Error;
 use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
@@ -28,6 +30,9 @@ const SMALLEST_NORM: f64 = 1e-3;
 
 /// Points drawn before giving up on finding one away from every kink.
 const ATTEMPTS: u64 = 8;
+
+/// Up to this many pieces of a forward pass are compared with the whole.
+const MOST_PIECES: usize = 3;
 
 /// Up to this many elements of operand times result, the full Jacobian is compared.
 const FULL_JACOBIAN: usize = 200;
@@ -113,6 +118,10 @@ impl<'a, T: Real> Trial<'a, T> {
 
     /// Result and workspace; both start as NaN, and so does the scratch.
     fn forward(&self, x: &[Vec<T>]) -> (Vec<T>, Vec<T>) {
+        self.forward_in(Parts::ONE, x)
+    }
+
+    fn forward_in(&self, parts: Parts<'_, T>, x: &[Vec<T>]) -> (Vec<T>, Vec<T>) {
         let memory = self.op.memory(&self.shapes);
         let nan = |len| vec![T::NAN; len];
         let (mut y, mut workspace, mut scratch) = (nan(self.result.len()), nan(memory.workspace), nan(memory.forward_scratch));
@@ -125,6 +134,7 @@ impl<'a, T: Real> Trial<'a, T> {
             packed: &[],
             shapes: &self.shapes,
             level: self.level,
+            parts,
             stream: self.stream,
             coupled: None,
         });
@@ -191,7 +201,10 @@ pub fn operation<O: Op<f64> + Op<f32>>(op: &O, operands: &[&[usize]]) -> Checked
             let double = Trial::<f64>::new(op, operands, level, stream)?;
             jacobian(&double)?;
             rules(&double)?;
-            precision(&double, &Trial::<f32>::new(op, operands, level, stream)?)?;
+            let single = Trial::<f32>::new(op, operands, level, stream)?;
+            precision(&double, &single)?;
+            pieces(&double)?;
+            pieces(&single)?;
         }
     }
     Ok(())
@@ -278,6 +291,21 @@ fn precision(double: &Trial<'_, f64>, single: &Trial<'_, f32>) -> Checked {
     } else {
         Err(double.fault(format!("f32 against f64: off by {worst:e}")))
     }
+}
+
+/// The forward pass has the same bits in pieces as in one.
+fn pieces<T: Real>(trial: &Trial<'_, T>) -> Checked {
+    let x = trial.operands(3);
+    let (y, workspace) = trial.forward(&x);
+    for count in 2..=MOST_PIECES {
+        let slabs = Slabs::new(count, trial.op.memory(&trial.shapes).forward_scratch);
+        let cut = trial.forward_in(Parts::of(Parallelism::Sequential, &slabs, 1), &x);
+        let pairs = cut.0.iter().zip(&y).chain(cut.1.iter().zip(&workspace));
+        if pairs.into_iter().any(|(cut, whole)| cut.f64().to_bits() != whole.f64().to_bits()) {
+            return Err(trial.fault(format!("other bits in {count} pieces than in one")));
+        }
+    }
+    Ok(())
 }
 
 /// Gradients of a whole graph's mean loss: directional derivatives along each parameter tensor, and along all at once.

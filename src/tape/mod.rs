@@ -10,11 +10,16 @@ pub mod ops;
 
 mod graph;
 mod parameter;
+mod parts;
 mod plan;
 mod session;
 mod shape;
+mod slab;
+mod threads;
 
 pub use graph::{Graph, MAX_INPUTS, Var};
 pub use parameter::{Parameter, Storage};
-pub use session::{DropoutKey, Fill, SHARDS, Session, Threads};
+pub use parts::Parts;
+pub use session::{DropoutKey, Fill, SHARDS, Session};
 pub use shape::{MAX_RANK, Shape};
+pub use threads::Threads;

@@ -1,6 +1,7 @@
 //! What an operation of the tape is: a shape rule, what it keeps, a forward pass and, if it can be trained through, a
 //! backward pass. The operations themselves are in `ops`, one file each; this file knows none of them.
 
+use super::parts::Parts;
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::level::Level;
@@ -83,6 +84,8 @@ pub struct Forward<'a, T> {
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
     pub level: Level,
+    /// For large operations: in how many pieces to work.
+    pub parts: Parts<'a, T>,
     /// Random stream of this operation, step and sample; `None` when random parts are off. Counter-based: the backward pass
     /// and any thread make the same numbers again.
     pub stream: Option<Stream>,

@@ -1,33 +1,30 @@
 //! Replaying a plan: one sample at a time, one worker a core, the same bits on any number of threads.
 //!
 //! The batch is the outermost loop. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
-//! gradient slab of its own; shards are summed in order. So neither the number of threads nor their timing can change a bit.
+//! gradient slab of its own; shards are summed in order. Where there are fewer samples than threads, large operations work on pieces
+//! of their rows, which have the bits of the whole. So neither the number of threads nor their timing can change a bit.
 //! In the steady state (no more samples than in an earlier call) nothing is allocated.
 //!
-//! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic but the sum over shards.
+//! This file owns the memory and is the interface; what happens in a step is in `packing`, `replay` (or `lockstep`) and `shards`.
 
-use super::graph::{Graph, MAX_INPUTS, Var};
-use super::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS, Pack, Pass};
-use super::plan::{ALIGNMENT_BYTES, Piece, Plan, Role, Step, alignment};
+use super::graph::{Graph, Var};
+use super::op::Pass;
+use super::plan::Plan;
+use super::slab::{Slab, Slabs};
+use super::threads::{Threads, Workers};
 use crate::error::{Error, Result};
 use lockstep::Lockstep;
+use packing::pack;
+use phyture_kernels::Real;
 use phyture_kernels::level::Level;
-use phyture_kernels::random::Stream;
-use phyture_kernels::{Real, Write};
-use std::sync::{Mutex, PoisonError};
+use replay::Replay;
+pub use shards::SHARDS;
+use shards::{Shard, reduce};
 
 mod lockstep;
-
-/// Gradient shards of a training session: a constant, so that the order of summation is one. More than this many threads bring
-/// nothing in training.
-pub const SHARDS: usize = 8;
-
-/// Elements summed over the shards at a time, so that the sum stays in cache.
-const REDUCE_BLOCK: usize = 4096;
-
-/// How many threads a session works on; 0 means all cores. Without the feature `rayon`, always the calling one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Threads(pub usize);
+mod packing;
+mod replay;
+mod shards;
 
 /// Key of the random streams of one training step. With the same key the same dropout masks are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,34 +38,13 @@ pub struct DropoutKey {
 /// Fills the inputs of one sample, in the order in which the graph recorded them; called on worker threads.
 pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
 
-/// Activations, gradients of activations, workspaces and scratch of one sample, at an aligned start.
-struct Slab<T> {
-    numbers: Vec<T>,
-    len: usize,
-}
-
-impl<T: Real> Slab<T> {
-    fn new(len: usize) -> Self {
-        Self { numbers: vec![T::ZERO; len + alignment::<T>()], len }
-    }
-
-    fn aligned(&mut self) -> &mut [T] {
-        let skip = self.numbers.as_ptr().align_offset(ALIGNMENT_BYTES).min(alignment::<T>());
-        self.numbers.get_mut(skip..skip + self.len).unwrap_or_default()
-    }
-}
-
-/// Parameter gradients of the samples of one shard.
-struct Shard<T> {
-    gradients: Vec<T>,
-}
-
 /// A plan with its memory, ready to be replayed.
 pub struct Session<T> {
     plan: Plan<T>,
     level: Level,
     poison: bool,
-    slabs: Mutex<Vec<Slab<T>>>,
+    /// One for each thread that may work on samples.
+    slabs: Slabs<T>,
     /// Weights as the forward and the backward calls of a step want them.
     packed: [Slab<T>; 2],
     shards: Vec<Shard<T>>,
@@ -78,8 +54,7 @@ pub struct Session<T> {
     results: Vec<T>,
     /// All samples of a step at once, for a plan that couples them.
     lockstep: Option<Lockstep<T>>,
-    #[cfg(feature = "rayon")]
-    pool: Option<rayon::ThreadPool>,
+    workers: Workers,
 }
 
 impl<T: Real> Session<T> {
@@ -108,8 +83,7 @@ impl<T: Real> Session<T> {
             expected: "a level of this processor, or nothing".into(),
         })?;
         let trains = plan.loss.is_some();
-        let count = if threads.0 == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { threads.0 };
-        let count = if cfg!(feature = "rayon") { count } else { 1 };
+        let count = threads.count();
         // Inference has nothing to sum, so its number of shards is free.
         let shards = if trains { SHARDS } else { SHARDS.max(count) };
         let gradient_len = if trains { plan.parameter_len } else { 0 };
@@ -117,14 +91,13 @@ impl<T: Real> Session<T> {
             level,
             poison: false,
             packed: plan.packed_len.map(Slab::new),
-            slabs: Mutex::new((0..count.min(shards)).map(|_| Slab::new(plan.slab_len)).collect()),
+            slabs: Slabs::new(count.min(shards), plan.slab_len),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
             losses: Vec::new(),
             results: Vec::new(),
             lockstep: plan.forward.iter().any(|step| step.op.coupling().is_some()).then(Lockstep::default),
-            #[cfg(feature = "rayon")]
-            pool: if count > 1 { Some(pool(count)?) } else { None },
+            workers: Workers::new(count)?,
             plan,
         })
     }
@@ -161,34 +134,38 @@ impl<T: Real> Session<T> {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
-        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, .. } = self;
+        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
-        let mut work = || {
+        workers.run(|parallelism| {
             let [forward, backward] = packed.each_mut().map(Slab::aligned);
-            join(
-                || pack(&plan.forward, Pass::Forward, level, parameters, 0, forward),
-                || pack(&plan.backward, Pass::Backward, level, parameters, 0, backward),
+            parallelism.join(
+                || pack(parallelism, &plan.forward, Pass::Forward, level, parameters, 0, forward),
+                || pack(parallelism, &plan.backward, Pass::Backward, level, parameters, 0, backward),
             );
-            let packed = [&*forward, &*backward];
-            let replay =
-                Replay { plan, level, poison, slabs, packed, parameters, dropout, fill, samples, result_len, shards: count };
+            let replay = Replay {
+                plan,
+                level,
+                poison,
+                parallelism,
+                slabs,
+                packed: [&*forward, &*backward],
+                parameters,
+                dropout,
+                fill,
+                samples,
+                result_len,
+                shards: count,
+            };
             match lockstep.as_mut().filter(|_| dropout.is_some()) {
                 Some(lockstep) => lockstep.run(&replay, shards, losses_mut, results),
                 None => replay.work(shards, 0, losses_mut, results),
             }
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
-            reduce(gradients, shards, &used, 0);
-        };
-        #[cfg(feature = "rayon")]
-        match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
-        }
-        #[cfg(not(feature = "rayon"))]
-        work();
+            reduce(parallelism, gradients, shards, &used, 0);
+        });
         for range in &self.plan.unreached {
             if let Some(gradients) = self.gradients.get_mut(range.clone()) {
                 gradients.fill(T::ZERO);
@@ -262,251 +239,6 @@ impl<T: Real> Session<T> {
     }
 }
 
-#[cfg(feature = "rayon")]
-fn pool(threads: usize) -> Result<rayon::ThreadPool> {
-    let named = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("phyture-{index}"));
-    named.build().map_err(|error| Error::Config {
-        place: "session".into(),
-        field: "threads".into(),
-        found: format!("{threads} ({error})"),
-        expected: "a number of threads that the system can start".into(),
-    })
-}
-
-/// Two closures, on two threads if a pool is there.
-fn join(a: impl FnOnce() + Send, b: impl FnOnce() + Send) {
-    #[cfg(feature = "rayon")]
-    if rayon::current_thread_index().is_some() {
-        rayon::join(a, b);
-        return;
-    }
-    a();
-    b();
-}
-
-/// Packs the weights of a list of steps, whose packed forms lie one after another from `start` on.
-fn pack<T: Real>(steps: &[Step<T>], pass: Pass, level: Level, parameters: &[T], start: usize, packed: &mut [T]) {
-    match steps {
-        [] => {}
-        [step] => {
-            if let Some((weight, range)) = &step.packed {
-                let (weight, packed) = (&parameters[weight.clone()], &mut packed[range.start - start..range.end - start]);
-                step.op.pack(Pack { pass, weight, packed, shapes: &step.shapes, level });
-            }
-        }
-        _ => {
-            let (low, high) = steps.split_at(steps.len() / 2);
-            let middle = low.iter().rev().find_map(|step| step.packed.as_ref()).map_or(start, |(_, range)| range.end);
-            let (low_packed, high_packed) = packed.split_at_mut(middle - start);
-            join(
-                || pack(low, pass, level, parameters, start, low_packed),
-                || pack(high, pass, level, parameters, middle, high_packed),
-            );
-        }
-    }
-}
-
-/// gradients = Σ shards, element by element in the order of the shards.
-fn reduce<T: Real>(gradients: &mut [T], shards: &[Shard<T>], used: &(dyn Fn(usize) -> bool + Sync), start: usize) {
-    if gradients.len() > REDUCE_BLOCK {
-        let half = (gradients.len() / 2).next_multiple_of(REDUCE_BLOCK);
-        let (low, high) = gradients.split_at_mut(half.min(gradients.len()));
-        return join(|| reduce(low, shards, used, start), || reduce(high, shards, used, start + half));
-    }
-    gradients.fill(T::ZERO);
-    for (_, shard) in shards.iter().enumerate().filter(|(index, _)| used(*index)) {
-        let part = shard.gradients.get(start..).unwrap_or_default();
-        gradients.iter_mut().zip(part).for_each(|(sum, part)| *sum += *part);
-    }
-}
-
-/// What all workers of one step share.
-struct Replay<'a, T> {
-    plan: &'a Plan<T>,
-    level: Level,
-    poison: bool,
-    slabs: &'a Mutex<Vec<Slab<T>>>,
-    packed: [&'a [T]; 2],
-    parameters: &'a [T],
-    dropout: Option<DropoutKey>,
-    fill: Fill<'a, T>,
-    samples: usize,
-    result_len: usize,
-    shards: usize,
-}
-
-impl<T: Real> Replay<'_, T> {
-    /// First sample of a shard: shards are as equal as they can be, and depend on the number of samples alone.
-    const fn first_sample(&self, shard: usize) -> usize {
-        shard * self.samples / self.shards
-    }
-
-    fn work(&self, shards: &mut [Shard<T>], first: usize, losses: &mut [f64], results: &mut [T]) {
-        match shards {
-            [] => {}
-            [shard] => self.shard(shard, self.first_sample(first), losses, results),
-            _ => {
-                let (low, high) = shards.split_at_mut(shards.len() / 2);
-                let middle = first + low.len();
-                let samples = self.first_sample(middle) - self.first_sample(first);
-                let (low_losses, high_losses) = losses.split_at_mut(samples);
-                let (low_results, high_results) = results.split_at_mut(samples * self.result_len);
-                join(|| self.work(low, first, low_losses, low_results), || self.work(high, middle, high_losses, high_results));
-            }
-        }
-    }
-
-    fn shard(&self, shard: &mut Shard<T>, first: usize, losses: &mut [f64], results: &mut [T]) {
-        if losses.is_empty() {
-            return;
-        }
-        let lock = || self.slabs.lock().unwrap_or_else(PoisonError::into_inner);
-        // There are as many slabs as threads, and a thread holds one at a time.
-        let mut slab = lock().pop().unwrap_or_else(|| Slab::new(self.plan.slab_len));
-        for (index, loss) in losses.iter_mut().enumerate() {
-            let result = &mut results[index * self.result_len..][..self.result_len];
-            *loss = self.sample(slab.aligned(), &mut shard.gradients, first + index, index == 0, result);
-        }
-        lock().push(slab);
-    }
-
-    /// Fills the inputs of a sample.
-    fn begin(&self, slab: &mut [T], sample: usize) {
-        if self.poison {
-            slab.fill(T::NAN);
-        }
-        let mut inputs: [&mut [T]; MAX_INPUTS] = std::array::from_fn(|_| Default::default());
-        let count = self.plan.inputs.len();
-        carve(slab, &self.plan.inputs, |role, piece| {
-            if let Role::X(index) = role {
-                inputs[index] = piece;
-            }
-        });
-        (self.fill)(sample, &mut inputs[..count]);
-    }
-
-    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
-        self.begin(slab, sample);
-        for step in &self.plan.forward {
-            step.op.forward(self.forward(step, slab, sample, None));
-        }
-        let mut loss = 0.0;
-        if let Some((value, gradient)) = self.plan.loss {
-            loss = slab[value].f64();
-            slab[gradient] = T::of(1.0 / self.samples as f64);
-            for step in &self.plan.backward {
-                if let Some(differentiable) = step.op.differentiable() {
-                    differentiable.backward(self.backward(step, slab, gradients, (sample, first), None));
-                }
-            }
-        }
-        self.finish(slab, result);
-        loss
-    }
-
-    /// Copies outputs and gradients of inputs.
-    fn finish(&self, slab: &[T], result: &mut [T]) {
-        let mut result = result;
-        for range in self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()) {
-            let (now, later) = result.split_at_mut(range.len());
-            now.copy_from_slice(&slab[range.clone()]);
-            result = later;
-        }
-    }
-
-    fn stream(&self, step: &Step<T>, sample: usize) -> Option<Stream> {
-        self.dropout.map(|key| Stream::new(key.seed, key.step, step.site, sample as u64))
-    }
-
-    /// What the forward pass of a step is given.
-    fn forward<'b>(
-        &'b self,
-        step: &'b Step<T>,
-        slab: &'b mut [T],
-        sample: usize,
-        coupled: Option<Coupled<'b, T>>,
-    ) -> Forward<'b, T> {
-        let mut io = Forward {
-            x: [&[]; MAX_OPERANDS],
-            y: Default::default(),
-            workspace: Default::default(),
-            scratch: Default::default(),
-            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[0][range.clone()]),
-            shapes: &step.shapes,
-            level: self.level,
-            stream: self.stream(step, sample),
-            coupled,
-        };
-        for (index, range) in &step.parameters {
-            io.x[*index] = &self.parameters[range.clone()];
-        }
-        carve(slab, &step.pieces, |role, piece| match role {
-            Role::X(index) => io.x[index] = piece,
-            Role::Y => io.y = piece,
-            Role::Workspace => io.workspace = piece,
-            Role::Scratch => io.scratch = piece,
-            Role::Dy | Role::Dx(..) => {}
-        });
-        io
-    }
-
-    /// What the backward pass of a step is given; the first sample of a shard sets parameter gradients.
-    fn backward<'b>(
-        &'b self,
-        step: &'b Step<T>,
-        slab: &'b mut [T],
-        gradients: &'b mut [T],
-        (sample, first): (usize, bool),
-        coupled: Option<Coupled<'b, T>>,
-    ) -> Backward<'b, T> {
-        let mut io = Backward {
-            x: [&[]; MAX_OPERANDS],
-            y: &[],
-            dy: &[],
-            workspace: &[],
-            dx: [const { None }; MAX_OPERANDS],
-            scratch: Default::default(),
-            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[1][range.clone()]),
-            shapes: &step.shapes,
-            level: self.level,
-            stream: self.stream(step, sample),
-            coupled,
-        };
-        for (index, range) in &step.parameters {
-            io.x[*index] = &self.parameters[range.clone()];
-        }
-        carve(slab, &step.pieces, |role, piece| match role {
-            Role::X(index) => io.x[index] = piece,
-            Role::Y => io.y = piece,
-            Role::Workspace => io.workspace = piece,
-            Role::Scratch => io.scratch = piece,
-            Role::Dy => io.dy = piece,
-            Role::Dx(index, write) => io.dx[index] = Some(Gradient { values: piece, write }),
-        });
-        carve(gradients, &step.parameter_gradients, |role, piece| {
-            if let Role::Dx(index, write) = role {
-                // Over the samples of a shard the gradients add up; the first sample sets.
-                let write = if first { write } else { Write::Add };
-                io.dx[index] = Some(Gradient { values: piece, write });
-            }
-        });
-        io
-    }
-}
-
-/// Hands out disjoint pieces of a slab, sorted by start.
-fn carve<'a, T>(slab: &'a mut [T], pieces: &[Piece], mut take: impl FnMut(Role, &'a mut [T])) {
-    let mut rest = slab;
-    let mut position = 0;
-    for piece in pieces {
-        let (_, tail) = std::mem::take(&mut rest).split_at_mut(piece.start - position);
-        let (taken, tail) = tail.split_at_mut(piece.len);
-        take(piece.role, taken);
-        rest = tail;
-        position = piece.start + piece.len;
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::gradcheck;
@@ -514,6 +246,7 @@ mod tests {
     use super::super::plan::tests::{random_graph, recipe};
     use super::*;
     use phyture_kernels::Tolerance;
+    use phyture_kernels::random::Stream;
     use proptest::prelude::*;
 
     const KEY: Option<DropoutKey> = Some(DropoutKey { seed: 4, step: 2 });

@@ -1,15 +1,15 @@
 //! Multi-head attention without the projections (paper eqs. 21–23), with dropout on the probabilities while training.
 //!   o = (m∘softmax(q·kᵀ/√d_k)/(1−p))·v for each head;  dq, dk, dv by recomputation from the kept log-sum-exp
-//! q, o [queries, d]; k, v [keys, d]; head h is columns h·d_k … (h+1)·d_k. No score map is stored. Kept: `[heads, queries]`.
+//! q, o [queries, d]; k, v [keys, d]; head h is columns h·d_k … (h+1)·d_k. No score map is stored. Kept: `[queries, heads]`.
 
 use super::{or_scratch, rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
-use phyture_kernels::Real;
 use phyture_kernels::attention::{self, Gradients};
 use phyture_kernels::dropout::Mask;
 use phyture_kernels::random::Stream;
+use phyture_kernels::{Real, RowsMut};
 
 /// Operands q, k, v.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,11 +50,13 @@ impl<T: Real> Op<T> for Attention {
     }
 
     fn forward(&self, io: Forward<'_, T>) {
-        let [q, k, ..] = io.shapes else { return };
-        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
+        let [shape, keys, ..] = io.shapes else { return };
+        let (q, k, v) = (rows(io.x[0], shape), rows(io.x[1], keys), rows(io.x[2], keys));
         let mask = self.mask(io.stream);
-        let o = rows_mut(io.y, q);
-        attention::forward(io.level, self.heads, operands.0, operands.1, operands.2, mask, o, io.workspace, io.scratch);
+        io.parts.rows(q.rows(), attention::CUT, [io.y, io.workspace], io.scratch, |piece, [o, lse], scratch| {
+            let o = RowsMut::packed(o, piece.len(), q.cols());
+            attention::forward_rows(io.level, self.heads, q, k, v, mask, piece.start, o, lse, scratch);
+        });
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -97,5 +99,6 @@ mod tests {
 
     gradcheck!(attention: TWO_HEADS, [[5, 6], [7, 6], [7, 6]], [[3, 2], [2, 2], [2, 2]], [[1, 2], [1, 2], [1, 2]]);
     gradcheck!(several_blocks: TWO_HEADS, [[70, 4], [90, 4], [90, 4]]);
+    gradcheck!(in_pieces: TWO_HEADS, [[300, 4], [7, 4], [7, 4]]);
     gradcheck!(one_head_as_wide_as_the_paper: Attention { heads: 1, dropout: 0.0 }, [[9, 16], [9, 16], [9, 16]]);
 }

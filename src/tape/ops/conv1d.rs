@@ -113,10 +113,14 @@ impl<T: Real> Op<T> for Conv1d {
 
     fn forward(&self, io: Forward<'_, T>) {
         let ([x, _, bias @ ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
-        let y = RowsMut::packed(io.y, sizes.geometry.output_rows(sizes.rows), sizes.outputs);
+        let Sizes { geometry, outputs, .. } = sizes;
+        let (x, weight) = (rows(io.x[0], x), weight(io.x[1], io.packed));
         let bias = (!bias.is_empty()).then_some(io.x[2]);
         let epilogue = self.epilogue.kernel(io.stream);
-        conv1d::forward(io.level, sizes.geometry, rows(io.x[0], x), weight(io.x[1], io.packed), bias, epilogue, y, io.scratch);
+        io.parts.rows(geometry.output_rows(sizes.rows), conv1d::CUT, [io.y], io.scratch, |piece, [y], scratch| {
+            let y = RowsMut::packed(y, piece.len(), outputs);
+            conv1d::forward_rows(io.level, geometry, x, weight, bias, epilogue, piece.start, y, scratch);
+        });
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -168,6 +172,7 @@ mod tests {
 
     gradcheck!(plain: PLAIN, [[9, 3], [3, 3, 4], [4]], [[9, 3], [3, 3, 4]], [[3, 1], [3, 1, 2], [2]]);
     gradcheck!(padded_leaky_dropout: LEAKY, [[8, 3], [5, 3, 4], [4]], [[1, 1], [5, 1, 1], [1]], [[2, 2], [5, 2, 1], [1]]);
+    gradcheck!(in_pieces: LEAKY, [[26, 1], [5, 1, 2], [2]], [[36, 1], [5, 1, 1], [1]]);
     gradcheck!(tanh: TANH, [[9, 3], [3, 3, 4], [4]], [[3, 1], [3, 1, 2], [2]]);
     gradcheck!(uneven_padding: Conv1d { padding: (2, 3), epilogue: Epilogue::None }, [[6, 2], [4, 2, 3], [3]]);
 }

@@ -4,9 +4,11 @@
 //! and all go on; likewise backward. Shards, their gradients and the order of summation are those of the session, so that again the
 //! number of threads changes no bit.
 
-use super::{Replay, Shard, Slab, join};
+use super::replay::Replay;
+use super::shards::Shard;
 use crate::tape::op::{Coupled, Pass};
 use crate::tape::plan::{Plan, Step};
+use crate::tape::slab::Slab;
 use phyture_kernels::Real;
 use std::ops::Range;
 
@@ -46,7 +48,7 @@ fn each<T: Real>(replay: &Replay<'_, T>, shards: &mut [Shard<T>], first: usize, 
             let (low, high) = shards.split_at_mut(shards.len() / 2);
             let middle = first + low.len();
             let (low_lanes, high_lanes) = lanes.split_at_mut(replay.first_sample(middle) - replay.first_sample(first));
-            join(|| each(replay, low, first, low_lanes, work), || each(replay, high, middle, high_lanes, work));
+            replay.parallelism.join(|| each(replay, low, first, low_lanes, work), || each(replay, high, middle, high_lanes, work));
         }
     }
 }

@@ -1,0 +1,183 @@
+//! Gradients of attention: p = e^(s − ℓ) and the dropout mask m are made again, block by block (Dao 2023, FlashAttention-2).
+//!
+//! ```text
+//! D = rowsum(do∘o),  dp = m∘(do·vᵀ)/(1 − rate),  ds = p∘(dp − D)
+//! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do
+//! ```
+
+use super::{KEYS, QUERIES, Shape, block_of_queries, lanes, panels, product, take, transposed_product};
+use crate::dropout::{Mask, MaskLanes};
+use crate::elementary::exp_negative;
+use crate::level::{Isa, Level, Tiled};
+use crate::{Real, Rows, RowsMut, Write};
+
+/// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
+#[derive(Debug)]
+pub struct Gradients<'a, T> {
+    /// Gradient of q, `[queries, heads·d_k]`.
+    pub dq: RowsMut<'a, T>,
+    /// Gradient of k, `[keys, heads·d_k]`.
+    pub dk: RowsMut<'a, T>,
+    /// Gradient of v, `[keys, heads·d_k]`.
+    pub dv: RowsMut<'a, T>,
+    /// Set or add for dq.
+    pub write_q: Write,
+    /// Set or add for dk.
+    pub write_k: Write,
+    /// Set or add for dv.
+    pub write_v: Write,
+}
+
+/// dq, dk, dv {=, +=} from do and what the forward pass took and gave.
+///
+/// # Panics
+/// As [`forward`](super::forward).
+pub fn backward<T: Real>(
+    level: Level,
+    heads: usize,
+    q: Rows<'_, T>,
+    k: Rows<'_, T>,
+    v: Rows<'_, T>,
+    dropout: Option<Mask>,
+    o: Rows<'_, T>,
+    log_sum_exp: &[T],
+    d_o: Rows<'_, T>,
+    gradients: Gradients<'_, T>,
+    scratch: &mut [T],
+) {
+    let shape = Shape::of(heads, &q, &k, &v, &o, log_sum_exp);
+    crate::rows::same_shape(&q, &o);
+    crate::rows::same_shape(&o, &d_o);
+    crate::rows::same_shape(&q, &gradients.dq.view());
+    crate::rows::same_shape(&k, &gradients.dk.view());
+    crate::rows::same_shape(&v, &gradients.dv.view());
+    T::attention_backward(level, Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
+}
+
+pub(crate) struct Backward<'a, T> {
+    shape: Shape,
+    q: Rows<'a, T>,
+    k: Rows<'a, T>,
+    v: Rows<'a, T>,
+    dropout: Option<Mask>,
+    o: Rows<'a, T>,
+    log_sum_exp: &'a [T],
+    d_o: Rows<'a, T>,
+    gradients: Gradients<'a, T>,
+    scratch: &'a mut [T],
+}
+
+impl<T: Real> Tiled<T> for Backward<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Shape { heads, queries, keys, size } = self.shape;
+        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
+        let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
+        let mut scratch = self.scratch;
+        let key_panels = take(&mut scratch, keys * wide);
+        let key_sums = take(&mut scratch, keys * wide);
+        let value_sums = take(&mut scratch, keys * wide);
+        let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * block));
+        let [query_panels, output_panels, query_sums] = [(); 3].map(|()| take(&mut scratch, block * wide));
+        let [scores, d_scores] = [(); 2].map(|()| take(&mut scratch, KEYS * block));
+        let [log_sum_exp, means] = [(); 2].map(|()| take(&mut scratch, block));
+        let (scale, keep_scale) = (self.shape.scale::<T>(), T::of(self.dropout.map_or(1.0, Mask::scale)));
+        for h in 0..heads {
+            let (q, k, v) = (self.q.columns(h * size, size), self.k.columns(h * size, size), self.v.columns(h * size, size));
+            let (o, d_o) = (self.o.columns(h * size, size), self.d_o.columns(h * size, size));
+            panels::<T, NR>(k, scale, keys, key_panels);
+            key_sums.fill(T::ZERO);
+            value_sums.fill(T::ZERO);
+            for first in (0..queries).step_by(block) {
+                let end = queries.min(first + block);
+                let (q_block, d_block) = (q.range(first, end), d_o.range(first, end));
+                // The dropout scale rides on do, the score scale on q and k.
+                lanes::<T, NR>(q_block, scale, query_lanes);
+                lanes::<T, NR>(d_block, keep_scale, output_lanes);
+                panels::<T, NR>(q_block, scale, block, query_panels);
+                panels::<T, NR>(d_block, keep_scale, block, output_panels);
+                log_sum_exp.fill(T::ZERO);
+                let rows = self.log_sum_exp[first * heads..end * heads].chunks_exact(heads);
+                log_sum_exp.iter_mut().zip(rows).for_each(|(lane, row)| *lane = row[h]);
+                means.fill(T::ZERO);
+                for (lane, mean) in means[..end - first].iter_mut().enumerate() {
+                    *mean = o.row(first + lane).iter().zip(d_block.row(lane)).map(|(o, d)| *o * *d).sum();
+                }
+                let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
+                query_sums.fill(T::ZERO);
+                for key in (0..keys).step_by(KEYS) {
+                    let (key_end, count) = (keys.min(key + KEYS), KEYS.min(keys - key));
+                    let scores = &mut scores[..count * block];
+                    let d_scores = &mut d_scores[..count * block];
+                    product::<T, I, MR, NR>(k.range(key, key_end), query_lanes, RowsMut::packed(scores, count, block), Write::Set);
+                    product::<T, I, MR, NR>(
+                        v.range(key, key_end),
+                        output_lanes,
+                        RowsMut::packed(d_scores, count, block),
+                        Write::Set,
+                    );
+                    gradient_block::<T, I, NR>(block, key, mask.as_ref(), scores, d_scores, log_sum_exp, means);
+                    let target = |sums| RowsMut::packed(sums, count, wide);
+                    let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
+                    product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
+                    product::<T, I, MR, NR>(ds, query_panels, target(&mut key_sums[key * wide..key_end * wide]), Write::Add);
+                    transposed_product::<T, I, MR, NR>(ds, (key_panels, keys, key), RowsMut::packed(query_sums, block, wide));
+                }
+                emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
+            }
+            emit(key_sums, wide, keys, dk.reborrow().columns(h * size, size), write_k);
+            emit(value_sums, wide, keys, dv.reborrow().columns(h * size, size), write_v);
+        }
+    }
+}
+
+/// Over a block `[keys, lanes]` from key `first_key`, which is even: scores become m∘p, and the gradients of m∘p become those of the
+/// scores, p∘(m∘dp − D).
+#[inline(always)]
+fn gradient_block<T: Real, I: Isa, const NR: usize>(
+    block: usize,
+    first_key: usize,
+    mask: Option<&MaskLanes<QUERIES>>,
+    scores: &mut [T],
+    d_scores: &mut [T],
+    log_sum_exp: &[T],
+    means: &[T],
+) {
+    let lanes = log_sum_exp.as_chunks::<NR>().0.iter().zip(means.as_chunks::<NR>().0);
+    for (chunk, (&log_sum_exp, &means)) in lanes.enumerate() {
+        let pairs = scores.chunks_mut(2 * block).zip(d_scores.chunks_mut(2 * block));
+        for ((rows, d_rows), key) in pairs.zip((first_key..).step_by(2)) {
+            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
+            for (i, (row, d_row)) in rows.chunks_exact_mut(block).zip(d_rows.chunks_exact_mut(block)).enumerate() {
+                let (row, d_row) = (&mut row.as_chunks_mut::<NR>().0[chunk], &mut d_row.as_chunks_mut::<NR>().0[chunk]);
+                // In variables of their own, which nothing else can point to.
+                let (mut p, mut ds) = (*row, *d_row);
+                for (p, l) in p.iter_mut().zip(&log_sum_exp) {
+                    *p = exp_negative::<T, I>(*p - *l);
+                }
+                if let Some(keeps) = &keeps {
+                    ds.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
+                }
+                for ((ds, p), mean) in ds.iter_mut().zip(&p).zip(&means) {
+                    *ds = *p * (*ds - *mean);
+                }
+                if let Some(keeps) = &keeps {
+                    p.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
+                }
+                (*row, *d_row) = (p, ds);
+            }
+        }
+    }
+}
+
+/// Stores the first `rows` of padded sums.
+#[inline(always)]
+fn emit<T: Real>(sums: &[T], wide: usize, rows: usize, mut y: RowsMut<'_, T>, write: Write) {
+    for (i, sums) in sums.chunks_exact(wide).take(rows).enumerate() {
+        let pairs = y.row_mut(i).iter_mut().zip(sums);
+        match write {
+            Write::Set => pairs.for_each(|(y, x)| *y = *x),
+            Write::Add => pairs.for_each(|(y, x)| *y += *x),
+        }
+    }
+}

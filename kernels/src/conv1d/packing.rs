@@ -1,0 +1,74 @@
+//! The weight of a convolution as its products want it: in panels, packed by the call or once for many calls.
+//!
+//! Not here: any arithmetic.
+
+use super::Geometry;
+use crate::level::{Isa, Level, Tiled};
+use crate::{Real, Rows, tile};
+
+/// Numbers of a weight packed by [`pack`]; by [`pack_transposed`] with inputs and outputs exchanged.
+pub const fn packed_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    tile::panels_len(geometry.taps * inputs, outputs)
+}
+
+/// A weight `[taps, in, out]`, as it is or as packed once for many calls.
+#[derive(Clone, Copy, Debug)]
+pub enum Weight<'a, T> {
+    /// Packed by the call, in its scratch.
+    Plain(&'a [T]),
+    /// By [`pack`] for [`forward`](super::forward), by [`pack_transposed`] for [`backward_input`](super::backward_input), at the same
+    /// level.
+    Packed(&'a [T]),
+}
+
+/// Packs a weight for [`forward`](super::forward).
+///
+/// # Panics
+/// If lengths disagree.
+pub fn pack<T: Real>(level: Level, geometry: Geometry, (inputs, outputs): (usize, usize), weight: &[T], packed: &mut [T]) {
+    assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
+    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: false });
+}
+
+/// Packs a weight for [`backward_input`](super::backward_input).
+///
+/// # Panics
+/// If lengths disagree.
+pub fn pack_transposed<T: Real>(
+    level: Level,
+    geometry: Geometry,
+    (inputs, outputs): (usize, usize),
+    weight: &[T],
+    packed: &mut [T],
+) {
+    assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
+    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
+}
+
+pub(crate) struct Pack<'a, T> {
+    geometry: Geometry,
+    inputs: usize,
+    outputs: usize,
+    weight: &'a [T],
+    packed: &'a mut [T],
+    transposed: bool,
+}
+
+impl<T: Real> Tiled<T> for Pack<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Self { geometry: Geometry { taps, .. }, inputs, outputs, weight, packed, transposed } = self;
+        if weight.is_empty() {
+            return;
+        }
+        if !transposed {
+            let panels = &mut packed[..taps * inputs * outputs.next_multiple_of(NR)];
+            return tile::pack::<T, NR>(Rows::packed(weight, taps * inputs, outputs), panels);
+        }
+        let panels = &mut packed[..taps * outputs * inputs.next_multiple_of(NR)];
+        for j in 0..taps {
+            let row = |c: usize| &weight[(j * inputs + c) * outputs..][..outputs];
+            tile::pack_transposed::<T, NR>(outputs, inputs, 1, row, taps * outputs * NR, &mut panels[j * outputs * NR..]);
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! The steps of a plan on the samples of a step: shards side by side, the samples of a shard in order, each in a slab.
+//!
+//! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic.
+
+use super::shards::Shard;
+use super::{DropoutKey, Fill};
+use crate::tape::graph::MAX_INPUTS;
+use crate::tape::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS};
+use crate::tape::parts::Parts;
+use crate::tape::plan::{Piece, Plan, Role, Step};
+use crate::tape::slab::Slabs;
+use crate::tape::threads::Parallelism;
+use phyture_kernels::level::Level;
+use phyture_kernels::random::Stream;
+use phyture_kernels::{Real, Write};
+
+/// What all workers of one step share.
+pub(super) struct Replay<'a, T> {
+    pub plan: &'a Plan<T>,
+    pub level: Level,
+    pub poison: bool,
+    pub parallelism: Parallelism,
+    pub slabs: &'a Slabs<T>,
+    pub packed: [&'a [T]; 2],
+    pub parameters: &'a [T],
+    pub dropout: Option<DropoutKey>,
+    pub fill: Fill<'a, T>,
+    pub samples: usize,
+    pub result_len: usize,
+    pub shards: usize,
+}
+
+impl<T: Real> Replay<'_, T> {
+    /// First sample of a shard: shards are as equal as they can be, and depend on the number of samples alone.
+    pub const fn first_sample(&self, shard: usize) -> usize {
+        shard * self.samples / self.shards
+    }
+
+    pub fn work(&self, shards: &mut [Shard<T>], first: usize, losses: &mut [f64], results: &mut [T]) {
+        match shards {
+            [] => {}
+            [shard] => self.shard(shard, self.first_sample(first), losses, results),
+            _ => {
+                let (low, high) = shards.split_at_mut(shards.len() / 2);
+                let middle = first + low.len();
+                let samples = self.first_sample(middle) - self.first_sample(first);
+                let (low_losses, high_losses) = losses.split_at_mut(samples);
+                let (low_results, high_results) = results.split_at_mut(samples * self.result_len);
+                self.parallelism
+                    .join(|| self.work(low, first, low_losses, low_results), || self.work(high, middle, high_losses, high_results));
+            }
+        }
+    }
+
+    fn shard(&self, shard: &mut Shard<T>, first: usize, losses: &mut [f64], results: &mut [T]) {
+        if losses.is_empty() {
+            return;
+        }
+        self.slabs.lend(|slab| {
+            for (index, loss) in losses.iter_mut().enumerate() {
+                let result = &mut results[index * self.result_len..][..self.result_len];
+                *loss = self.sample(slab, &mut shard.gradients, first + index, index == 0, result);
+            }
+        });
+    }
+
+    /// Fills the inputs of a sample.
+    pub fn begin(&self, slab: &mut [T], sample: usize) {
+        if self.poison {
+            slab.fill(T::NAN);
+        }
+        let mut inputs: [&mut [T]; MAX_INPUTS] = std::array::from_fn(|_| Default::default());
+        let count = self.plan.inputs.len();
+        carve(slab, &self.plan.inputs, |role, piece| {
+            if let Role::X(index) = role {
+                inputs[index] = piece;
+            }
+        });
+        (self.fill)(sample, &mut inputs[..count]);
+    }
+
+    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
+        self.begin(slab, sample);
+        for step in &self.plan.forward {
+            step.op.forward(self.forward(step, slab, sample, None));
+        }
+        let mut loss = 0.0;
+        if let Some((value, gradient)) = self.plan.loss {
+            loss = slab[value].f64();
+            slab[gradient] = T::of(1.0 / self.samples as f64);
+            for step in &self.plan.backward {
+                if let Some(differentiable) = step.op.differentiable() {
+                    differentiable.backward(self.backward(step, slab, gradients, (sample, first), None));
+                }
+            }
+        }
+        self.finish(slab, result);
+        loss
+    }
+
+    /// Copies outputs and gradients of inputs.
+    pub fn finish(&self, slab: &[T], result: &mut [T]) {
+        let mut result = result;
+        for range in self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()) {
+            let (now, later) = result.split_at_mut(range.len());
+            now.copy_from_slice(&slab[range.clone()]);
+            result = later;
+        }
+    }
+
+    fn stream(&self, step: &Step<T>, sample: usize) -> Option<Stream> {
+        self.dropout.map(|key| Stream::new(key.seed, key.step, step.site, sample as u64))
+    }
+
+    /// What the forward pass of a step is given.
+    pub fn forward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        sample: usize,
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Forward<'b, T> {
+        let mut io = Forward {
+            x: [&[]; MAX_OPERANDS],
+            y: Default::default(),
+            workspace: Default::default(),
+            scratch: Default::default(),
+            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[0][range.clone()]),
+            shapes: &step.shapes,
+            level: self.level,
+            parts: Parts::of(self.parallelism, self.slabs, self.samples),
+            stream: self.stream(step, sample),
+            coupled,
+        };
+        for (index, range) in &step.parameters {
+            io.x[*index] = &self.parameters[range.clone()];
+        }
+        carve(slab, &step.pieces, |role, piece| match role {
+            Role::X(index) => io.x[index] = piece,
+            Role::Y => io.y = piece,
+            Role::Workspace => io.workspace = piece,
+            Role::Scratch => io.scratch = piece,
+            Role::Dy | Role::Dx(..) => {}
+        });
+        io
+    }
+
+    /// What the backward pass of a step is given; the first sample of a shard sets parameter gradients.
+    pub fn backward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        gradients: &'b mut [T],
+        (sample, first): (usize, bool),
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Backward<'b, T> {
+        let mut io = Backward {
+            x: [&[]; MAX_OPERANDS],
+            y: &[],
+            dy: &[],
+            workspace: &[],
+            dx: [const { None }; MAX_OPERANDS],
+            scratch: Default::default(),
+            packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[1][range.clone()]),
+            shapes: &step.shapes,
+            level: self.level,
+            stream: self.stream(step, sample),
+            coupled,
+        };
+        for (index, range) in &step.parameters {
+            io.x[*index] = &self.parameters[range.clone()];
+        }
+        carve(slab, &step.pieces, |role, piece| match role {
+            Role::X(index) => io.x[index] = piece,
+            Role::Y => io.y = piece,
+            Role::Workspace => io.workspace = piece,
+            Role::Scratch => io.scratch = piece,
+            Role::Dy => io.dy = piece,
+            Role::Dx(index, write) => io.dx[index] = Some(Gradient { values: piece, write }),
+        });
+        carve(gradients, &step.parameter_gradients, |role, piece| {
+            if let Role::Dx(index, write) = role {
+                // Over the samples of a shard the gradients add up; the first sample sets.
+                let write = if first { write } else { Write::Add };
+                io.dx[index] = Some(Gradient { values: piece, write });
+            }
+        });
+        io
+    }
+}
+
+/// Hands out disjoint pieces of a slab, sorted by start.
+fn carve<'a, T>(slab: &'a mut [T], pieces: &[Piece], mut take: impl FnMut(Role, &'a mut [T])) {
+    let mut rest = slab;
+    let mut position = 0;
+    for piece in pieces {
+        let (_, tail) = std::mem::take(&mut rest).split_at_mut(piece.start - position);
+        let (taken, tail) = tail.split_at_mut(piece.len);
+        take(piece.role, taken);
+        rest = tail;
+        position = piece.start + piece.len;
+    }
+}
