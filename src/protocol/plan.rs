@@ -214,6 +214,20 @@ impl Plan {
         *self == Self { tables, methods, data, settings, ..other.clone() }
     }
 
+    /// What has been asked for in this plan or in another that it continues: tables and rows of both, and the larger number of seeds.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        let mut joined = self.clone();
+        joined.tables =
+            TableId::ALL.into_iter().filter(|table| self.tables.contains(table) || other.tables.contains(table)).collect();
+        // No rows named is all rows.
+        let all = self.methods.is_empty() || other.methods.is_empty();
+        let more = other.methods.iter().filter(|method| !self.methods.contains(method));
+        joined.methods = if all { Vec::new() } else { self.methods.iter().chain(more).cloned().collect() };
+        joined.settings.seeds = self.settings.seeds.max(other.settings.seeds);
+        joined
+    }
+
     /// Checks that the rows wanted are rows.
     ///
     /// # Errors
@@ -425,6 +439,10 @@ pub(super) mod tests {
         let keys = |plan: &Plan| plan.runs()?.iter().map(|run| plan.key(run)).collect::<Result<BTreeSet<_>>>();
         assert!(keys(&first)?.is_subset(&keys(&more)?));
         assert_eq!(first.runs()?.len(), 3, "one row, three seeds");
+        assert_eq!(first.joined(&more).tables, more.tables);
+        assert_eq!(keys(&first.joined(&more))?, keys(&more)?, "nothing that was asked for before is forgotten");
+        let other = Plan { methods: vec!["cnn".into()], ..first.clone() };
+        assert_eq!(other.joined(&first).methods, ["cnn", "tcn"]);
         more.settings.training.epochs += 1;
         assert!(!more.continues(&first));
         assert!(

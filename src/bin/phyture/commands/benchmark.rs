@@ -160,7 +160,8 @@ fn open(folder: &Folder, plan: &Plan, wanted: &Wanted) -> Result<()> {
     if !wanted.resume && wanted.shard.is_none() {
         return refuse("a plan with runs", "--resume to go on with it, or another folder");
     }
-    if there == *plan { Ok(()) } else { folder.write_plan(plan) }
+    let joined = plan.joined(&there);
+    if there == joined { Ok(()) } else { folder.write_plan(&joined) }
 }
 
 /// Runs that are to be made one after the other.
