@@ -1,16 +1,19 @@
 //! Multi-head attention that never stores a score map (paper eqs. 21–23 without the projections).
 //!
 //! ```text
-//! s = q·kᵀ/√d_k,  p = softmax(s) a row,  o = (m∘p/(1 − rate))·v       for each head
+//! s = log₂e·q·kᵀ/√d_k,  ℓ = log₂ Σ 2ˢ a row,  p = 2^(s − ℓ),  o = (m∘p/(1 − rate))·v       for each head
 //! ```
 //!
-//! q, o `[queries, heads·d_k]`; k, v `[keys, heads·d_k]`; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of
-//! keys with an online softmax and keeps only ℓ = log Σ eˢ, `[queries, heads]`, for the gradients, which are in `backward`.
+//! that is softmax(q·kᵀ/√d_k), in powers of 2 because they are cheaper than those of e. q, o `[queries, heads·d_k]`; k, v
+//! `[keys, heads·d_k]`; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of keys with an online softmax and keeps
+//! only ℓ, `[queries, heads]`, for the gradients, which are in `backward`.
+//!
+//! Scores lie as `[keys, queries]`: what is done to a score is done to a register of queries.
 //!
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
-use crate::dropout::{Mask, MaskLanes};
-use crate::elementary::exp_negative;
+use crate::dropout::{Keep, Mask, MaskLanes};
+use crate::elementary::power_of_two;
 use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
@@ -26,13 +29,8 @@ const QUERIES: usize = 96;
 /// Where o may be cut for [`forward_rows`]: at multiples of this many queries, every query is in the same block as uncut.
 pub const CUT: usize = QUERIES;
 
-/// Keys of a block. A block of scores, at most 96 x 64 numbers, stays in the first-level cache.
-const KEYS: usize = 64;
-
-/// Width of a head in padded buffers.
-const fn padded(head_size: usize) -> usize {
-    head_size.next_multiple_of(32)
-}
+/// Keys of a block: a multiple of every tile's rows. A block of scores, at most 96 x 72 numbers, stays in the first-level cache.
+const KEYS: usize = 72;
 
 /// Queries a block really has at a level whose tile is `NR` wide: short blocks waste less of a history of 1000.
 const fn block_of_queries<const NR: usize>() -> usize {
@@ -42,7 +40,7 @@ const fn block_of_queries<const NR: usize>() -> usize {
 /// Scratch, in numbers, that [`forward`] and [`backward()`] need.
 pub fn scratch_len(heads: usize, queries: usize, keys: usize, head_size: usize) -> usize {
     let _ = (heads, queries);
-    let wide = padded(head_size);
+    let wide = head_size.next_multiple_of(tile::WIDEST);
     3 * keys * wide + 2 * head_size * QUERIES + 3 * QUERIES * wide + 2 * KEYS * QUERIES + 3 * QUERIES
 }
 
@@ -69,8 +67,43 @@ impl Shape {
         Self { heads, queries: q.rows(), keys: k.rows(), size: q.cols() / heads }
     }
 
+    /// 1/√d_k
     fn scale<T: Real>(&self) -> T {
         T::of(1.0 / (self.size as f64).sqrt())
+    }
+
+    /// log₂e/√d_k
+    fn score_scale<T: Real>(&self) -> T {
+        T::of(std::f64::consts::LOG2_E / (self.size as f64).sqrt())
+    }
+}
+
+/// The tile of the products whose result is as wide as a head, at a level whose wide tile has `NR` columns: the tall one where the
+/// wide one would compute more zeros.
+#[derive(Clone, Copy)]
+struct HeadTile {
+    tall: bool,
+    /// Columns of a panel.
+    columns: usize,
+    /// Width of a head in whole panels.
+    wide: usize,
+}
+
+impl HeadTile {
+    #[inline(always)]
+    fn new<const NR: usize>(size: usize) -> Self {
+        let tall = size.next_multiple_of(NR / 2);
+        if tall < size.next_multiple_of(NR) {
+            Self { tall: true, columns: NR / 2, wide: tall }
+        } else {
+            Self { tall: false, columns: NR, wide: tall }
+        }
+    }
+
+    /// Runs a product with this tile.
+    #[inline(always)]
+    fn run<T: Real, I: Isa, const MR: usize, const NR: usize>(self, product: impl Tiled<T>) {
+        if self.tall { I::tall(product) } else { product.run::<I, MR, NR>() }
     }
 }
 
@@ -109,32 +142,48 @@ fn lanes<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, panels: &mut [T]) 
     }
 }
 
-/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block`, times `factor`; missing rows are zero.
+/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block` in panels of `columns`, times `factor`; missing rows are zero.
 #[inline(always)]
-fn panels<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, block: usize, panels: &mut [T]) {
-    for (panel, c) in panels.chunks_exact_mut(block * NR).zip((0..).step_by(NR)) {
-        pad(x.columns(c, NR.min(x.cols() - c)), factor, NR, panel);
+fn panels<T: Real>(x: Rows<'_, T>, factor: T, block: usize, columns: usize, panels: &mut [T]) {
+    for (panel, c) in panels.chunks_exact_mut(block * columns).zip((0..).step_by(columns)) {
+        pad(x.columns(c, columns.min(x.cols() - c)), factor, columns, panel);
     }
 }
 
 /// c {=, +=} rows·panels.
-#[inline(always)]
-fn product<T: Real, I: Isa, const MR: usize, const NR: usize>(rows: Rows<'_, T>, panels: &[T], c: RowsMut<'_, T>, write: Write) {
-    let n = c.cols();
-    tile::rows::<T, I, _, _, MR, NR>(&rows, n, panels, &mut Store { c, bias: None, write });
+struct Product<'a, T> {
+    rows: Rows<'a, T>,
+    panels: &'a [T],
+    c: RowsMut<'a, T>,
+    write: Write,
 }
 
-/// c += sᵀ·b for a block s `[keys, lanes]`, with b `[all keys, width]` in panels, from line `key` on.
-#[inline(always)]
-fn transposed_product<T: Real, I: Isa, const MR: usize, const NR: usize>(
-    s: Rows<'_, T>,
-    (panels, keys, key): (&[T], usize, usize),
-    c: RowsMut<'_, T>,
-) {
-    let mut sink = Store { c, bias: None, write: Write::Add };
-    for (panel, j) in panels.chunks_exact(keys * NR).zip((0..).step_by(NR)) {
-        let panel = &panel.as_chunks::<NR>().0[key..key + s.rows()];
-        tile::columns::<T, I, _, MR, NR>((|p| s.row(p), s.cols()), panel, (j, NR), &mut sink);
+impl<T: Real> Tiled<T> for Product<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let n = self.c.cols();
+        tile::rows::<T, I, _, _, MR, NR>(&self.rows, n, self.panels, &mut Store { c: self.c, bias: None, write: self.write });
+    }
+}
+
+/// c += sᵀ·b for a block s `[keys, queries]`, with b `[all keys, width]` in panels, from line `key` on.
+struct TransposedProduct<'a, T> {
+    s: Rows<'a, T>,
+    panels: &'a [T],
+    keys: usize,
+    key: usize,
+    c: RowsMut<'a, T>,
+}
+
+impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let s = self.s;
+        let mut sink = Store { c: self.c, bias: None, write: Write::Add };
+        for (panel, j) in self.panels.chunks_exact(self.keys * NR).zip((0..).step_by(NR)) {
+            let panel = &panel.as_chunks::<NR>().0[self.key..self.key + s.rows()];
+            tile::columns::<T, I, _, MR, NR>((|p| s.row(p), s.cols()), panel, (j, NR), &mut sink);
+        }
     }
 }
 
@@ -195,57 +244,57 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
         let Shape { heads, queries, keys, size } = self.shape;
-        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
+        let (most, tile) = (block_of_queries::<NR>(), HeadTile::new::<NR>(size));
+        let HeadTile { columns, wide, .. } = tile;
         let mut scratch = self.scratch;
         let values = take(&mut scratch, keys * wide);
-        let query_lanes = take(&mut scratch, size * block);
-        let sums = take(&mut scratch, block * wide);
-        let scores = take(&mut scratch, KEYS * block);
-        let largest = take(&mut scratch, block);
-        let total = take(&mut scratch, block);
-        let factor = take(&mut scratch, block);
+        let query_lanes = take(&mut scratch, size * most);
+        let sums = take(&mut scratch, most * wide);
+        let scores = take(&mut scratch, KEYS * most);
+        let [largest, total, factor] = [(); 3].map(|()| take(&mut scratch, most));
         let keep_scale = T::of(self.dropout.map_or(1.0, Mask::scale));
         let stop = self.first + self.o.rows();
         for h in 0..heads {
             let (q, k) = (self.q.columns(h * size, size), self.k.columns(h * size, size));
-            panels::<T, NR>(self.v.columns(h * size, size), T::ONE, keys, values);
-            for first in (self.first..stop).step_by(block) {
-                let end = stop.min(first + block);
-                lanes::<T, NR>(q.range(first, end), self.shape.scale(), query_lanes);
+            panels(self.v.columns(h * size, size), T::ONE, keys, columns, values);
+            for first in (self.first..stop).step_by(most) {
+                let end = stop.min(first + most);
+                let block = (end - first).next_multiple_of(NR);
+                let query_lanes = &mut query_lanes[..size * block];
+                lanes::<T, NR>(q.range(first, end), self.shape.score_scale(), query_lanes);
                 let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
+                let [largest, total, factor] = [&mut largest[..block], &mut total[..block], &mut factor[..block]];
                 largest.fill(T::NEG_INFINITY);
                 total.fill(T::ZERO);
                 sums.fill(T::ZERO);
                 for key in (0..keys).step_by(KEYS) {
                     let key_end = keys.min(key + KEYS);
                     let scores = &mut scores[..(key_end - key) * block];
-                    product::<T, I, MR, NR>(
-                        k.range(key, key_end),
-                        query_lanes,
-                        RowsMut::packed(scores, key_end - key, block),
-                        Write::Set,
-                    );
+                    let rows = k.range(key, key_end);
+                    let c = RowsMut::packed(scores, key_end - key, block);
+                    Product { rows, panels: query_lanes, c, write: Write::Set }.run::<I, MR, NR>();
                     softmax_block::<T, I, NR>(block, key, mask.as_ref(), scores, largest, total, factor);
                     for (row, factor) in sums.chunks_exact_mut(wide).zip(factor.iter()) {
                         row.iter_mut().for_each(|x| *x *= *factor);
                     }
-                    let scores = Rows::packed(scores, key_end - key, block);
-                    transposed_product::<T, I, MR, NR>(scores, (values, keys, key), RowsMut::packed(sums, block, wide));
+                    let s = Rows::packed(scores, key_end - key, block);
+                    let c = RowsMut::packed(sums, block, wide);
+                    tile.run::<T, I, MR, NR>(TransposedProduct { s, panels: values, keys, key, c });
                 }
                 for (lane, i) in (first - self.first..end - self.first).enumerate() {
                     let target = &mut self.o.row_mut(i)[h * size..][..size];
                     let normalise = keep_scale / total[lane];
                     target.iter_mut().zip(&sums[lane * wide..]).for_each(|(o, x)| *o = *x * normalise);
-                    self.log_sum_exp[i * heads + h] = largest[lane] + total[lane].ln();
+                    self.log_sum_exp[i * heads + h] = largest[lane] + total[lane].ln() * T::LOG2_E;
                 }
             }
         }
     }
 }
 
-/// One step of the online softmax over a block of scores `[keys, lanes]`, from key `first_key`, which is even. Scores become
-/// m∘e^(s − largest) with the new largest score of each lane and the dropout mask m; `total`, of e^(s − largest), and what else was
-/// summed so far is to be multiplied with `factor` = e^(old − new).
+/// One step of the online softmax over a block of scores `[keys, queries]`, from key `first_key`, which is even. Scores become
+/// m∘2^(s − largest) with the new largest score of each query and the dropout mask m; `total`, of 2^(s − largest), and what else was
+/// summed so far is to be multiplied with `factor` = 2^(old − new).
 #[inline(always)]
 fn softmax_block<T: Real, I: Isa, const NR: usize>(
     block: usize,
@@ -258,34 +307,17 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
 ) {
     let chunks = largest.as_chunks_mut::<NR>().0.iter_mut().zip(total.as_chunks_mut::<NR>().0).zip(factor.as_chunks_mut::<NR>().0);
     for (chunk, ((largest, total), factor)) in chunks.enumerate() {
-        let mut m = *largest;
-        for row in scores.chunks_exact(block) {
-            let row = &row.as_chunks::<NR>().0[chunk];
-            for (m, s) in m.iter_mut().zip(row) {
-                *m = if *s > *m { *s } else { *m };
-            }
-        }
+        let m = largest_of_block(block, chunk, scores, *largest);
         for ((factor, old), new) in factor.iter_mut().zip(*largest).zip(m) {
-            *factor = exp_negative::<T, I>(old - new);
+            *factor = power_of_two::<T, I>(old - new);
         }
         let mut sum = [T::ZERO; NR];
         for (rows, key) in scores.chunks_mut(2 * block).zip((first_key..).step_by(2)) {
-            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
-            for (i, row) in rows.chunks_exact_mut(block).enumerate() {
-                let row = &mut row.as_chunks_mut::<NR>().0[chunk];
-                let mut p = *row;
-                for (p, m) in p.iter_mut().zip(&m) {
-                    *p = exp_negative::<T, I>(*p - *m);
-                }
-                for (sum, p) in sum.iter_mut().zip(&p) {
-                    *sum += *p;
-                }
-                if let Some(keeps) = &keeps {
-                    for (p, keep) in p.iter_mut().zip(&keeps[i]) {
-                        *p *= *keep;
-                    }
-                }
-                *row = p;
+            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair(key));
+            let (first, second) = pair_of_rows::<T, NR>(rows, block, chunk);
+            *first = softmax_row::<T, I, NR>(*first, &m, &mut sum, keeps.as_ref().map(|keeps| &keeps[0]));
+            if let Some(second) = second {
+                *second = softmax_row::<T, I, NR>(*second, &m, &mut sum, keeps.as_ref().map(|keeps| &keeps[1]));
             }
         }
         for ((total, factor), sum) in total.iter_mut().zip(factor).zip(sum) {
@@ -293,6 +325,48 @@ fn softmax_block<T: Real, I: Isa, const NR: usize>(
         }
         *largest = m;
     }
+}
+
+/// Chunk `chunk` of the first row of a block, and of the second if there is one.
+#[inline(always)]
+fn pair_of_rows<T, const NR: usize>(rows: &mut [T], block: usize, chunk: usize) -> (&mut [T; NR], Option<&mut [T; NR]>) {
+    let (first, second) = rows.split_at_mut(block);
+    (&mut first.as_chunks_mut::<NR>().0[chunk], second.as_chunks_mut::<NR>().0.get_mut(chunk))
+}
+
+/// One key of [`softmax_block`]. By value: nothing else can point to these numbers, which stay in registers.
+#[inline(always)]
+fn softmax_row<T: Real, I: Isa, const NR: usize>(s: [T; NR], m: &[T; NR], sum: &mut [T; NR], keep: Option<&Keep<NR>>) -> [T; NR] {
+    let mut p = s;
+    for (p, m) in p.iter_mut().zip(m) {
+        *p = power_of_two::<T, I>(*p - *m);
+    }
+    for (sum, p) in sum.iter_mut().zip(&p) {
+        *sum += *p;
+    }
+    if let Some(keep) = keep { keep.of(p) } else { p }
+}
+
+/// The largest score of each query of a chunk, `so_far` included. Odd and even keys apart: a maximum takes several cycles, and in one
+/// chain each would wait for the last.
+#[inline(always)]
+fn largest_of_block<T: Real, const NR: usize>(block: usize, chunk: usize, scores: &[T], so_far: [T; NR]) -> [T; NR] {
+    let (mut even, mut odd) = (so_far, so_far);
+    for rows in scores.chunks(2 * block) {
+        let (first, second) = rows.split_at(block);
+        larger(&mut even, &first.as_chunks::<NR>().0[chunk]);
+        if let Some(second) = second.as_chunks::<NR>().0.get(chunk) {
+            larger(&mut odd, second);
+        }
+    }
+    larger(&mut even, &odd);
+    even
+}
+
+/// m = max(m, x), lane by lane.
+#[inline(always)]
+fn larger<T: Real, const NR: usize>(m: &mut [T; NR], x: &[T; NR]) {
+    m.iter_mut().zip(x).for_each(|(m, x)| *m = if *x > *m { *x } else { *m });
 }
 
 #[cfg(test)]
@@ -426,6 +500,6 @@ mod tests {
         let v: Vec<f64> = (0..keys).flat_map(|j| [j as f64; 4]).collect();
         let (o, lse) = plain_forward(&q, &k, &v, (1, keys), width);
         assert_near("o is the value of the last key", &o, &[99.0; 4], Tolerance::Close);
-        assert_near("log-sum-exp is the last score", &lse, &[99.0 * 4.0 * 1e4 / 2.0], Tolerance::Close);
+        assert_near("ℓ is the last score", &lse, &[99.0 * 4.0 * 1e4 / 2.0 * std::f64::consts::LOG2_E], Tolerance::Close);
     }
 }

@@ -113,6 +113,7 @@ pub(crate) struct Forward<'a, T> {
 impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        const { assert!(CUT.is_multiple_of(MR), "a cut ends inside a tile") };
         let Geometry { taps, left, .. } = self.geometry;
         let (inputs, outputs) = (self.x.cols(), self.y.cols());
         let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];

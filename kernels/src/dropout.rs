@@ -87,22 +87,34 @@ pub(crate) struct MaskChunk<'a, const NR: usize> {
 }
 
 impl<const NR: usize> MaskChunk<'_, NR> {
-    /// For an even column and the next one, 1 where an element is kept and 0 where it is dropped, lane by lane. Factors and not
-    /// conditions: what follows is then arithmetic on floats alone, which vectorises whatever it is.
+    /// For an even column and the next one, the words that decide about each lane.
     #[inline(always)]
-    pub(crate) fn pair<T: Real>(self, even_column: usize) -> [[T; NR]; 2] {
-        let mut words = [0; NR];
-        for ((to, low), high) in words.iter_mut().zip(self.low).zip(self.high) {
-            *to = word(*low, *high, even_column as u32 >> 1);
+    pub(crate) fn pair(self, even_column: usize) -> [Keep<NR>; 2] {
+        let mut halves = [[0; NR]; 2];
+        for ((to, low), high) in halves[1].iter_mut().zip(self.low).zip(self.high) {
+            *to = word(*low, *high, even_column as u32 >> 1) as i32;
         }
-        let mut factors = [[T::ZERO; NR]; 2];
-        for (to, word) in factors[0].iter_mut().zip(&words) {
-            *to = if (*word << 16) as i32 >= self.bound { T::ONE } else { T::ZERO };
+        let [even, odd] = &mut halves;
+        even.iter_mut().zip(odd).for_each(|(even, odd)| *even = *odd << 16);
+        halves.map(|words| Keep { words, bound: self.bound })
+    }
+}
+
+/// What is kept of one column of a mask, one row a lane.
+pub(crate) struct Keep<const NR: usize> {
+    words: [i32; NR],
+    bound: i32,
+}
+
+impl<const NR: usize> Keep<NR> {
+    /// x where it is kept, 0 where it is dropped.
+    #[inline(always)]
+    pub(crate) fn of<T: Real>(&self, x: [T; NR]) -> [T; NR] {
+        let mut kept = x;
+        for (x, word) in kept.iter_mut().zip(&self.words) {
+            *x = if *word >= self.bound { *x } else { T::ZERO };
         }
-        for (to, word) in factors[1].iter_mut().zip(&words) {
-            *to = if *word as i32 >= self.bound { T::ONE } else { T::ZERO };
-        }
-        factors
+        kept
     }
 }
 
@@ -186,8 +198,8 @@ mod tests {
             let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.5);
             let (lanes, even) = (MaskLanes::<8>::new(mask, row), 2 * (column / 2));
             let chunk = lanes.chunk::<8>(0);
-            for (column, factors) in (even..).zip(chunk.pair::<f32>(even)) {
-                assert_eq!(factors.map(|factor| factor == 1.0).to_vec(), (row..row + 8).map(|i| mask.keeps(i, column)).collect::<Vec<_>>());
+            for (column, keep) in (even..).zip(chunk.pair(even)) {
+                assert_eq!(keep.of([1.0_f64; 8]).map(|kept| kept == 1.0).to_vec(), (row..row + 8).map(|i| mask.keeps(i, column)).collect::<Vec<_>>());
             }
         }
 

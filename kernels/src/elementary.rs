@@ -3,6 +3,7 @@
 //! | function | how | largest error found, f32 / f64 |
 //! | --- | --- | --- |
 //! | eˣ | x = k·ln 2 + r with |r| ≤ ln 2/2 (Cody & Waite 1980), eʳ = 1 + r + r²·q(r), scaled by 2ᵏ | 1.1 / 2 ULP |
+//! | 2ˣ | x = k + r with |r| ≤ ½, 2ʳ = 1 + r·q(r), scaled by 2ᵏ; x not above the largest exponent | 1.5 / 1.5 ULP |
 //! | tanh x | x + x³·q(x²) below 5/8, else 1 − 2e⁻²ˣ/(1 + e⁻²ˣ) | 1.4 / 2 ULP |
 //! | 1/(1 + e⁻ˣ) | as written | 2.3 / 4 ULP |
 //! | erf x | x + x·q(x²) below 1, else 1 − e^(−x²)·q(2/(2 + x)), as for 6 beyond 6 | 1.3 / 8 ULP |
@@ -19,6 +20,8 @@ use crate::level::{Isa, Kernel, Level};
 pub trait Elementary: Sized + 'static {
     /// (eʳ − 1 − r)/r² on |r| ≤ ln 2/2, by powers of r.
     const EXP: &'static [Self];
+    /// (2ʳ − 1)/r on |r| ≤ ½, by powers of r.
+    const POWER: &'static [Self];
     /// (tanh √u − √u)/√u³ on 0 ≤ u ≤ 0.4, by powers of u.
     const TANH: &'static [Self];
     /// erf √u/√u − 1 on 0 ≤ u ≤ 1, by powers of u.
@@ -39,11 +42,14 @@ pub trait Elementary: Sized + 'static {
     fn times_normal_power_of_two(self, rounded: Self) -> Self;
     /// Below this eˣ is subnormal, or 0.
     const EXP_SUBNORMAL: Self;
+    /// The smallest exponent of a normal number.
+    const LEAST_POWER: Self;
 }
 
 #[expect(clippy::excessive_precision, reason = "decimal digits enough for the exact binary value")]
 impl Elementary for f32 {
     const EXP: &'static [Self] = &[0.5, 0.166665768, 0.0416665544, 0.00836320297, 0.00139262135];
+    const POWER: &'static [Self] = &[0.693147188, 0.240226508, 0.0555035711, 0.00961808256, 0.00133908634, 0.000154531629];
     const TANH: &'static [Self] = &[-0.333333284, 0.133327188, -0.0538432632, 0.0209613291, -0.0060451651];
     const ERF: &'static [Self] =
         &[0.128379166, -0.376126267, 0.112835947, -0.026854212, 0.00518908742, -0.000801686429, 7.87587506e-5];
@@ -54,6 +60,7 @@ impl Elementary for f32 {
     const EXP_RANGE: [Self; 2] = [-104.0, 89.0];
     const ROUNDER: Self = 12_582_912.0;
     const EXP_SUBNORMAL: Self = -87.0;
+    const LEAST_POWER: Self = -126.0;
     #[inline(always)]
     fn times_normal_power_of_two(self, rounded: Self) -> Self {
         // The low bits of the rounder are 0: what is shifted out of `rounded` is the rounder, what remains is k.
@@ -81,6 +88,20 @@ impl Elementary for f64 {
         2.7557268378684193e-6,
         2.7620138719733996e-7,
         2.5100424157005067e-8,
+    ];
+    const POWER: &'static [Self] = &[
+        0.69314718055994531,
+        0.24022650695910071,
+        0.055504108664821627,
+        0.0096181291076284795,
+        0.0013333558146406471,
+        0.00015403530393370733,
+        1.5252733841556773e-5,
+        1.3215486808705563e-6,
+        1.0178057087733941e-7,
+        7.0548973041554993e-9,
+        4.4558179083360645e-10,
+        2.5729324177362304e-11,
     ];
     const TANH: &'static [Self] = &[
         -0.33333333333333333,
@@ -134,6 +155,7 @@ impl Elementary for f64 {
     const EXP_RANGE: [Self; 2] = [-746.0, 710.0];
     const ROUNDER: Self = 6_755_399_441_055_744.0;
     const EXP_SUBNORMAL: Self = -708.0;
+    const LEAST_POWER: Self = -1022.0;
     #[inline(always)]
     fn times_normal_power_of_two(self, rounded: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_add(rounded.to_bits() << 52))
@@ -151,7 +173,8 @@ impl Elementary for f64 {
 /// c₀ + c₁x + c₂x² + … by Horner's rule.
 #[inline(always)]
 fn polynomial<T: Real, I: Isa>(coefficients: &'static [T], x: T) -> T {
-    coefficients.iter().rev().fold(T::ZERO, |sum, c| I::mul_add(sum, x, *c))
+    let Some((highest, lower)) = coefficients.split_last() else { return T::ZERO };
+    lower.iter().rev().fold(*highest, |sum, c| I::mul_add(sum, x, *c))
 }
 
 /// eˣ
@@ -176,6 +199,15 @@ pub(crate) fn exp_negative<T: Real, I: Isa>(x: T) -> T {
     let r = I::mul_add(-k, T::LN_2[1], I::mul_add(-k, T::LN_2[0], x));
     let power = I::mul_add(polynomial::<T, I>(T::EXP, r), r * r, r) + T::ONE;
     if x < T::EXP_SUBNORMAL { T::ZERO } else { power.times_normal_power_of_two(rounded) }
+}
+
+/// 2ˣ for x below the largest exponent; 2 to the smallest exponent where that would be smaller still. NaN gives NaN.
+#[inline(always)]
+pub(crate) fn power_of_two<T: Real, I: Isa>(x: T) -> T {
+    let x = if x < T::LEAST_POWER { T::LEAST_POWER } else { x };
+    let rounded = x + T::ROUNDER;
+    let r = x - (rounded - T::ROUNDER);
+    I::mul_add(polynomial::<T, I>(T::POWER, r), r, T::ONE).times_normal_power_of_two(rounded)
 }
 
 /// tanh x

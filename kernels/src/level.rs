@@ -205,6 +205,9 @@ pub(crate) trait Isa {
     /// two of the right operand and one of the left.
     fn tiled<T: Real, K: Tiled<T>>(kernel: K);
 
+    /// The same with a tile of one register's width and twice the rows: for results no wider than that.
+    fn tall<T: Real, K: Tiled<T>>(kernel: K);
+
     /// a·b + c, rounded once where the level can.
     #[inline(always)]
     fn mul_add<T: Real>(a: T, b: T, c: T) -> T {
@@ -220,6 +223,10 @@ impl Isa for Plain {
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::plain_tile(kernel);
     }
+    #[inline(always)]
+    fn tall<T: Real, K: Tiled<T>>(kernel: K) {
+        T::plain_tall_tile(kernel);
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -231,6 +238,10 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::avx2_tile(kernel);
+    }
+    #[inline(always)]
+    fn tall<T: Real, K: Tiled<T>>(kernel: K) {
+        T::avx2_tall_tile(kernel);
     }
 }
 
@@ -244,6 +255,10 @@ impl Isa for Avx512 {
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::avx512_tile(kernel);
     }
+    #[inline(always)]
+    fn tall<T: Real, K: Tiled<T>>(kernel: K) {
+        T::avx512_tall_tile(kernel);
+    }
 }
 
 #[cfg(target_arch = "aarch64")]
@@ -255,6 +270,10 @@ impl Isa for Neon {
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::neon_tile(kernel);
+    }
+    #[inline(always)]
+    fn tall<T: Real, K: Tiled<T>>(kernel: K) {
+        T::neon_tall_tile(kernel);
     }
 }
 

@@ -118,7 +118,7 @@ pub fn attention<T: Real>(
     for h in 0..heads {
         let (dropped, lse) = probabilities(heads, h, q, k, dropout);
         for i in 0..q.rows() {
-            log_sum_exp[i * heads + h] = T::of(lse[i]);
+            log_sum_exp[i * heads + h] = T::of(lse[i] * std::f64::consts::LOG2_E);
             for c in 0..size {
                 o.row_mut(i)[h * size + c] = sum((0..k.rows()).map(|j| dropped[i][j].1 * v.row(j)[h * size + c].f64()));
             }

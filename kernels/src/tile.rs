@@ -62,8 +62,17 @@ impl<T> LeftRows<T> for Rows<'_, T> {
     }
 }
 
-/// A row of a tile in registers: NR numbers, whatever the level.
+/// A row of a tile in registers, NR numbers: both of them, or in a tall tile the first alone. The other one is then never
+/// computed with, and the compiler drops it.
 pub(crate) type Pair<T, I> = [<I as Isa>::Vector<T>; 2];
+
+/// Whether rows of NR numbers take two registers.
+#[inline(always)]
+fn is_pair<T: Real, I: Isa, const NR: usize>() -> bool {
+    let lanes = I::Vector::<T>::LANES;
+    assert!(NR == lanes || NR == 2 * lanes, "a panel is one or two registers wide");
+    NR > lanes
+}
 
 /// Where finished sums go.
 pub(crate) trait Sink<T: Real> {
@@ -80,24 +89,41 @@ pub(crate) trait Sink<T: Real> {
 /// Registers as numbers in memory.
 #[inline(always)]
 pub(crate) fn unload<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>) -> [T; NR] {
-    assert_eq!(NR, 2 * I::Vector::<T>::LANES, "a panel is two registers wide");
     let mut numbers = [T::ZERO; NR];
+    store::<T, I, NR>(pair, &mut numbers);
+    numbers
+}
+
+/// Writes a row of a tile.
+#[inline(always)]
+fn store<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &mut [T; NR]) {
     let to = numbers.as_mut_ptr();
-    // SAFETY: the array holds two registers.
+    // SAFETY: the array holds one register, and two where there is a pair.
     unsafe {
         pair[0].store(to);
-        pair[1].store(to.add(I::Vector::<T>::LANES));
+        if is_pair::<T, I, NR>() {
+            pair[1].store(to.add(I::Vector::<T>::LANES));
+        }
     }
-    numbers
 }
 
 /// NR numbers as registers.
 #[inline(always)]
 fn load<T: Real, I: Isa, const NR: usize>(numbers: &[T; NR]) -> Pair<T, I> {
-    assert_eq!(NR, 2 * I::Vector::<T>::LANES, "a panel is two registers wide");
     let from = numbers.as_ptr();
-    // SAFETY: the array holds two registers.
-    unsafe { [I::Vector::load(from), I::Vector::load(from.add(I::Vector::<T>::LANES))] }
+    // SAFETY: the array holds one register, and two where there is a pair.
+    unsafe {
+        let first = I::Vector::load(from);
+        [first, if is_pair::<T, I, NR>() { I::Vector::load(from.add(I::Vector::<T>::LANES)) } else { first }]
+    }
+}
+
+/// A row of a tile plus the first NR of at least as many numbers.
+#[inline(always)]
+fn plus<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &[T]) -> Pair<T, I> {
+    let Some(numbers) = numbers.first_chunk::<NR>() else { return pair };
+    let more = load::<T, I, NR>(numbers);
+    [pair[0].add(more[0]), if is_pair::<T, I, NR>() { pair[1].add(more[1]) } else { pair[1] }]
 }
 
 /// Overwrites or adds, after adding a bias a column if there is one.
@@ -120,27 +146,15 @@ impl<T: Real> Sink<T> for Store<'_, T> {
     }
 
     #[inline(always)]
-    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: Pair<T, I>) {
-        let mut sums = sums;
-        let add = |sums: &mut Pair<T, I>, numbers: &[T]| {
-            if let Some(numbers) = numbers.first_chunk::<NR>() {
-                let more = load::<T, I, NR>(numbers);
-                sums.iter_mut().zip(more).for_each(|(sum, more)| *sum = sum.add(more));
-            }
-        };
+    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, mut sums: Pair<T, I>) {
         if let Some(bias) = self.bias {
-            add(&mut sums, &bias[j..]);
+            sums = plus::<T, I, NR>(sums, &bias[j..]);
         }
-        let c = &mut self.c.row_mut(i)[j..][..NR];
+        let Some(c) = self.c.row_mut(i)[j..].first_chunk_mut::<NR>() else { return };
         if self.write == Write::Add {
-            add(&mut sums, c);
+            sums = plus::<T, I, NR>(sums, c);
         }
-        let to = c.as_mut_ptr();
-        // SAFETY: c was cut to NR numbers, which are two registers.
-        unsafe {
-            sums[0].store(to);
-            sums[1].store(to.add(I::Vector::<T>::LANES));
-        }
+        store::<T, I, NR>(sums, c);
     }
 }
 
@@ -188,8 +202,8 @@ pub(crate) fn pack_transposed<'b, T: Real, const NR: usize>(
 /// them in memory, all through the inner loop.
 macro_rules! store_rows {
     ($acc:ident, |$i:ident, $sums:ident| $store:expr) => {
-        const { assert!(MR <= 12, "a tile has more rows than are written out here") };
-        store_rows!(@ $acc, |$i, $sums| $store, 0 1 2 3 4 5 6 7 8 9 10 11)
+        const { assert!(MR <= 24, "a tile has more rows than are written out here") };
+        store_rows!(@ $acc, |$i, $sums| $store, 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23)
     };
     (@ $acc:ident, |$i:ident, $sums:ident| $store:expr, $($row:literal)*) => {
         $(if $row < MR {
@@ -203,15 +217,21 @@ macro_rules! store_rows {
 #[inline(always)]
 fn spill<T: Real, I: Isa, const MR: usize, const NR: usize>(acc: [Pair<T, I>; MR]) -> [[T; NR]; MR] {
     let mut rows = [[T::ZERO; NR]; MR];
-    rows.iter_mut().zip(acc).for_each(|(row, pair)| *row = unload::<T, I, NR>(pair));
+    // A loop, not a closure: a closure that is not inlined would be compiled without the level's instructions.
+    for (row, pair) in rows.iter_mut().zip(acc) {
+        *row = unload::<T, I, NR>(pair);
+    }
     rows
 }
 
-/// `acc[i] += a·b` for both registers of a row.
+/// `acc[i] += a·b` for a row of NR numbers.
 #[inline(always)]
-fn accumulate<T: Real, I: Isa>(acc: &mut Pair<T, I>, a: T, b: Pair<T, I>) {
+fn accumulate<T: Real, I: Isa, const NR: usize>(acc: &mut Pair<T, I>, a: T, b: Pair<T, I>) {
     let a = I::Vector::splat(a);
-    *acc = [a.mul_add(b[0], acc[0]), a.mul_add(b[1], acc[1])];
+    acc[0] = a.mul_add(b[0], acc[0]);
+    if is_pair::<T, I, NR>() {
+        acc[1] = a.mul_add(b[1], acc[1]);
+    }
 }
 
 /// One tile of the row form: rows `first…first + MR` (the last row again beyond the end), one panel.
@@ -234,7 +254,7 @@ fn row_tile<T: Real, I: Isa, L: LeftRows<T>, const MR: usize, const NR: usize>(
             for i in 0..MR {
                 // SAFETY: a chunk has `depth` lines, and each piece was cut to `depth` above.
                 let a = unsafe { *pieces[i].get_unchecked(p) };
-                accumulate::<T, I>(&mut acc[i], a, b);
+                accumulate::<T, I, NR>(&mut acc[i], a, b);
             }
         }
     }
@@ -249,7 +269,7 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     panels: &[T],
     sink: &mut S,
 ) {
-    const { assert!(CUT.is_multiple_of(MR) && ROW_BLOCK.is_multiple_of(CUT), "a cut, or a block, ends inside a tile") };
+    const { assert!(ROW_BLOCK.is_multiple_of(MR) && ROW_BLOCK.is_multiple_of(CUT), "a block ends inside a tile, or between cuts") };
     let (m, lines) = (left.rows(), left.taps() * left.depth());
     if lines == 0 {
         for (i, j) in (0..m).flat_map(|i| (0..n).step_by(NR).map(move |j| (i, j))) {
@@ -298,7 +318,7 @@ fn column_tile<'a, T: Real, I: Isa, const MR: usize, const NR: usize>(
         let b = load::<T, I, NR>(line);
         let a = &left(p)[i_first..][..MR];
         for i in 0..MR {
-            accumulate::<T, I>(&mut acc[i], a[i], b);
+            accumulate::<T, I, NR>(&mut acc[i], a[i], b);
         }
     }
     acc

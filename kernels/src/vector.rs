@@ -72,8 +72,8 @@ impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
     }
 }
 
-/// Registers and accumulator tiles of one float type at each level: two registers wide, as tall as leaves room for two of the right
-/// operand and one of the left. A supertrait of [`Real`]; not for use outside this crate.
+/// Registers and accumulator tiles of one float type at each level: a wide one, two registers wide and as tall as leaves room for two of
+/// the right operand and one of the left; and a tall one, half as wide and twice as tall. A supertrait of [`Real`]; not for use outside this crate.
 #[expect(private_bounds, reason = "registers are this crate's own")]
 pub trait Registers: Sized {
     /// What every processor of the architecture has.
@@ -89,15 +89,26 @@ pub trait Registers: Sized {
     type Avx512: Vector<Self>;
     #[doc(hidden)]
     fn plain_tile<K: Tiled<Self>>(kernel: K);
+    #[doc(hidden)]
+    fn plain_tall_tile<K: Tiled<Self>>(kernel: K);
     #[cfg(target_arch = "x86_64")]
     #[doc(hidden)]
     fn avx2_tile<K: Tiled<Self>>(kernel: K);
     #[cfg(target_arch = "x86_64")]
     #[doc(hidden)]
+    fn avx2_tall_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
     fn avx512_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "x86_64")]
+    #[doc(hidden)]
+    fn avx512_tall_tile<K: Tiled<Self>>(kernel: K);
     #[cfg(target_arch = "aarch64")]
     #[doc(hidden)]
     fn neon_tile<K: Tiled<Self>>(kernel: K);
+    #[cfg(target_arch = "aarch64")]
+    #[doc(hidden)]
+    fn neon_tall_tile<K: Tiled<Self>>(kernel: K);
 }
 
 macro_rules! registers {
@@ -112,25 +123,29 @@ macro_rules! registers {
             type Avx2 = std::arch::x86_64::$avx2;
             #[cfg(target_arch = "x86_64")]
             type Avx512 = std::arch::x86_64::$avx512;
-            registers!(@tile plain_tile Plain $plain);
+            registers!(@tiles plain_tile plain_tall_tile Plain $plain);
             #[cfg(target_arch = "x86_64")]
-            registers!(@tile avx2_tile crate::level::Avx2 $avx2_tile);
+            registers!(@tiles avx2_tile avx2_tall_tile crate::level::Avx2 $avx2_tile);
             #[cfg(target_arch = "x86_64")]
-            registers!(@tile avx512_tile crate::level::Avx512 $avx512_tile);
+            registers!(@tiles avx512_tile avx512_tall_tile crate::level::Avx512 $avx512_tile);
             #[cfg(target_arch = "aarch64")]
-            registers!(@tile neon_tile crate::level::Neon $neon);
+            registers!(@tiles neon_tile neon_tall_tile crate::level::Neon $neon);
         }
     };
-    (@tile $name:ident $level:path [$rows:literal x $columns:literal]) => {
+    (@tiles $wide:ident $tall:ident $level:path [$rows:literal x $columns:literal, $tall_rows:literal x $tall_columns:literal]) => {
         #[inline(always)]
-        fn $name<K: Tiled<Self>>(kernel: K) {
+        fn $wide<K: Tiled<Self>>(kernel: K) {
             kernel.run::<$level, $rows, $columns>();
+        }
+        #[inline(always)]
+        fn $tall<K: Tiled<Self>>(kernel: K) {
+            kernel.run::<$level, $tall_rows, $tall_columns>();
         }
     };
 }
 
-registers!(f32: plain __m128 of 4 [4 x 8] avx2 __m256 [6 x 16] avx512 __m512 [12 x 32] neon [8 x 8]);
-registers!(f64: plain __m128d of 2 [4 x 4] avx2 __m256d [6 x 8] avx512 __m512d [12 x 16] neon [4 x 8]);
+registers!(f32: plain __m128 of 4 [4 x 8, 8 x 4] avx2 __m256 [6 x 16, 12 x 8] avx512 __m512 [12 x 32, 24 x 16] neon [8 x 8, 16 x 4]);
+registers!(f64: plain __m128d of 2 [4 x 4, 8 x 2] avx2 __m256d [6 x 8, 12 x 4] avx512 __m512d [12 x 16, 24 x 8] neon [4 x 8, 8 x 4]);
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {

@@ -1,13 +1,13 @@
-//! Gradients of attention: p = e^(s − ℓ) and the dropout mask m are made again, block by block (Dao 2023, FlashAttention-2).
+//! Gradients of attention: p = 2^(s − ℓ) and the dropout mask m are made again, block by block (Dao 2023, FlashAttention-2).
 //!
 //! ```text
 //! D = rowsum(do∘o),  dp = m∘(do·vᵀ)/(1 − rate),  ds = p∘(dp − D)
-//! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do
+//! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do           (ds is the gradient of q·kᵀ/√d_k)
 //! ```
 
-use super::{KEYS, QUERIES, Shape, block_of_queries, lanes, panels, product, take, transposed_product};
-use crate::dropout::{Mask, MaskLanes};
-use crate::elementary::exp_negative;
+use super::{HeadTile, KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
+use crate::dropout::{Keep, Mask, MaskLanes};
+use crate::elementary::power_of_two;
 use crate::level::{Isa, Level, Tiled};
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -71,31 +71,34 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         let Shape { heads, queries, keys, size } = self.shape;
-        let (block, wide) = (block_of_queries::<NR>(), size.next_multiple_of(NR));
+        let (most, tile) = (block_of_queries::<NR>(), HeadTile::new::<NR>(size));
+        let HeadTile { columns, wide, .. } = tile;
         let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
         let mut scratch = self.scratch;
-        let key_panels = take(&mut scratch, keys * wide);
-        let key_sums = take(&mut scratch, keys * wide);
-        let value_sums = take(&mut scratch, keys * wide);
-        let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * block));
-        let [query_panels, output_panels, query_sums] = [(); 3].map(|()| take(&mut scratch, block * wide));
-        let [scores, d_scores] = [(); 2].map(|()| take(&mut scratch, KEYS * block));
-        let [log_sum_exp, means] = [(); 2].map(|()| take(&mut scratch, block));
+        let [key_panels, key_sums, value_sums] = [(); 3].map(|()| take(&mut scratch, keys * wide));
+        let [query_lanes, output_lanes] = [(); 2].map(|()| take(&mut scratch, size * most));
+        let [query_panels, output_panels, query_sums] = [(); 3].map(|()| take(&mut scratch, most * wide));
+        let [scores, d_scores] = [(); 2].map(|()| take(&mut scratch, KEYS * most));
+        let [log_sum_exp, means] = [(); 2].map(|()| take(&mut scratch, most));
         let (scale, keep_scale) = (self.shape.scale::<T>(), T::of(self.dropout.map_or(1.0, Mask::scale)));
         for h in 0..heads {
             let (q, k, v) = (self.q.columns(h * size, size), self.k.columns(h * size, size), self.v.columns(h * size, size));
             let (o, d_o) = (self.o.columns(h * size, size), self.d_o.columns(h * size, size));
-            panels::<T, NR>(k, scale, keys, key_panels);
+            panels(k, scale, keys, columns, key_panels);
             key_sums.fill(T::ZERO);
             value_sums.fill(T::ZERO);
-            for first in (0..queries).step_by(block) {
-                let end = queries.min(first + block);
+            for first in (0..queries).step_by(most) {
+                let end = queries.min(first + most);
+                let block = (end - first).next_multiple_of(NR);
                 let (q_block, d_block) = (q.range(first, end), d_o.range(first, end));
+                let [query_lanes, output_lanes] = [&mut query_lanes[..size * block], &mut output_lanes[..size * block]];
+                let [query_panels, output_panels] = [&mut query_panels[..block * wide], &mut output_panels[..block * wide]];
+                let [log_sum_exp, means] = [&mut log_sum_exp[..block], &mut means[..block]];
                 // The dropout scale rides on do, the score scale on q and k.
-                lanes::<T, NR>(q_block, scale, query_lanes);
+                lanes::<T, NR>(q_block, self.shape.score_scale(), query_lanes);
                 lanes::<T, NR>(d_block, keep_scale, output_lanes);
-                panels::<T, NR>(q_block, scale, block, query_panels);
-                panels::<T, NR>(d_block, keep_scale, block, output_panels);
+                panels(q_block, scale, block, columns, query_panels);
+                panels(d_block, keep_scale, block, columns, output_panels);
                 log_sum_exp.fill(T::ZERO);
                 let rows = self.log_sum_exp[first * heads..end * heads].chunks_exact(heads);
                 log_sum_exp.iter_mut().zip(rows).for_each(|(lane, row)| *lane = row[h]);
@@ -107,21 +110,19 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
                 query_sums.fill(T::ZERO);
                 for key in (0..keys).step_by(KEYS) {
                     let (key_end, count) = (keys.min(key + KEYS), KEYS.min(keys - key));
-                    let scores = &mut scores[..count * block];
-                    let d_scores = &mut d_scores[..count * block];
-                    product::<T, I, MR, NR>(k.range(key, key_end), query_lanes, RowsMut::packed(scores, count, block), Write::Set);
-                    product::<T, I, MR, NR>(
-                        v.range(key, key_end),
-                        output_lanes,
-                        RowsMut::packed(d_scores, count, block),
-                        Write::Set,
-                    );
+                    let [scores, d_scores] = [&mut scores[..count * block], &mut d_scores[..count * block]];
+                    for (rows, panels, scores) in [(k, &*query_lanes, &mut *scores), (v, &*output_lanes, &mut *d_scores)] {
+                        let (rows, c) = (rows.range(key, key_end), RowsMut::packed(scores, count, block));
+                        Product { rows, panels, c, write: Write::Set }.run::<I, MR, NR>();
+                    }
                     gradient_block::<T, I, NR>(block, key, mask.as_ref(), scores, d_scores, log_sum_exp, means);
-                    let target = |sums| RowsMut::packed(sums, count, wide);
                     let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
-                    product::<T, I, MR, NR>(s, output_panels, target(&mut value_sums[key * wide..key_end * wide]), Write::Add);
-                    product::<T, I, MR, NR>(ds, query_panels, target(&mut key_sums[key * wide..key_end * wide]), Write::Add);
-                    transposed_product::<T, I, MR, NR>(ds, (key_panels, keys, key), RowsMut::packed(query_sums, block, wide));
+                    for (rows, panels, sums) in [(s, &*output_panels, &mut *value_sums), (ds, &*query_panels, &mut *key_sums)] {
+                        let c = RowsMut::packed(&mut sums[key * wide..key_end * wide], count, wide);
+                        tile.run::<T, I, MR, NR>(Product { rows, panels, c, write: Write::Add });
+                    }
+                    let c = RowsMut::packed(query_sums, block, wide);
+                    tile.run::<T, I, MR, NR>(TransposedProduct { s: ds, panels: key_panels, keys, key, c });
                 }
                 emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
             }
@@ -131,7 +132,7 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
     }
 }
 
-/// Over a block `[keys, lanes]` from key `first_key`, which is even: scores become m∘p, and the gradients of m∘p become those of the
+/// Over a block `[keys, queries]` from key `first_key`, which is even: scores become m∘p, and the gradients of m∘p become those of the
 /// scores, p∘(m∘dp − D).
 #[inline(always)]
 fn gradient_block<T: Real, I: Isa, const NR: usize>(
@@ -147,27 +148,43 @@ fn gradient_block<T: Real, I: Isa, const NR: usize>(
     for (chunk, (&log_sum_exp, &means)) in lanes.enumerate() {
         let pairs = scores.chunks_mut(2 * block).zip(d_scores.chunks_mut(2 * block));
         for ((rows, d_rows), key) in pairs.zip((first_key..).step_by(2)) {
-            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair::<T>(key));
-            for (i, (row, d_row)) in rows.chunks_exact_mut(block).zip(d_rows.chunks_exact_mut(block)).enumerate() {
-                let (row, d_row) = (&mut row.as_chunks_mut::<NR>().0[chunk], &mut d_row.as_chunks_mut::<NR>().0[chunk]);
-                // In variables of their own, which nothing else can point to.
-                let (mut p, mut ds) = (*row, *d_row);
-                for (p, l) in p.iter_mut().zip(&log_sum_exp) {
-                    *p = exp_negative::<T, I>(*p - *l);
-                }
-                if let Some(keeps) = &keeps {
-                    ds.iter_mut().zip(&keeps[i]).for_each(|(dp, keep)| *dp *= *keep);
-                }
-                for ((ds, p), mean) in ds.iter_mut().zip(&p).zip(&means) {
-                    *ds = *p * (*ds - *mean);
-                }
-                if let Some(keeps) = &keeps {
-                    p.iter_mut().zip(&keeps[i]).for_each(|(p, keep)| *p *= *keep);
-                }
-                (*row, *d_row) = (p, ds);
+            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair(key));
+            let (first, second) = pair_of_rows::<T, NR>(rows, block, chunk);
+            let (d_first, d_second) = pair_of_rows::<T, NR>(d_rows, block, chunk);
+            let keep = keeps.as_ref().map(|keeps| &keeps[0]);
+            (*first, *d_first) = gradient_row::<T, I, NR>(*first, *d_first, &log_sum_exp, &means, keep);
+            if let (Some(second), Some(d_second)) = (second, d_second) {
+                let keep = keeps.as_ref().map(|keeps| &keeps[1]);
+                (*second, *d_second) = gradient_row::<T, I, NR>(*second, *d_second, &log_sum_exp, &means, keep);
             }
         }
     }
+}
+
+/// One key of [`gradient_block`]: m∘p and the gradient of the scores. By value: nothing else can point to these numbers, which stay in
+/// registers.
+#[inline(always)]
+fn gradient_row<T: Real, I: Isa, const NR: usize>(
+    s: [T; NR],
+    dp: [T; NR],
+    log_sum_exp: &[T; NR],
+    means: &[T; NR],
+    keep: Option<&Keep<NR>>,
+) -> ([T; NR], [T; NR]) {
+    let (mut p, mut ds) = (s, dp);
+    for (p, l) in p.iter_mut().zip(log_sum_exp) {
+        *p = power_of_two::<T, I>(*p - *l);
+    }
+    if let Some(keep) = keep {
+        ds = keep.of(ds);
+    }
+    for ((ds, p), mean) in ds.iter_mut().zip(&p).zip(means) {
+        *ds = *p * (*ds - *mean);
+    }
+    if let Some(keep) = keep {
+        p = keep.of(p);
+    }
+    (p, ds)
 }
 
 /// Stores the first `rows` of padded sums.
