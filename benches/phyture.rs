@@ -65,8 +65,9 @@ fn inference(criterion: &mut Criterion) -> Result<()> {
         let mut group = criterion.benchmark_group(group);
         group.sample_size(10).measurement_time(Duration::from_secs(10));
         let mut session = Session::infer(network.graph(), &[network.output()], Threads(threads))?;
+        session.load(&parameters)?;
         group.bench_function(BenchmarkId::from_parameter(id), |bencher| {
-            bencher.iter(|| session.predict(&parameters, samples, &fill, &mut |_, _| {}).is_ok());
+            bencher.iter(|| session.predict(samples, &fill, &mut |_, _| {}).is_ok());
         });
         group.finish();
     }

@@ -58,9 +58,10 @@ fn run() -> Result<String, String> {
     match case.as_str() {
         "forward" => {
             let mut session = Session::infer(network.graph(), &[network.output()], Threads(threads)).map_err(text)?;
+            session.load(&parameters).map_err(text)?;
             for _ in 0..WARM_UP + repeats {
                 let start = Instant::now();
-                session.predict(&parameters, batch, &fill, &mut |_, _| {}).map_err(text)?;
+                session.predict(batch, &fill, &mut |_, _| {}).map_err(text)?;
                 seconds.push(start.elapsed().as_secs_f64());
             }
         }

@@ -118,6 +118,7 @@ fn convolution(criterion: &mut Criterion) {
         };
         let mut contenders = each_level(|level| {
             let (mut y, packed) = (vec![0.0; after * WIDTH], packed(level, false));
+            let mut scratch = vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)];
             Box::new(move || {
                 conv1d::forward(
                     level,
@@ -127,7 +128,7 @@ fn convolution(criterion: &mut Criterion) {
                     None,
                     epilogue,
                     RowsMut::packed(black_box(&mut y), after, WIDTH),
-                    &mut [],
+                    &mut scratch,
                 );
             })
         });
@@ -161,8 +162,8 @@ fn convolution(criterion: &mut Criterion) {
         ));
         compare(criterion, "conv1d_backward_input", &shape, operations, contenders);
         let mut contenders = each_level(|level| {
-            let mut dw = vec![0.0; 5 * WIDTH * WIDTH];
-            Box::new(move || conv1d::backward_weight(level, geometry, x, dz, black_box(&mut dw), Write::Set))
+            let (mut dw, mut scratch) = (vec![0.0; 5 * WIDTH * WIDTH], vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)]);
+            Box::new(move || conv1d::backward_weight(level, geometry, x, dz, black_box(&mut dw), Write::Set, &mut scratch))
         });
         let mut dw = vec![0.0_f32; 5 * WIDTH * WIDTH];
         contenders.push(("reference", Box::new(move || reference::conv1d_backward_weight(geometry, x, dz, black_box(&mut dw)))));

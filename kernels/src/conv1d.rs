@@ -9,6 +9,8 @@
 //! product, so that neither it nor its gradient is ever transposed (PyTorch keeps `[out, in, taps]`). The padded sequence is never made:
 //! the product reads shifted rows of x where they lie.
 //!
+//! Kernels of 3 and 5 taps between many channels take the shorter way of `six_points`: the same sums in another order.
+//!
 //! Here: shapes and the forward product. f and dropout are in `epilogue`, gradients in `backward`, packed weights in `packing`.
 
 use crate::level::{Isa, Level, Tiled};
@@ -18,6 +20,7 @@ use crate::{Real, Rows, RowsMut};
 mod backward;
 mod epilogue;
 mod packing;
+mod six_points;
 
 pub(crate) use backward::{BackwardInput, BackwardWeight};
 pub use backward::{backward_bias, backward_input, backward_weight};
@@ -47,13 +50,23 @@ impl Geometry {
 
 /// Scratch, in numbers, that any function here needs.
 pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
-    let Geometry { left, right, .. } = geometry;
-    let input = packed_len(geometry, outputs, inputs) + outputs + (left + right) * inputs;
-    packed_len(geometry, inputs, outputs).max(input)
+    let forward = packed_len(geometry, inputs, outputs);
+    let backward = packed_len(geometry, outputs, inputs) + ends_len(geometry, inputs, outputs);
+    if six_points::applies(geometry, inputs, outputs) {
+        let product = six_points::product_scratch_len(inputs.max(outputs));
+        (forward.max(backward) + product).max(six_points::gradient_scratch_len(inputs, outputs))
+    } else {
+        forward.max(backward)
+    }
+}
+
+/// A row of zeros, and the gradients of the padded rows.
+const fn ends_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    outputs + (geometry.left + geometry.right) * inputs
 }
 
 /// Where y may be cut for [`forward_rows`]: at multiples of this many rows, every row is computed by the same instructions as uncut.
-pub const CUT: usize = tile::CUT;
+pub const CUT: usize = six_points::CUT;
 
 /// y = dropout(f(conv(x) + b)).
 ///
@@ -90,14 +103,15 @@ pub fn forward_rows<T: Real>(
 ) {
     assert!(first + y.rows() <= geometry.output_rows(x.rows()), "conv1d: rows of y");
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
-    let packed = match weight {
-        Weight::Packed(packed) => packed,
+    let (packed, scratch) = match weight {
+        Weight::Packed(packed) => (packed, scratch),
         Weight::Plain(weight) => {
-            pack(level, geometry, (x.cols(), y.cols()), weight, scratch);
-            scratch
+            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, x.cols(), y.cols()));
+            pack(level, geometry, (x.cols(), y.cols()), weight, packed);
+            (&*packed, rest)
         }
     };
-    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, first, y });
+    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, first, y, scratch });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -108,6 +122,7 @@ pub(crate) struct Forward<'a, T> {
     epilogue: Epilogue,
     first: usize,
     y: RowsMut<'a, T>,
+    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
@@ -115,10 +130,14 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         const { assert!(CUT.is_multiple_of(MR), "a cut ends inside a tile") };
         let Geometry { taps, left, .. } = self.geometry;
-        let (inputs, outputs) = (self.x.cols(), self.y.cols());
-        let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
-        let shifted = Shifted { x: self.x, taps, left, first: self.first, rows: self.y.rows() };
+        let (rows, inputs, outputs) = (self.y.rows(), self.x.cols(), self.y.cols());
+        let shifted = Shifted { x: self.x, taps, left, first: self.first, rows };
         let mut sink = Finish::new(self.first, self.y, self.bias, self.epilogue);
+        if six_points::applies(self.geometry, inputs, outputs) {
+            let packed = &self.packed[..six_points::packed_len(inputs, outputs)];
+            return six_points::product::<T, I, _, _, MR, NR>(taps, &shifted, (rows, inputs), packed, &mut sink, self.scratch);
+        }
+        let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
         tile::rows::<T, I, _, _, MR, NR>(&shifted, outputs, panels, &mut sink);
     }
 }
@@ -158,6 +177,13 @@ impl<T> LeftRows<T> for Shifted<'_, T> {
     }
 }
 
+impl<T> six_points::Sequence<T> for Shifted<'_, T> {
+    #[inline(always)]
+    fn row(&self, s: usize) -> &[T] {
+        self.x.row(self.source(s, 0))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
@@ -180,7 +206,8 @@ mod tests {
     }
 
     pub(super) fn problem() -> impl Strategy<Value = Problem> {
-        (1_usize..6, 0_usize..5, 0_usize..5, 0_usize..200, 1_usize..35, 1_usize..35, 0_u64..1000).prop_map(
+        let channels = || prop_oneof![3 => 1_usize..35, 1 => Just(32), 1 => Just(64)];
+        (1_usize..6, 0_usize..5, 0_usize..5, 0_usize..200, channels(), channels(), 0_u64..1000).prop_map(
             |(taps, left, right, rows, inputs, outputs, seed)| Problem {
                 geometry: Geometry { taps, left, right },
                 rows,
@@ -222,7 +249,7 @@ mod tests {
                 });
             }
             check_writes(&format!("dW at {level}"), &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write);
+                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
             });
         }
     }

@@ -96,7 +96,7 @@ pub(crate) fn unload<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>) -> [T; 
 
 /// Writes a row of a tile.
 #[inline(always)]
-fn store<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &mut [T; NR]) {
+pub(crate) fn store<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &mut [T; NR]) {
     let to = numbers.as_mut_ptr();
     // SAFETY: the array holds one register, and two where there is a pair.
     unsafe {
@@ -109,7 +109,7 @@ fn store<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &mut [T; N
 
 /// NR numbers as registers.
 #[inline(always)]
-fn load<T: Real, I: Isa, const NR: usize>(numbers: &[T; NR]) -> Pair<T, I> {
+pub(crate) fn load<T: Real, I: Isa, const NR: usize>(numbers: &[T; NR]) -> Pair<T, I> {
     let from = numbers.as_ptr();
     // SAFETY: the array holds one register, and two where there is a pair.
     unsafe {
@@ -226,7 +226,7 @@ fn spill<T: Real, I: Isa, const MR: usize, const NR: usize>(acc: [Pair<T, I>; MR
 
 /// `acc[i] += a·b` for a row of NR numbers.
 #[inline(always)]
-fn accumulate<T: Real, I: Isa, const NR: usize>(acc: &mut Pair<T, I>, a: T, b: Pair<T, I>) {
+pub(crate) fn accumulate<T: Real, I: Isa, const NR: usize>(acc: &mut Pair<T, I>, a: T, b: Pair<T, I>) {
     let a = I::Vector::splat(a);
     acc[0] = a.mul_add(b[0], acc[0]);
     if is_pair::<T, I, NR>() {

@@ -249,6 +249,7 @@ impl Hybrid {
     /// The network on windows that have been checked, on top of the sequences' baselines.
     fn complete_windows(&self, sequences: &[sequence::Sequence], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
         let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
+        session.load(&self.parameters)?;
         let mut predicted = Vec::with_capacity(windows.len());
         for chunk in windows.chunks(CHUNK) {
             let fill = |sample: usize, slabs: &mut [&mut [f32]]| {
@@ -256,7 +257,7 @@ impl Hybrid {
                     sequences[window.flight].history(window.last, state, physics);
                 }
             };
-            session.predict(&self.parameters, chunk.len(), &fill, &mut |sample, output| {
+            session.predict(chunk.len(), &fill, &mut |sample, output| {
                 let window = chunk[sample];
                 predicted.push(self.complete(sequences[window.flight].baseline(window.last), output));
             })?;

@@ -35,12 +35,14 @@ impl<'a> StreamingHybrid<'a> {
             return Err(error);
         }
         let history = description.config.history();
+        let mut session = Session::infer(hybrid.network.graph(), &[hybrid.network.output()], Threads(1))?;
+        session.load(&hybrid.parameters)?;
         Ok(Self {
             hybrid,
             model: description.model.stream(description.step_s)?,
             linear: description.linear.as_ref().map(|linear| StreamingLinear::new(linear, description.step_s)).transpose()?,
             inputs: formulas.iter().map(|formula| formula.stream(description.step_s)).collect::<Result<_>>()?,
-            session: Session::infer(hybrid.network.graph(), &[hybrid.network.output()], Threads(1))?,
+            session,
             state: vec![0.0; history * description.inputs.len()],
             physics: vec![0.0; history * 6],
             samples: 0,
@@ -88,8 +90,7 @@ impl<'a> StreamingHybrid<'a> {
             }
         };
         let mut predicted = [f64::NAN; 6];
-        self.session
-            .predict(&self.hybrid.parameters, 1, &fill, &mut |_, output| predicted = self.hybrid.complete(baseline, output))?;
+        self.session.predict(1, &fill, &mut |_, output| predicted = self.hybrid.complete(baseline, output))?;
         if predicted.iter().any(|value| !value.is_finite()) {
             return Err(Error::Undetermined(format!("sample {}: the prediction is not finite", self.samples - 1)));
         }

@@ -47,6 +47,8 @@ pub struct Session<T> {
     slabs: Slabs<T>,
     /// Weights as the forward and the backward calls of a step want them.
     packed: [Slab<T>; 2],
+    /// Parameters that [`Session::load`] was given.
+    loaded: Vec<T>,
     shards: Vec<Shard<T>>,
     gradients: Vec<T>,
     losses: Vec<f64>,
@@ -92,6 +94,7 @@ impl<T: Real> Session<T> {
             poison: false,
             packed: plan.packed_len.map(Slab::new),
             slabs: Slabs::new(count.min(shards), plan.slab_len),
+            loaded: Vec::new(),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
             losses: Vec::new(),
@@ -125,32 +128,82 @@ impl<T: Real> Session<T> {
     /// # Errors
     /// [`Error::Shape`] if `parameters` is not as long as the graph's flat slab.
     pub fn step(&mut self, parameters: &[T], samples: usize, dropout: Option<DropoutKey>, fill: Fill<'_, T>) -> Result<f64> {
-        if parameters.len() != self.plan.parameter_len {
-            let message = format!("{} parameters; the graph has {}", parameters.len(), self.plan.parameter_len);
-            return Err(Error::Shape { operation: "session", message });
+        self.pack(parameters)?;
+        // What was loaded is not what is packed any more.
+        self.loaded.clear();
+        Ok(self.replay(parameters, samples, dropout, fill))
+    }
+
+    /// Takes over parameters for [`Session::predict`]: what can be prepared of them is prepared once, here.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if `parameters` is not as long as the graph's flat slab.
+    pub fn load(&mut self, parameters: &[T]) -> Result<()> {
+        self.pack(parameters)?;
+        self.loaded.clear();
+        self.loaded.extend_from_slice(parameters);
+        Ok(())
+    }
+
+    /// Runs samples `0..samples` with the parameters loaded and without dropout, and hands the outputs over in order.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if no parameters are loaded; [`Session::step`] forgets them.
+    pub fn predict(&mut self, samples: usize, fill: Fill<'_, T>, each: &mut dyn FnMut(usize, &[T])) -> Result<()> {
+        self.check(&self.loaded)?;
+        let loaded = std::mem::take(&mut self.loaded);
+        self.replay(&loaded, samples, None, fill);
+        self.loaded = loaded;
+        let output_len = self.plan.outputs.iter().map(ExactSizeIterator::len).sum();
+        let result_len = self.result_len();
+        for sample in 0..samples {
+            each(sample, &self.results[sample * result_len..][..output_len]);
         }
+        Ok(())
+    }
+
+    fn check(&self, parameters: &[T]) -> Result<()> {
+        if parameters.len() == self.plan.parameter_len {
+            return Ok(());
+        }
+        let message = format!("{} parameters; the graph has {}", parameters.len(), self.plan.parameter_len);
+        Err(Error::Shape { operation: "session", message })
+    }
+
+    /// Weights in the form their kernels want.
+    fn pack(&mut self, parameters: &[T]) -> Result<()> {
+        self.check(parameters)?;
+        let Self { plan, level, packed, workers, .. } = self;
+        workers.run(|parallelism| {
+            let [forward, backward] = packed.each_mut().map(Slab::aligned);
+            parallelism.join(
+                || pack(parallelism, &plan.forward, Pass::Forward, *level, parameters, 0, forward),
+                || pack(parallelism, &plan.backward, Pass::Backward, *level, parameters, 0, backward),
+            );
+        });
+        Ok(())
+    }
+
+    /// The samples of a step, with weights as they are packed; the mean loss.
+    fn replay(&mut self, parameters: &[T], samples: usize, dropout: Option<DropoutKey>, fill: Fill<'_, T>) -> f64 {
         let result_len = self.result_len();
         if self.losses.len() < samples {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
-        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers } = self;
+        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers, .. } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
         workers.run(|parallelism| {
-            let [forward, backward] = packed.each_mut().map(Slab::aligned);
-            parallelism.join(
-                || pack(parallelism, &plan.forward, Pass::Forward, level, parameters, 0, forward),
-                || pack(parallelism, &plan.backward, Pass::Backward, level, parameters, 0, backward),
-            );
+            let packed = packed.each_mut().map(|packed| &*packed.aligned());
             let replay = Replay {
                 plan,
                 level,
                 poison,
                 parallelism,
                 slabs,
-                packed: [&*forward, &*backward],
+                packed,
                 parameters,
                 dropout,
                 fill,
@@ -171,27 +224,7 @@ impl<T: Real> Session<T> {
                 gradients.fill(T::ZERO);
             }
         }
-        Ok(self.losses[..samples].iter().sum::<f64>() / samples.max(1) as f64)
-    }
-
-    /// Runs samples `0..samples` without dropout and hands the outputs over in order.
-    ///
-    /// # Errors
-    /// As [`Session::step`].
-    pub fn predict(
-        &mut self,
-        parameters: &[T],
-        samples: usize,
-        fill: Fill<'_, T>,
-        each: &mut dyn FnMut(usize, &[T]),
-    ) -> Result<()> {
-        self.step(parameters, samples, None, fill)?;
-        let output_len = self.plan.outputs.iter().map(ExactSizeIterator::len).sum();
-        let result_len = self.result_len();
-        for sample in 0..samples {
-            each(sample, &self.results[sample * result_len..][..output_len]);
-        }
-        Ok(())
+        self.losses[..samples].iter().sum::<f64>() / samples.max(1) as f64
     }
 
     /// Lets operations that couple samples keep what the last step told them (running means of a batch normalisation) in their
@@ -336,7 +369,9 @@ mod tests {
         assert!(first != other && first != off);
         let mut order = Vec::new();
         let mut infer = Session::infer(&graph, &[output], Threads(2))?;
-        infer.predict(&parameters, 3, &fill, &mut |sample, output| {
+        assert!(infer.predict(1, &fill, &mut |_, _| {}).is_err(), "a prediction without parameters");
+        infer.load(&parameters)?;
+        infer.predict(3, &fill, &mut |sample, output| {
             order.push(sample);
             assert!(sample != 1 || bits(output) == off, "inference differs from training without dropout");
         })?;

@@ -38,41 +38,47 @@ impl<'a, T: Real> Finish<'a, T> {
         Self { first, y, bias, epilogue, scale: T::of(epilogue.dropout.map_or(1.0, Mask::scale)) }
     }
 
-    /// Row `i`, columns `j…` of z without its bias becomes y. The numbers are a variable of the caller's own, which nothing else can
-    /// point to: only then do these loops become one pass over registers.
+    /// y of row `i`, columns `j…`, from z without its bias. By value, so that nothing else can point to these numbers and the steps
+    /// become one pass over registers.
     #[inline(always)]
-    fn apply<I: Isa>(&self, i: usize, j: usize, z: &mut [T]) {
-        if let Some(bias) = self.bias {
-            z.iter_mut().zip(&bias[j..]).for_each(|(z, b)| *z += *b);
+    fn apply<I: Isa, const N: usize>(&self, i: usize, j: usize, mut z: [T; N], bias: Option<&[T; N]>) -> [T; N] {
+        if let Some(bias) = bias {
+            z.iter_mut().zip(bias).for_each(|(z, b)| *z += *b);
         }
         if let Activation::LeakyRelu { slope } = self.epilogue.activation {
             let slope = T::of(slope);
             z.iter_mut().for_each(|z| *z = if *z > T::ZERO { *z } else { -(slope * z.abs()) });
         } else {
-            activation::map::<T, I>(self.epilogue.activation, z);
+            activation::map::<T, I>(self.epilogue.activation, &mut z);
         }
         if let Some(mask) = self.epilogue.dropout {
             let mask = mask.row(self.first + i);
             z.iter_mut().enumerate().for_each(|(c, z)| *z = if mask.keeps(j + c) { *z * self.scale } else { T::ZERO });
         }
+        z
     }
 }
 
 impl<T: Real> Sink<T> for Finish<'_, T> {
     #[inline(always)]
     fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]) {
-        let mut z = [T::ZERO; tile::WIDEST];
-        let z = &mut z[..sums.len()];
-        z.copy_from_slice(sums);
-        self.apply::<I>(i, j, z);
-        self.y.row_mut(i)[j..][..z.len()].copy_from_slice(z);
+        let widened = |x: &[T]| {
+            let mut wide = [T::ZERO; tile::WIDEST];
+            wide[..sums.len()].copy_from_slice(&x[..sums.len()]);
+            wide
+        };
+        let bias = self.bias.map(|bias| widened(&bias[j..]));
+        let y = self.apply::<I, { tile::WIDEST }>(i, j, widened(sums), bias.as_ref());
+        self.y.row_mut(i)[j..][..sums.len()].copy_from_slice(&y[..sums.len()]);
     }
 
     #[inline(always)]
     fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: tile::Pair<T, I>) {
-        let mut z = tile::unload::<T, I, NR>(sums);
-        self.apply::<I>(i, j, &mut z);
-        self.y.row_mut(i)[j..][..NR].copy_from_slice(&z);
+        let bias = self.bias.and_then(|bias| bias[j..].first_chunk::<NR>());
+        let y = self.apply::<I, NR>(i, j, tile::unload::<T, I, NR>(sums), bias);
+        if let Some(to) = self.y.row_mut(i)[j..].first_chunk_mut::<NR>() {
+            *to = y;
+        }
     }
 }
 
@@ -187,7 +193,7 @@ mod tests {
         let epilogue = Epilogue { activation: LEAKY, dropout: Some(mask) };
         for level in Level::available() {
             let (x, dy) = (vec![1.0_f32; 64], vec![1.0_f32; 64]);
-            let (mut y, mut dz, mut scratch) = (vec![f32::NAN; 64], vec![f32::NAN; 64], vec![0.0; 64]);
+            let (mut y, mut dz, mut scratch) = (vec![f32::NAN; 64], vec![f32::NAN; 64], vec![0.0; scratch_len(geometry, 1, 1)]);
             forward(
                 level,
                 geometry,

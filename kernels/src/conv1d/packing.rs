@@ -2,13 +2,17 @@
 //!
 //! Not here: any arithmetic.
 
-use super::Geometry;
+use super::{Geometry, six_points};
 use crate::level::{Isa, Level, Tiled};
 use crate::{Real, Rows, tile};
 
 /// Numbers of a weight packed by [`pack`]; by [`pack_transposed`] with inputs and outputs exchanged.
 pub const fn packed_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
-    tile::panels_len(geometry.taps * inputs, outputs)
+    if six_points::applies(geometry, inputs, outputs) {
+        six_points::packed_len(inputs, outputs)
+    } else {
+        tile::panels_len(geometry.taps * inputs, outputs)
+    }
 }
 
 /// A weight `[taps, in, out]`, as it is or as packed once for many calls.
@@ -57,9 +61,15 @@ pub(crate) struct Pack<'a, T> {
 impl<T: Real> Tiled<T> for Pack<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let Self { geometry: Geometry { taps, .. }, inputs, outputs, weight, packed, transposed } = self;
+        let Self { geometry, inputs, outputs, weight, packed, transposed } = self;
+        let Geometry { taps, .. } = geometry;
         if weight.is_empty() {
             return;
+        }
+        if six_points::applies(geometry, inputs, outputs) {
+            let packed = &mut packed[..six_points::packed_len(inputs, outputs)];
+            let pack = if transposed { six_points::pack_transposed::<T, I, NR> } else { six_points::pack::<T, I, NR> };
+            return pack(taps, inputs, outputs, weight, packed);
         }
         if !transposed {
             let panels = &mut packed[..taps * inputs * outputs.next_multiple_of(NR)];

@@ -154,7 +154,7 @@ impl<T: Real> Differentiable<T> for Conv1d {
             conv1d::backward_input(io.level, geometry, dz, weight, rows_mut(dx.values, x), dx.write, scratch);
         }
         if let Some(dweight) = dweight {
-            conv1d::backward_weight(io.level, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write);
+            conv1d::backward_weight(io.level, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write, scratch);
         }
         if let Some(dbias) = dbias {
             conv1d::backward_bias(io.level, dz, dbias.values, dbias.write);
