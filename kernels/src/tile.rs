@@ -120,7 +120,7 @@ pub(crate) fn load<T: Real, I: Isa, const NR: usize>(numbers: &[T; NR]) -> Pair<
 
 /// A row of a tile plus the first NR of at least as many numbers.
 #[inline(always)]
-fn plus<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &[T]) -> Pair<T, I> {
+pub(crate) fn plus<T: Real, I: Isa, const NR: usize>(pair: Pair<T, I>, numbers: &[T]) -> Pair<T, I> {
     let Some(numbers) = numbers.first_chunk::<NR>() else { return pair };
     let more = load::<T, I, NR>(numbers);
     [pair[0].add(more[0]), if is_pair::<T, I, NR>() { pair[1].add(more[1]) } else { pair[1] }]

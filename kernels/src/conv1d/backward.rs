@@ -65,7 +65,14 @@ impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
             let packed = &self.packed[..six_points::packed_len(outputs, inputs)];
             let rows = n + left + right;
             let mut sink = Padded { left, n, inner, outer };
-            six_points::product::<T, I, _, _, MR, NR>(taps, &part(0, rows, 0, rows), (rows, outputs), packed, &mut sink, self.scratch);
+            six_points::product::<T, I, _, _, MR, NR>(
+                taps,
+                &part(0, rows, 0, rows),
+                (rows, outputs),
+                packed,
+                &mut sink,
+                self.scratch,
+            );
         } else {
             let panels = &self.packed[..taps * outputs * inputs.next_multiple_of(NR)];
             tile::rows::<T, I, _, _, MR, NR>(&part(left, n, 0, n), inputs, panels, &mut inner);

@@ -42,6 +42,12 @@ const GROUPS: usize = 12;
 /// Groups of a block in the gradient of the weight, where the sum runs along them.
 const WEIGHT_GROUPS: usize = 96;
 
+/// Numbers of one point in a buffer of several: a few cache lines more than it holds, since otherwise the same place of all points
+/// would be in the same few lines of the first-level cache.
+const fn apart(numbers: usize) -> usize {
+    numbers + 80
+}
+
 /// A multiple of m for every number of taps, and of m·[`GROUPS`].
 pub(super) const CUT: usize = 4 * GROUPS;
 
@@ -60,7 +66,11 @@ const fn power(point: usize, exponent: usize, count: usize) -> f64 {
 
 /// Whether a convolution of these sizes is computed this way.
 pub(super) const fn applies(geometry: Geometry, inputs: usize, outputs: usize) -> bool {
-    matches!(geometry.taps, 3 | 5) && inputs > 0 && outputs > 0 && inputs.is_multiple_of(tile::WIDEST) && outputs.is_multiple_of(tile::WIDEST)
+    matches!(geometry.taps, 3 | 5)
+        && inputs > 0
+        && outputs > 0
+        && inputs.is_multiple_of(tile::WIDEST)
+        && outputs.is_multiple_of(tile::WIDEST)
 }
 
 /// Numbers of a packed weight.
@@ -70,12 +80,12 @@ pub(super) const fn packed_len(inputs: usize, outputs: usize) -> usize {
 
 /// Scratch, in numbers, of [`product`].
 pub(super) const fn product_scratch_len(inputs: usize) -> usize {
-    POINTS * GROUPS * (inputs + tile::WIDEST)
+    POINTS * (apart(GROUPS * inputs) + apart(GROUPS * tile::WIDEST))
 }
 
 /// Scratch, in numbers, of [`weight_gradient`].
 pub(super) const fn gradient_scratch_len(inputs: usize, outputs: usize) -> usize {
-    POINTS * (WEIGHT_GROUPS * (inputs + outputs) + inputs * outputs)
+    POINTS * (apart(WEIGHT_GROUPS * inputs) + apart(WEIGHT_GROUPS * outputs) + apart(inputs * outputs))
 }
 
 /// u of a weight `[taps, in, out]`, as panels `[out/NR][τ][in][NR]`.
@@ -174,13 +184,14 @@ fn groups<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const M: usize, const MR:
     scratch: &mut [T],
 ) {
     const { assert!(GROUPS.is_multiple_of(MR), "a block of groups ends inside a tile") };
-    let (v, products) = scratch.split_at_mut(POINTS * GROUPS * inputs);
-    let products = &mut products[..POINTS * GROUPS * NR];
+    let (v, products) = scratch.split_at_mut(POINTS * apart(GROUPS * inputs));
+    let products = &mut products[..POINTS * apart(GROUPS * NR)];
     for start in (0..rows).step_by(GROUPS * M) {
         let count = (rows - start).div_ceil(M).min(GROUPS);
-        transform::<T, I, X, NR>(x, (start, M), (count, GROUPS), inputs, v);
+        transform::<T, I, X, NR>(x, (start, M), (count, apart(GROUPS * inputs)), inputs, v);
         for (panel, j) in packed.chunks_exact(POINTS * inputs * NR).zip((0..).step_by(NR)) {
-            let points = v.chunks_exact(GROUPS * inputs).zip(panel.chunks_exact(inputs * NR)).zip(products.chunks_exact_mut(GROUPS * NR));
+            let points = v.chunks_exact(apart(GROUPS * inputs)).zip(panel.chunks_exact(inputs * NR));
+            let points = points.zip(products.chunks_exact_mut(apart(GROUPS * NR)));
             for ((v, u), product) in points {
                 let mut sink = Store { c: RowsMut::packed(product, count, NR), bias: None, write: Write::Set };
                 tile::rows::<T, I, _, _, MR, NR>(&Rows::packed(v, count, inputs), NR, u, &mut sink);
@@ -188,7 +199,7 @@ fn groups<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const M: usize, const MR:
             for group in 0..count {
                 let mut z = [[I::splat(T::ZERO); 2]; M];
                 for point in 0..POINTS {
-                    let Some(product) = products[(point * GROUPS + group) * NR..].first_chunk::<NR>() else { return };
+                    let Some(product) = products[point * apart(GROUPS * NR) + group * NR..].first_chunk::<NR>() else { return };
                     let product = tile::load::<T, I, NR>(product);
                     for (i, z) in z.iter_mut().enumerate() {
                         add_multiple::<T, I, NR>(z, power(point, i, M), product);
@@ -213,12 +224,12 @@ fn add_multiple<T: Real, I: Isa, const NR: usize>(sum: &mut Pair<T, I>, factor: 
     }
 }
 
-/// v of `count` groups of M rows from row `first` on, `[τ][most][inputs]`.
+/// v of `count` groups of m rows from row `first` on, `[τ][groups][inputs]` with points `distance` apart.
 #[inline(always)]
 fn transform<T: Real, I: Isa, X: Sequence<T>, const NR: usize>(
     x: &X,
     (first, m): (usize, usize),
-    (count, most): (usize, usize),
+    (count, distance): (usize, usize),
     inputs: usize,
     v: &mut [T],
 ) {
@@ -239,7 +250,7 @@ fn transform<T: Real, I: Isa, X: Sequence<T>, const NR: usize>(
                 for (factor, x) in factors.iter().zip(x) {
                     add_multiple::<T, I, NR>(&mut sum, *factor, x);
                 }
-                let Some(to) = v[(point * most + group) * inputs + c..].first_chunk_mut::<NR>() else { return };
+                let Some(to) = v[point * distance + group * inputs + c..].first_chunk_mut::<NR>() else { return };
                 tile::store::<T, I, NR>(sum, to);
             }
         }
@@ -271,16 +282,16 @@ fn gradient_groups<T: Real, I: Isa, X: Sequence<T>, const M: usize, const MR: us
     scratch: &mut [T],
 ) {
     let (rows, outputs) = (dz.rows(), dz.cols());
-    let (v, rest) = scratch.split_at_mut(POINTS * WEIGHT_GROUPS * inputs);
-    let (d_products, rest) = rest.split_at_mut(POINTS * WEIGHT_GROUPS * outputs);
-    let du = &mut rest[..POINTS * inputs * outputs];
+    let (v, rest) = scratch.split_at_mut(POINTS * apart(WEIGHT_GROUPS * inputs));
+    let (d_products, rest) = rest.split_at_mut(POINTS * apart(WEIGHT_GROUPS * outputs));
+    let du = &mut rest[..POINTS * apart(inputs * outputs)];
     for start in (0..rows).step_by(WEIGHT_GROUPS * M) {
         let count = (rows - start).div_ceil(M).min(WEIGHT_GROUPS);
         let write = if start == 0 { Write::Set } else { Write::Add };
-        transform::<T, I, X, NR>(x, (start, M), (count, WEIGHT_GROUPS), inputs, v);
+        transform::<T, I, X, NR>(x, (start, M), (count, apart(WEIGHT_GROUPS * inputs)), inputs, v);
         spread::<T, I, M, NR>(&dz, (start, count), d_products);
-        let points = v.chunks_exact(WEIGHT_GROUPS * inputs).zip(d_products.chunks_exact(WEIGHT_GROUPS * outputs));
-        for ((v, d_products), du) in points.zip(du.chunks_exact_mut(inputs * outputs)) {
+        let points = v.chunks_exact(apart(WEIGHT_GROUPS * inputs)).zip(d_products.chunks_exact(apart(WEIGHT_GROUPS * outputs)));
+        for ((v, d_products), du) in points.zip(du.chunks_exact_mut(apart(inputs * outputs))) {
             let v = Rows::packed(v, count, inputs);
             let mut sink = Store { c: RowsMut::packed(du, inputs, outputs), bias: None, write };
             for (panel, j) in d_products.chunks_exact(WEIGHT_GROUPS * NR).zip((0..).step_by(NR)) {
@@ -294,22 +305,32 @@ fn gradient_groups<T: Real, I: Isa, X: Sequence<T>, const M: usize, const MR: us
             }
         }
     }
-    let taps = POINTS + 1 - M;
-    for (j, dw) in dweight.chunks_exact_mut(inputs * outputs).enumerate() {
-        for (dw, at) in dw.as_chunks_mut::<NR>().0.iter_mut().zip((0..).step_by(NR)) {
-            let mut sum = if write == Write::Add { *dw } else { [T::ZERO; NR] };
-            for point in 0..POINTS {
-                let factor = T::of(SCALE[point] * power(point, j, taps));
-                sum.iter_mut().zip(&du[point * inputs * outputs + at..]).for_each(|(sum, du)| *sum = I::mul_add(factor, *du, *sum));
+    // dW[j] = Σ_τ G[τ, j]·du[τ]
+    let (taps, size) = (POINTS + 1 - M, inputs * outputs);
+    for at in (0..size).step_by(NR) {
+        let mut sums = [[I::splat(T::ZERO); 2]; POINTS];
+        for point in 0..POINTS {
+            let Some(du) = du[point * apart(size) + at..].first_chunk::<NR>() else { return };
+            let du = tile::load::<T, I, NR>(du);
+            for (j, sum) in sums.iter_mut().enumerate().take(taps) {
+                add_multiple::<T, I, NR>(sum, SCALE[point] * power(point, j, taps), du);
             }
-            *dw = sum;
+        }
+        for (j, sum) in sums.into_iter().enumerate().take(taps) {
+            let Some(dw) = dweight[j * size + at..].first_chunk_mut::<NR>() else { return };
+            let sum = if write == Write::Add { tile::plus::<T, I, NR>(sum, dw) } else { sum };
+            tile::store::<T, I, NR>(sum, dw);
         }
     }
 }
 
 /// Gradients of the products of `count` groups from dz, from row `start` on, as panels `[τ][out/NR][WEIGHT_GROUPS][NR]`.
 #[inline(always)]
-fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(dz: &Rows<'_, T>, (start, count): (usize, usize), d_products: &mut [T]) {
+fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(
+    dz: &Rows<'_, T>,
+    (start, count): (usize, usize),
+    d_products: &mut [T],
+) {
     let outputs = dz.cols();
     for group in 0..count {
         for (panel, j) in (0..outputs).step_by(NR).enumerate() {
@@ -327,7 +348,7 @@ fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(dz: &Rows<'_, T>, (s
                 for (i, z) in z.iter().enumerate() {
                     add_multiple::<T, I, NR>(&mut sum, power(point, i, M), *z);
                 }
-                let at = ((point * outputs / NR + panel) * WEIGHT_GROUPS + group) * NR;
+                let at = point * apart(WEIGHT_GROUPS * outputs) + (panel * WEIGHT_GROUPS + group) * NR;
                 let Some(to) = d_products[at..].first_chunk_mut::<NR>() else { return };
                 tile::store::<T, I, NR>(sum, to);
             }
@@ -346,7 +367,10 @@ mod tests {
             for (i, j, k) in (0..m).flat_map(|i| (0..taps).flat_map(move |j| (0..POINTS).map(move |k| (i, j, k)))) {
                 let factor = |point: usize| power(point, i, m) * SCALE[point] * power(point, j, taps) * INPUT[point][k];
                 let found: f64 = (0..POINTS).map(factor).sum();
-                assert!((found - f64::from(u8::from(i + j == k))).abs() < 1e-14, "{taps} taps: output {i}, tap {j}, input {k}: {found}");
+                assert!(
+                    (found - f64::from(u8::from(i + j == k))).abs() < 1e-14,
+                    "{taps} taps: output {i}, tap {j}, input {k}: {found}"
+                );
             }
         }
     }
