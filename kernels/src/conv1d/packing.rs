@@ -68,8 +68,12 @@ impl<T: Real> Tiled<T> for Pack<'_, T> {
         }
         if six_points::applies(geometry, inputs, outputs) {
             let packed = &mut packed[..six_points::packed_len(inputs, outputs)];
-            let pack = if transposed { six_points::pack_transposed::<T, I, NR> } else { six_points::pack::<T, I, NR> };
-            return pack(taps, inputs, outputs, weight, packed);
+            // Called by name: through a pointer they would be compiled without the level's instructions.
+            return if transposed {
+                six_points::pack_transposed::<T, I, NR>(taps, inputs, outputs, weight, packed)
+            } else {
+                six_points::pack::<T, I, NR>(taps, inputs, outputs, weight, packed)
+            };
         }
         if !transposed {
             let panels = &mut packed[..taps * inputs * outputs.next_multiple_of(NR)];
