@@ -1,5 +1,5 @@
 //! Every kernel at the sizes of the networks, one thread, f32: this processor's best level beside the plain level, the naive
-//! reference, and for matrix products `matrixmultiply` called directly. Ids: `kernel/<name>/<shape>/<level | plain | reference>`.
+//! reference, and for matrix products `matrixmultiply` and `gemm` called directly. Ids: `kernel/<name>/<shape>/<level | plain | reference>`.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -10,7 +10,9 @@ use phyture_kernels::attention::{self, Gradients};
 use phyture_kernels::conv1d::{self, Epilogue, Geometry, Weight};
 use phyture_kernels::dropout::{self, Mask};
 use phyture_kernels::random::Stream;
-use phyture_kernels::{Level, Rows, RowsMut, Write, adam, gemm, layer_norm, moving_average, reference, sci, temporal};
+use phyture_kernels::{
+    Level, Rows, RowsMut, Write, adam, gemm as own_gemm, layer_norm, moving_average, peak, reference, sci, temporal,
+};
 
 /// Numbers in [−1, 1).
 fn numbers(seed: u64, len: usize) -> Vec<f32> {
@@ -41,6 +43,12 @@ fn each_level<'a>(row: impl Fn(Level) -> Box<dyn FnMut() + 'a>) -> Vec<Contender
     levels().into_iter().map(|level| (level.name(), row(level))).collect()
 }
 
+/// What shares of the peak are shares of, measured before everything else.
+fn say_peak(_: &mut Criterion) {
+    let level = levels()[0];
+    println!("multiply-add peak at level {level}: {:.1} GFLOP/s", peak::f32_gflops(level));
+}
+
 fn products(criterion: &mut Criterion) {
     for (m, k, n) in [(1000, 64, 64), (500, 320, 64), (1000, 16, 64), (64, 1000, 64)] {
         let (a, b) = (&*numbers(1, m * k).leak(), &*numbers(2, k * n).leak());
@@ -48,13 +56,13 @@ fn products(criterion: &mut Criterion) {
         let (shape, operations) = (format!("{m}x{k}x{n}"), (2 * m * k * n) as u64);
         type Form = fn(Level, Rows<'_, f32>, Rows<'_, f32>, RowsMut<'_, f32>, Write, &mut [f32]);
         let forms: [(&str, Form, _, _); 3] = [
-            ("gemm_ab", gemm::ab, views.0, views.1),
-            ("gemm_atb", gemm::atb, views.2, views.1),
-            ("gemm_abt", gemm::abt, views.0, views.3),
+            ("gemm_ab", own_gemm::ab, views.0, views.1),
+            ("gemm_atb", own_gemm::atb, views.2, views.1),
+            ("gemm_abt", own_gemm::abt, views.0, views.3),
         ];
         for (name, form, a_view, b_view) in forms {
             let mut rows = each_level(|level| {
-                let (mut c, mut scratch) = (vec![0.0; m * n], vec![0.0; gemm::scratch_len(m, k, n)]);
+                let (mut c, mut scratch) = (vec![0.0; m * n], vec![0.0; own_gemm::scratch_len(m, k, n)]);
                 Box::new(move || form(level, a_view, b_view, RowsMut::packed(black_box(&mut c), m, n), Write::Set, &mut scratch))
             });
             // Element (i, p) of a and (p, j) of b, by their distances.
@@ -83,6 +91,39 @@ fn products(criterion: &mut Criterion) {
                             c.as_mut_ptr(),
                             n as isize,
                             1,
+                        );
+                    }
+                    black_box(&mut c);
+                }),
+            ));
+            let mut c = vec![0.0_f32; m * n];
+            rows.push((
+                "gemm",
+                Box::new(move || {
+                    let [row_a, column_a, row_b, column_b] =
+                        [stride_a.0, stride_a.1, stride_b.0, stride_b.1].map(usize::cast_signed);
+                    // SAFETY: as above; c is overwritten, not read.
+                    unsafe {
+                        gemm::gemm(
+                            m,
+                            n,
+                            k,
+                            c.as_mut_ptr(),
+                            1,
+                            n.cast_signed(),
+                            false,
+                            a.as_ptr(),
+                            column_a,
+                            row_a,
+                            b.as_ptr(),
+                            column_b,
+                            row_b,
+                            0.0,
+                            1.0,
+                            false,
+                            false,
+                            false,
+                            gemm::Parallelism::None,
                         );
                     }
                     black_box(&mut c);
@@ -316,6 +357,6 @@ criterion_group! {
     name = kernels;
     // Short: the whole list has to stay within minutes, the naive rows included.
     config = Criterion::default().sample_size(10).warm_up_time(Duration::from_millis(200)).measurement_time(Duration::from_millis(600));
-    targets = products, convolution, attention_maps, pointwise
+    targets = say_peak, products, convolution, attention_maps, pointwise
 }
 criterion_main!(kernels);

@@ -154,12 +154,28 @@ pub(crate) struct Backward<'a, T> {
 
 impl<T: Real> Kernel for Backward<'_, T> {
     #[inline(always)]
-    fn run<I: Isa>(mut self) {
+    fn run<I: Isa>(self) {
+        // Each arm has a loop of its own in which the kind is a constant: a choice inside the loop would keep it from vectorising.
+        match self.kind {
+            Activation::Identity => self.each::<I>(Activation::Identity),
+            Activation::Relu => self.each::<I>(Activation::Relu),
+            Activation::LeakyRelu { slope } => self.each::<I>(Activation::LeakyRelu { slope }),
+            Activation::Tanh => self.each::<I>(Activation::Tanh),
+            Activation::Sigmoid => self.each::<I>(Activation::Sigmoid),
+            Activation::Elu => self.each::<I>(Activation::Elu),
+            Activation::Gelu => self.each::<I>(Activation::Gelu),
+        }
+    }
+}
+
+impl<T: Real> Backward<'_, T> {
+    #[inline(always)]
+    fn each<I: Isa>(mut self, kind: Activation) {
         for i in 0..self.dy.rows() {
             let triples = self.dx.row_mut(i).iter_mut().zip(self.dy.row(i)).zip(self.saved.row(i));
             match self.write {
-                Write::Set => triples.for_each(|((dx, dy), saved)| *dx = *dy * derivative::<T, I>(self.kind, *saved)),
-                Write::Add => triples.for_each(|((dx, dy), saved)| *dx += *dy * derivative::<T, I>(self.kind, *saved)),
+                Write::Set => triples.for_each(|((dx, dy), saved)| *dx = *dy * derivative::<T, I>(kind, *saved)),
+                Write::Add => triples.for_each(|((dx, dy), saved)| *dx += *dy * derivative::<T, I>(kind, *saved)),
             }
         }
     }

@@ -7,12 +7,13 @@
 //! | [`abt`] | a·bᵀ | `[m, k]` | `[n, k]` |
 //!
 //! c is `[m, n]` and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
-//! stays in the first-level cache; a is read where it lies (tile.rs). Written for the sizes of this project: n from 6 to a few
+//! stays in the first-level cache; a is read where it lies (tile.rs). A result of a few rows is computed from b where it lies, for
+//! packing would cost more than the product; a result no wider than a register with the tall tile. Written for the sizes of this project: n from 6 to a few
 //! hundred, k up to a few thousand, any m.
 
 use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
-use crate::{Real, Rows, RowsMut, Write};
+use crate::{Real, Rows, RowsMut, Write, sums};
 
 /// Longest block of the summed index: a panel of 16 numbers a line is 16 KiB in f32 (8 numbers in f64), half the first-level cache.
 const LONGEST_BLOCK: usize = 256;
@@ -77,24 +78,72 @@ pub(crate) struct Product<'a, T> {
     scratch: &'a mut [T],
 }
 
+/// Results of fewer rows than this are not worth packing for.
+const FEW: usize = 4;
+
 impl<T: Real> Tiled<T> for Product<'_, T> {
     #[inline(always)]
-    fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
-        let n = self.c.cols();
-        for (start, end) in blocks(self.a.cols()) {
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        if self.c.rows() < FEW {
+            self.few_rows::<I>();
+        } else if self.c.cols() <= NR / 2 {
+            I::tall(ByTiles(self));
+        } else {
+            ByTiles(self).run::<I, MR, NR>();
+        }
+    }
+}
+
+impl<T: Real> Product<'_, T> {
+    /// Each row of c from the rows of b: sums of them, or inner products with them.
+    #[inline(always)]
+    fn few_rows<I: Isa>(mut self) {
+        for i in 0..self.c.rows() {
+            let (a, c) = (self.a.row(i), self.c.row_mut(i));
+            match (self.write, self.bias) {
+                (Write::Set, None) => c.fill(T::ZERO),
+                (Write::Set, Some(bias)) => c.copy_from_slice(bias),
+                (Write::Add, None) => {}
+                (Write::Add, Some(bias)) => c.iter_mut().zip(bias).for_each(|(c, bias)| *c += *bias),
+            }
+            match &self.b {
+                Right::Plain(b) => {
+                    for (p, a) in a.iter().enumerate() {
+                        c.iter_mut().zip(b.row(p)).for_each(|(c, b)| *c = I::mul_add(*a, *b, *c));
+                    }
+                }
+                Right::Transposed(b) => {
+                    for (j, c) in c.iter_mut().enumerate() {
+                        *c += sums::dot::<T, I>(a, b.row(j));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// A product by tiles, whatever their shape.
+struct ByTiles<'a, T>(Product<'a, T>);
+
+impl<T: Real> Tiled<T> for ByTiles<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let Product { a, b, bias, mut c, write, scratch } = self.0;
+        let n = c.cols();
+        for (start, end) in blocks(a.cols()) {
             let depth = end - start;
-            let panels = &mut self.scratch[..depth * n.next_multiple_of(NR)];
+            let panels = &mut scratch[..depth * n.next_multiple_of(NR)];
             if depth > 0 {
-                match &self.b {
+                match &b {
                     Right::Plain(b) => tile::pack::<T, NR>(b.range(start, end), panels),
                     Right::Transposed(b) => {
                         tile::pack_transposed::<T, NR>(depth, n, 1, |j| &b.row(j)[start..end], depth * NR, panels);
                     }
                 }
             }
-            let (bias, write) = if start == 0 { (self.bias, self.write) } else { (None, Write::Add) };
-            let mut sink = Store { c: self.c.reborrow(), bias, write };
-            tile::rows::<T, I, _, _, MR, NR>(&self.a.columns(start, depth), n, panels, &mut sink);
+            let (bias, write) = if start == 0 { (bias, write) } else { (None, Write::Add) };
+            let mut sink = Store { c: c.reborrow(), bias, write };
+            tile::rows::<T, I, _, _, MR, NR>(&a.columns(start, depth), n, panels, &mut sink);
         }
     }
 }
@@ -108,19 +157,30 @@ pub(crate) struct TransposedProduct<'a, T> {
 
 impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
     #[inline(always)]
-    fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
-        if self.a.rows() == 0 && self.write == Write::Set {
-            (0..self.c.rows()).for_each(|i| self.c.row_mut(i).fill(T::ZERO));
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        if self.b.cols() <= NR / 2 { I::tall(TransposedByTiles(self)) } else { TransposedByTiles(self).run::<I, MR, NR>() }
+    }
+}
+
+/// A transposed product by tiles, whatever their shape.
+struct TransposedByTiles<'a, T>(TransposedProduct<'a, T>);
+
+impl<T: Real> Tiled<T> for TransposedByTiles<'_, T> {
+    #[inline(always)]
+    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
+        let TransposedProduct { a, b, mut c, write } = self.0;
+        if a.rows() == 0 && write == Write::Set {
+            (0..c.rows()).for_each(|i| c.row_mut(i).fill(T::ZERO));
         }
-        let n = self.b.cols();
+        let n = b.cols();
         let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
-        for start in (0..self.a.rows()).step_by(tile::COLUMN_DEPTH) {
-            let end = self.a.rows().min(start + tile::COLUMN_DEPTH);
-            let write = if start == 0 { self.write } else { Write::Add };
+        for start in (0..a.rows()).step_by(tile::COLUMN_DEPTH) {
+            let end = a.rows().min(start + tile::COLUMN_DEPTH);
+            let write = if start == 0 { write } else { Write::Add };
             for j in (0..n).step_by(NR) {
                 let panel = &mut panel[..end - start];
-                tile::pack_panel(&self.b.range(start, end), j, panel);
-                let (a, mut sink) = (self.a.range(start, end), Store { c: self.c.reborrow(), bias: None, write });
+                tile::pack_panel(&b.range(start, end), j, panel);
+                let (a, mut sink) = (a.range(start, end), Store { c: c.reborrow(), bias: None, write });
                 tile::columns::<T, I, _, MR, NR>((|p| a.row(p), a.cols()), panel, (j, NR.min(n - j)), &mut sink);
             }
         }
