@@ -1,6 +1,6 @@
 """Training steps and forward passes of Phy-Ture beside other programs, on this machine, in turn.
 
-    python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes] [--peers | --only-peers] [--without jax]
+    python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes | --only-sizes] [--peers | --only-peers] [--without jax]
 
 Makes a virtual environment under target/ with the pinned versions below, builds this project's own row, and starts every row in a
 process of its own, one after another, ROUNDS times: so that whatever else the machine does hits all alike. Writes OUT.json (every
@@ -50,6 +50,8 @@ GROUPS = {
         ("JAX, jit", "jax", "forward", True),
     ],
 }
+# Histories and batches beside each other; PyTorch's attention maps of a batch of 128 at history 1000 take 14 GB.
+SIZES = [(250, 32), (500, 32), (1000, 32), (2000, 32), (1000, 1), (1000, 4), (1000, 16), (1000, 128)]
 # The peer networks at their own sizes, without dropout. PyTorch's Informer here attends to every key (fused), ours to those it samples.
 PEERS = ["cnn", "cnn_lstm", "tcn", "timesnet", "timemixer", "dlinear", "informer"]
 # Batch 1 on one thread.
@@ -109,12 +111,20 @@ def table(title, found):
     return [*lines, ""]
 
 
+def size_row(history, batch, pair):
+    own, other = ([second for result in results for second in result["seconds"]] for results in pair)
+    own = statistics.median(own)
+    there = f"{statistics.median(other):.4f} | {statistics.median(other) / own:.2f}" if other else "did not run |"
+    return f"| {history} | {batch} | {own:.4f} | {1e3 * own / batch:.2f} | {there} |"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--sizes", action="store_true", help="also histories 250 to 2000 and batches 1 to 128")
+    parser.add_argument("--only-sizes", action="store_true", help="these histories and batches and nothing else")
     parser.add_argument("--peers", action="store_true", help="also a training step of every peer network beside PyTorch")
     parser.add_argument("--only-peers", action="store_true", help="the peer networks and nothing else")
     parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
@@ -128,7 +138,7 @@ def main():
         record[title] = compare(python, own, keep(rows), threads, batch, history, options.rounds, options.repeats)
         lines.extend(table(title, record[title]))
 
-    if not options.only_peers:
+    if not options.only_peers and not options.only_sizes:
         for title, rows in GROUPS.items():
             add(f"{title}: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
         add(f"latency: history {HISTORY}, batch 1, 1 thread", LATENCY, 1, 1, HISTORY)
@@ -136,11 +146,16 @@ def main():
         rows = [("phyture", "phyture", f"peer-{kind}", False), ("PyTorch", "torch", f"peer-{kind}", False),
                 ("PyTorch, tuned memory", "torch", f"peer-{kind}", True)]
         add(f"{kind}, training step: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
-    if options.sizes:
-        for title, rows in GROUPS.items():
-            pair = [rows[0], next(row for row in rows if row[2] in ("naive-0.2", "fused-0", "forward-fused"))]
-            for history, batch in [(250, 32), (500, 32), (2000, 32), (1000, 1), (1000, 4), (1000, 128)]:
-                add(f"{title}: history {history}, batch {batch}, {threads} threads", pair, threads, batch, history)
+    for title, rows in GROUPS.items() if options.sizes or options.only_sizes else []:
+        pair = [rows[0], next(row for row in rows if row[2] in ("naive-0.2", "fused-0", "forward-fused"))]
+        lines += [f"### {title}, {threads} threads: medians, s", "", f"| history | batch | phyture | a window, ms | {pair[1][0]} | times phyture |",
+                  "| ---: | ---: | ---: | ---: | ---: | ---: |"]
+        for history, batch in SIZES:
+            size = f"{title}: history {history}, batch {batch}"
+            print(size, file=sys.stderr)
+            record[size] = compare(python, own, keep(pair), threads, batch, history, options.rounds, options.repeats)
+            lines.append(size_row(history, batch, [record[size].get(row[0], []) for row in pair]))
+        lines.append("")
     own_results = [result for found in record.values() for result in found["phyture"]]
     versions = sorted({result["version"] for found in record.values() for results in found.values() for result in results})
     processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())

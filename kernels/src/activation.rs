@@ -72,10 +72,26 @@ pub(crate) fn map<T: Real, I: Isa>(kind: Activation, values: &mut [T]) {
             let slope = T::of(slope);
             values.for_each(|x| *x = if *x > T::ZERO { *x } else { slope * *x });
         }
-        Activation::Tanh => values.for_each(|x| *x = tanh::<T, I>(*x)),
-        Activation::Sigmoid => values.for_each(|x| *x = sigmoid::<T, I>(*x)),
-        Activation::Elu => values.for_each(|x| *x = if *x > T::ZERO { *x } else { exp::<T, I>(*x) - T::ONE }),
-        Activation::Gelu => values.for_each(|x| *x = *x * half * (T::ONE + erf::<T, I>(*x * T::of(FRAC_1_SQRT_2)))),
+        Activation::Tanh => {
+            for x in values {
+                *x = tanh::<T, I>(*x);
+            }
+        }
+        Activation::Sigmoid => {
+            for x in values {
+                *x = sigmoid::<T, I>(*x);
+            }
+        }
+        Activation::Elu => {
+            for x in values {
+                *x = if *x > T::ZERO { *x } else { exp::<T, I>(*x) - T::ONE };
+            }
+        }
+        Activation::Gelu => {
+            for x in values {
+                *x = *x * half * (T::ONE + erf::<T, I>(*x * T::of(FRAC_1_SQRT_2)));
+            }
+        }
     }
 }
 
@@ -173,9 +189,15 @@ impl<T: Real> Backward<'_, T> {
     fn each<I: Isa>(mut self, kind: Activation) {
         for i in 0..self.dy.rows() {
             let triples = self.dx.row_mut(i).iter_mut().zip(self.dy.row(i)).zip(self.saved.row(i));
-            match self.write {
-                Write::Set => triples.for_each(|((dx, dy), saved)| *dx = *dy * derivative::<T, I>(kind, *saved)),
-                Write::Add => triples.for_each(|((dx, dy), saved)| *dx += *dy * derivative::<T, I>(kind, *saved)),
+            // Loops, not closures: a closure that is not inlined would be compiled without the level's instructions.
+            if self.write == Write::Set {
+                for ((dx, dy), saved) in triples {
+                    *dx = *dy * derivative::<T, I>(kind, *saved);
+                }
+            } else {
+                for ((dx, dy), saved) in triples {
+                    *dx += *dy * derivative::<T, I>(kind, *saved);
+                }
             }
         }
     }

@@ -268,10 +268,26 @@ impl<T: Real> Kernel for Apply<'_, T> {
     #[inline(always)]
     fn run<I: Isa>(self) {
         match self.function {
-            Function::Exp => self.values.iter_mut().for_each(|x| *x = exp::<T, I>(*x)),
-            Function::Tanh => self.values.iter_mut().for_each(|x| *x = tanh::<T, I>(*x)),
-            Function::Sigmoid => self.values.iter_mut().for_each(|x| *x = sigmoid::<T, I>(*x)),
-            Function::Erf => self.values.iter_mut().for_each(|x| *x = erf::<T, I>(*x)),
+            Function::Exp => {
+                for x in self.values.iter_mut() {
+                    *x = exp::<T, I>(*x);
+                }
+            }
+            Function::Tanh => {
+                for x in self.values.iter_mut() {
+                    *x = tanh::<T, I>(*x);
+                }
+            }
+            Function::Sigmoid => {
+                for x in self.values.iter_mut() {
+                    *x = sigmoid::<T, I>(*x);
+                }
+            }
+            Function::Erf => {
+                for x in self.values.iter_mut() {
+                    *x = erf::<T, I>(*x);
+                }
+            }
         }
     }
 }

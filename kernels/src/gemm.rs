@@ -109,7 +109,9 @@ impl<T: Real> Product<'_, T> {
             match &self.b {
                 Right::Plain(b) => {
                     for (p, a) in a.iter().enumerate() {
-                        c.iter_mut().zip(b.row(p)).for_each(|(c, b)| *c = I::mul_add(*a, *b, *c));
+                        for (c, b) in c.iter_mut().zip(b.row(p)) {
+                            *c = I::mul_add(*a, *b, *c);
+                        }
                     }
                 }
                 Right::Transposed(b) => {

@@ -119,8 +119,12 @@ impl<T: Real> Kernel for Forward<'_, T> {
             }
             let (input_forget, rest) = gates.split_at_mut(2 * hidden);
             let (candidate, output) = rest.split_at_mut(hidden);
-            input_forget.iter_mut().chain(&mut *output).for_each(|gate| *gate = sigmoid::<T, I>(*gate));
-            candidate.iter_mut().for_each(|gate| *gate = tanh::<T, I>(*gate));
+            for gate in input_forget.iter_mut().chain(&mut *output) {
+                *gate = sigmoid::<T, I>(*gate);
+            }
+            for gate in candidate.iter_mut() {
+                *gate = tanh::<T, I>(*gate);
+            }
             let (input, forget) = input_forget.split_at(hidden);
             for k in 0..hidden {
                 let before = if t > 0 { self.cells.view().row(t - 1)[k] } else { T::ZERO };

@@ -64,7 +64,9 @@ pub(crate) struct Average<'a, T> {
 /// y += factor·x
 #[inline(always)]
 fn add_scaled<T: Real, I: Isa>(y: &mut [T], factor: T, x: &[T]) {
-    y.iter_mut().zip(x).for_each(|(y, x)| *y = I::mul_add(factor, *x, *y));
+    for (y, x) in y.iter_mut().zip(x) {
+        *y = I::mul_add(factor, *x, *y);
+    }
 }
 
 impl<T: Real> Kernel for Average<'_, T> {
@@ -83,12 +85,18 @@ impl<T: Real> Kernel for Average<'_, T> {
             };
             if t % RESTART == 0 {
                 sum.fill(T::ZERO);
-                (0..2 * half + 1).filter_map(source).for_each(|x| add_scaled::<T, I>(sum, T::ONE, x));
+                for x in (0..2 * half + 1).filter_map(source) {
+                    add_scaled::<T, I>(sum, T::ONE, x);
+                }
             }
             let pairs = self.y.row_mut(t).iter_mut().zip(sum.iter());
             match self.write {
                 Write::Set => pairs.for_each(|(y, sum)| *y = share * *sum),
-                Write::Add => pairs.for_each(|(y, sum)| *y = I::mul_add(share, *sum, *y)),
+                Write::Add => {
+                    for (y, sum) in pairs {
+                        *y = I::mul_add(share, *sum, *y);
+                    }
+                }
             }
             match (source(2 * half + 1), source(0)) {
                 (Some(enters), Some(leaves)) => sum.iter_mut().zip(enters).zip(leaves).for_each(|((s, e), l)| *s += *e - *l),

@@ -88,7 +88,9 @@ impl<T: Real> Kernel for Forward<'_, T> {
                 Pool::Mean => {
                     y.fill(T::ZERO);
                     for s in window {
-                        y.iter_mut().zip(self.x.row(s)).for_each(|(y, x)| *y = I::mul_add(share, *x, *y));
+                        for (y, x) in y.iter_mut().zip(self.x.row(s)) {
+                            *y = I::mul_add(share, *x, *y);
+                        }
                     }
                 }
             }
@@ -137,7 +139,11 @@ impl<T: Real> Kernel for Backward<'_, T> {
             for s in self.geometry.window(t, self.dx.rows()) {
                 let pairs = self.dx.row_mut(s).iter_mut().zip(&mut *self.rest);
                 match self.pool {
-                    Pool::Mean => pairs.for_each(|(dx, rest)| *dx = I::mul_add(share, *rest, *dx)),
+                    Pool::Mean => {
+                        for (dx, rest) in pairs {
+                            *dx = I::mul_add(share, *rest, *dx);
+                        }
+                    }
                     Pool::Max => {
                         for ((dx, rest), (x, y)) in pairs.zip(self.x.row(s).iter().zip(self.y.row(t))) {
                             let here = *x == *y;

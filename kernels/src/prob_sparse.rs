@@ -166,7 +166,9 @@ impl<T: Real> Kernel for Rest<'_, T> {
         let share = T::of(1.0 / self.v.rows() as f64);
         self.o.row_mut(0).fill(T::ZERO);
         for j in 0..self.v.rows() {
-            self.o.row_mut(0).iter_mut().zip(self.v.row(j)).for_each(|(sum, v)| *sum = I::mul_add(share, *v, *sum));
+            for (sum, v) in self.o.row_mut(0).iter_mut().zip(self.v.row(j)) {
+                *sum = I::mul_add(share, *v, *sum);
+            }
         }
         for i in 1..=last {
             let [before, now] = two_rows(&mut self.o, i);
@@ -218,7 +220,9 @@ impl<T: Real> Kernel for Softmax<'_, T> {
             let (row, hidden) = row.split_at_mut(seen);
             hidden.fill(T::ZERO);
             let most = row.iter().fold(T::NEG_INFINITY, |most, x| if *x > most { *x } else { most });
-            row.iter_mut().for_each(|x| *x = exp::<T, I>((*x - most) * self.scale));
+            for x in row.iter_mut() {
+                *x = exp::<T, I>((*x - most) * self.scale);
+            }
             let inverse = T::ONE / crate::sums::of::<T, I>(row, |x| x);
             row.iter_mut().for_each(|x| *x *= inverse);
         }
@@ -311,7 +315,9 @@ impl<T: Real> BackwardRest<'_, T> {
         for h in 0..self.sparse.heads {
             let other = self.others[h * queries + i];
             let sums = self.sum[h * size..][..size].iter_mut().zip(&self.d_o.row(i)[h * size..]);
-            sums.for_each(|(sum, d)| *sum = I::mul_add(other, *d, *sum));
+            for (sum, d) in sums {
+                *sum = I::mul_add(other, *d, *sum);
+            }
         }
     }
 }
@@ -327,10 +333,14 @@ impl<T: Real> Kernel for BackwardRest<'_, T> {
             }
             return;
         }
-        (0..self.d_o.rows()).for_each(|i| self.add::<I>(i));
+        for i in 0..self.d_o.rows() {
+            self.add::<I>(i);
+        }
         let share = T::of(1.0 / self.dv.rows().max(1) as f64);
         for j in 0..self.dv.rows() {
-            self.dv.row_mut(j).iter_mut().zip(&*self.sum).for_each(|(dv, sum)| *dv = I::mul_add(share, *sum, *dv));
+            for (dv, sum) in self.dv.row_mut(j).iter_mut().zip(&*self.sum) {
+                *dv = I::mul_add(share, *sum, *dv);
+            }
         }
     }
 }

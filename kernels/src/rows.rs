@@ -295,7 +295,10 @@ pub(crate) struct Inner<'a, T> {
 impl<T: Real> Kernel for Inner<'_, T> {
     #[inline(always)]
     fn run<I: Isa>(self) {
-        *self.sum = (0..self.x.rows).map(|i| crate::sums::dot::<T, I>(self.x.row(i), self.y.row(i))).sum();
+        *self.sum = T::ZERO;
+        for i in 0..self.x.rows {
+            *self.sum += crate::sums::dot::<T, I>(self.x.row(i), self.y.row(i));
+        }
     }
 }
 

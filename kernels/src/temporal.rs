@@ -50,7 +50,9 @@ impl<T: Real> Kernel for WeightedSum<'_, T> {
         for p in 0..self.y.rows() {
             let y = self.y.row_mut(p);
             for (t, weight) in self.weight.row(p).iter().enumerate() {
-                y.iter_mut().zip(self.x.row(t)).for_each(|(y, x)| *y = I::mul_add(*weight, *x, *y));
+                for (y, x) in y.iter_mut().zip(self.x.row(t)) {
+                    *y = I::mul_add(*weight, *x, *y);
+                }
             }
         }
     }

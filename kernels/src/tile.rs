@@ -338,7 +338,9 @@ pub(crate) fn columns<'a, T: Real, I: Isa, S: Sink<T>, const MR: usize, const NR
             let mut sums = [T::ZERO; NR];
             for (p, line) in panel.iter().enumerate() {
                 let a = left(p)[i];
-                sums.iter_mut().zip(line).for_each(|(sum, b)| *sum = I::mul_add(a, *b, *sum));
+                for (sum, b) in sums.iter_mut().zip(line) {
+                    *sum = I::mul_add(a, *b, *sum);
+                }
             }
             sink.store::<I>(i, j, &sums[..width]);
         }
