@@ -1,6 +1,7 @@
 """Training steps and forward passes of Phy-Ture beside other programs, on this machine, in turn.
 
     python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes | --only-sizes] [--peers | --only-peers] [--without jax]
+                                   [--only "no dropout"]
 
 Makes a virtual environment under target/ with the pinned versions below, builds this project's own row, and starts every row in a
 process of its own, one after another, ROUNDS times: so that whatever else the machine does hits all alike. Writes OUT.json (every
@@ -128,6 +129,7 @@ def main():
     parser.add_argument("--peers", action="store_true", help="also a training step of every peer network beside PyTorch")
     parser.add_argument("--only-peers", action="store_true", help="the peer networks and nothing else")
     parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
+    parser.add_argument("--only", action="append", help="of the main tables, those whose title holds this text")
     options = parser.parse_args()
     python, own = environment(), own_program()
     keep = lambda rows: [row for row in rows if row[1] not in options.without]
@@ -139,9 +141,10 @@ def main():
         lines.extend(table(title, record[title]))
 
     if not options.only_peers and not options.only_sizes:
-        for title, rows in GROUPS.items():
-            add(f"{title}: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
-        add(f"latency: history {HISTORY}, batch 1, 1 thread", LATENCY, 1, 1, HISTORY)
+        main_tables = [(title, rows, threads, BATCH) for title, rows in GROUPS.items()] + [("latency", LATENCY, 1, 1)]
+        for title, rows, count, batch in main_tables:
+            if not options.only or any(text in title for text in options.only):
+                add(f"{title}: history {HISTORY}, batch {batch}, threads {count}", rows, count, batch, HISTORY)
     for kind in PEERS if options.peers or options.only_peers else []:
         rows = [("phyture", "phyture", f"peer-{kind}", False), ("PyTorch", "torch", f"peer-{kind}", False),
                 ("PyTorch, tuned memory", "torch", f"peer-{kind}", True)]
