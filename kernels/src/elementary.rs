@@ -42,8 +42,11 @@ pub trait Elementary: Sized + 'static {
     fn times_normal_power_of_two(self, rounded: Self) -> Self;
     /// Below this eˣ is subnormal, or 0.
     const EXP_SUBNORMAL: Self;
-    /// The smallest exponent of a normal number.
+    /// The exponent of the square of the distance from 1 to the next number. What is smaller beside 1 is kept out of products: it cannot
+    /// show in a sum, but a few factors later it is subnormal, and some processors compute a hundred times slower with those.
     const LEAST_POWER: Self;
+    /// 2 to [`Self::LEAST_POWER`].
+    const LEAST: Self;
 }
 
 #[expect(clippy::excessive_precision, reason = "decimal digits enough for the exact binary value")]
@@ -60,7 +63,8 @@ impl Elementary for f32 {
     const EXP_RANGE: [Self; 2] = [-104.0, 89.0];
     const ROUNDER: Self = 12_582_912.0;
     const EXP_SUBNORMAL: Self = -87.0;
-    const LEAST_POWER: Self = -126.0;
+    const LEAST_POWER: Self = -46.0;
+    const LEAST: Self = Self::EPSILON * Self::EPSILON;
     #[inline(always)]
     fn times_normal_power_of_two(self, rounded: Self) -> Self {
         // The low bits of the rounder are 0: what is shifted out of `rounded` is the rounder, what remains is k.
@@ -155,7 +159,8 @@ impl Elementary for f64 {
     const EXP_RANGE: [Self; 2] = [-746.0, 710.0];
     const ROUNDER: Self = 6_755_399_441_055_744.0;
     const EXP_SUBNORMAL: Self = -708.0;
-    const LEAST_POWER: Self = -1022.0;
+    const LEAST_POWER: Self = -104.0;
+    const LEAST: Self = Self::EPSILON * Self::EPSILON;
     #[inline(always)]
     fn times_normal_power_of_two(self, rounded: Self) -> Self {
         Self::from_bits(self.to_bits().wrapping_add(rounded.to_bits() << 52))
@@ -201,13 +206,19 @@ pub(crate) fn exp_negative<T: Real, I: Isa>(x: T) -> T {
     if x < T::EXP_SUBNORMAL { T::ZERO } else { power.times_normal_power_of_two(rounded) }
 }
 
-/// 2ˣ for x below the largest exponent; 2 to the smallest exponent where that would be smaller still. NaN gives NaN.
+/// 2ˣ for x below the largest exponent, and nothing smaller than [`Elementary::LEAST`], which is nothing beside 1. NaN gives NaN.
 #[inline(always)]
 pub(crate) fn power_of_two<T: Real, I: Isa>(x: T) -> T {
     let x = if x < T::LEAST_POWER { T::LEAST_POWER } else { x };
     let rounded = x + T::ROUNDER;
     let r = x - (rounded - T::ROUNDER);
     I::mul_add(polynomial::<T, I>(T::POWER, r), r, T::ONE).times_normal_power_of_two(rounded)
+}
+
+/// x, or 0 for a number of less than [`Elementary::LEAST`].
+#[inline(always)]
+pub fn or_zero<T: Real>(x: T) -> T {
+    if x.abs() < T::LEAST { T::ZERO } else { x }
 }
 
 /// tanh x
@@ -361,6 +372,42 @@ mod tests {
             level.run(Negative(&mut ends));
             assert_eq!(ends[..3].iter().map(|x| x.f64()).collect::<Vec<_>>(), [0.0, 0.0, 1.0]);
             assert!(ends[3].f64().is_nan(), "NaN is not hidden");
+        }
+        for level in Level::available() {
+            check::<f32>(level);
+            check::<f64>(level);
+        }
+    }
+
+    /// [`power_of_two`] over numbers.
+    struct Power<'a, T>(&'a mut [T]);
+
+    impl<T: Real> Kernel for Power<'_, T> {
+        #[inline(always)]
+        fn run<I: Isa>(self) {
+            for x in self.0 {
+                *x = power_of_two::<T, I>(*x);
+            }
+        }
+    }
+
+    #[test]
+    fn powers_of_two_stay_within_their_bound() {
+        fn check<T: Real>(level: Level) {
+            let low = T::LEAST_POWER.f64();
+            let points: Vec<T> = (0..=400_000).map(|i| T::of(low + (20.0 - low) * f64::from(i) / 400_000.0)).collect();
+            let mut found = points.clone();
+            level.run(Power(&mut found));
+            let worst = points.iter().zip(&found).map(|(x, y)| ulps(*y, x.f64().exp2())).fold(0.0, f64::max);
+            println!("2^x {} {level}: {worst:.3} ULP", std::any::type_name::<T>());
+            assert!(worst <= 2.0, "level {level}: {worst} ULP");
+            let mut ends = [T::NEG_INFINITY, T::of(2.0 * low), T::ZERO, T::NAN];
+            level.run(Power(&mut ends));
+            assert_eq!(ends[..3].iter().map(|x| x.f64()).collect::<Vec<_>>(), [low.exp2(), low.exp2(), 1.0]);
+            assert!(ends[3].f64().is_nan(), "NaN is not hidden");
+            let kept = [T::LEAST, T::ONE, T::NEG_INFINITY].map(|x| or_zero(x).f64());
+            assert_eq!(kept, [low.exp2(), 1.0, f64::NEG_INFINITY]);
+            assert!(or_zero(T::LEAST * T::of(-0.5)).f64().to_bits() == 0 && or_zero(T::NAN).f64().is_nan());
         }
         for level in Level::available() {
             check::<f32>(level);

@@ -12,7 +12,7 @@
 //! registers while W_h streams from the second-level cache, and the gates. The backward pass gathers the gradients of the gates of all
 //! steps and then forms every weight gradient as one product.
 
-use crate::elementary::{sigmoid, tanh};
+use crate::elementary::{or_zero, sigmoid, tanh};
 use crate::level::{Isa, Kernel, Level};
 use crate::{Real, Rows, RowsMut, Write, gemm, linear};
 
@@ -119,7 +119,10 @@ impl<T: Real> Kernel for Forward<'_, T> {
             }
             let (input_forget, rest) = gates.split_at_mut(2 * hidden);
             let (candidate, output) = rest.split_at_mut(hidden);
-            for gate in input_forget.iter_mut().chain(&mut *output) {
+            for gate in input_forget.iter_mut() {
+                *gate = sigmoid::<T, I>(*gate);
+            }
+            for gate in output.iter_mut() {
                 *gate = sigmoid::<T, I>(*gate);
             }
             for gate in candidate.iter_mut() {
@@ -179,6 +182,9 @@ impl<T: Real> Kernel for Backward<'_, T> {
             if t + 1 < self.dy.rows() {
                 add_product::<T, I>(self.dh, self.dgates.view().row(t + 1), self.packed);
             }
+            for dh in self.dh.iter_mut() {
+                *dh = or_zero(*dh);
+            }
             let (gates, cells) = (self.gates.row(t), self.cells.row(t));
             let (dinput, rest) = self.dgates.row_mut(t).split_at_mut(hidden);
             let (dforget, rest) = rest.split_at_mut(hidden);
@@ -194,7 +200,8 @@ impl<T: Real> Kernel for Backward<'_, T> {
                 dinput[k] = dc * candidate[k] * input[k] * (T::ONE - input[k]);
                 dforget[k] = dc * before * forget[k] * (T::ONE - forget[k]);
                 dcandidate[k] = dc * input[k] * (T::ONE - candidate[k] * candidate[k]);
-                self.dc[k] = dc * forget[k];
+                // Gradients die out along time: better at once than through subnormal numbers.
+                self.dc[k] = or_zero(dc * forget[k]);
             }
         }
     }

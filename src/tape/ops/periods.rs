@@ -11,6 +11,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
+use phyture_kernels::elementary::or_zero;
 use phyture_kernels::spectrum::{self, Transform};
 use phyture_kernels::{Real, Write};
 
@@ -74,7 +75,8 @@ impl<T: Real> Op<T> for Periods {
         let largest = y[1];
         let mut sum = T::ZERO;
         for weight in y.iter_mut().skip(1).step_by(2) {
-            *weight = (*weight - largest).exp();
+            // A share too small to show would make all gradients behind it subnormal.
+            *weight = or_zero((*weight - largest).exp());
             sum += *weight;
         }
         y.iter_mut().skip(1).step_by(2).for_each(|weight| *weight /= sum);
