@@ -51,8 +51,8 @@ GROUPS = {
         ("JAX, jit", "jax", "forward", True),
     ],
 }
-# Histories and batches beside each other; PyTorch's attention maps of a batch of 128 at history 1000 take 14 GB.
-SIZES = [(250, 32), (500, 32), (1000, 32), (2000, 32), (1000, 1), (1000, 4), (1000, 16), (1000, 128)]
+# Histories and batches beside each other; a history is a multiple of 8. PyTorch's attention maps of a batch of 128 at history 1000 take 14 GB.
+SIZES = [(248, 32), (504, 32), (1000, 32), (2000, 32), (1000, 1), (1000, 4), (1000, 16), (1000, 128)]
 # The peer networks at their own sizes, without dropout. PyTorch's Informer here attends to every key (fused), ours to those it samples.
 PEERS = ["cnn", "cnn_lstm", "tcn", "timesnet", "timemixer", "dlinear", "informer"]
 # Batch 1 on one thread.
@@ -124,7 +124,7 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--sizes", action="store_true", help="also histories 250 to 2000 and batches 1 to 128")
+    parser.add_argument("--sizes", action="store_true", help="also histories 248 to 2000 and batches 1 to 128")
     parser.add_argument("--only-sizes", action="store_true", help="these histories and batches and nothing else")
     parser.add_argument("--peers", action="store_true", help="also a training step of every peer network beside PyTorch")
     parser.add_argument("--only-peers", action="store_true", help="the peer networks and nothing else")
