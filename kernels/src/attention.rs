@@ -29,7 +29,7 @@ const QUERIES: usize = 96;
 /// Where o may be cut for [`forward_rows`]: at multiples of this many queries, every query is in the same block as uncut.
 pub const CUT: usize = QUERIES;
 
-/// Keys of a block: a multiple of every tile's rows. A block of scores, at most 96 x 72 numbers, stays in the first-level cache.
+/// Keys of a block: on x86-64 a multiple of every tile's rows. A block of scores, at most 96 x 72 numbers, stays in the first-level cache.
 const KEYS: usize = 72;
 
 /// Queries a block really has at a level whose tile is `NR` wide: short blocks waste less of a history of 1000.
@@ -75,35 +75,6 @@ impl Shape {
     /// log₂e/√d_k
     fn score_scale<T: Real>(&self) -> T {
         T::of(std::f64::consts::LOG2_E / (self.size as f64).sqrt())
-    }
-}
-
-/// The tile of the products whose result is as wide as a head, at a level whose wide tile has `NR` columns: the tall one where the
-/// wide one would compute more zeros.
-#[derive(Clone, Copy)]
-struct HeadTile {
-    tall: bool,
-    /// Columns of a panel.
-    columns: usize,
-    /// Width of a head in whole panels.
-    wide: usize,
-}
-
-impl HeadTile {
-    #[inline(always)]
-    fn new<const NR: usize>(size: usize) -> Self {
-        let tall = size.next_multiple_of(NR / 2);
-        if tall < size.next_multiple_of(NR) {
-            Self { tall: true, columns: NR / 2, wide: tall }
-        } else {
-            Self { tall: false, columns: NR, wide: tall }
-        }
-    }
-
-    /// Runs a product with this tile.
-    #[inline(always)]
-    fn run<T: Real, I: Isa, const MR: usize, const NR: usize>(self, product: impl Tiled<T>) {
-        if self.tall { I::tall(product) } else { product.run::<I, MR, NR>() }
     }
 }
 
@@ -244,8 +215,8 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
         let Shape { heads, queries, keys, size } = self.shape;
-        let (most, tile) = (block_of_queries::<NR>(), HeadTile::new::<NR>(size));
-        let HeadTile { columns, wide, .. } = tile;
+        let (most, columns) = (block_of_queries::<NR>(), tile::panel_width::<NR>(size));
+        let wide = size.next_multiple_of(columns);
         let mut scratch = self.scratch;
         let values = take(&mut scratch, keys * wide);
         let query_lanes = take(&mut scratch, size * most);
@@ -279,7 +250,7 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
                     }
                     let s = Rows::packed(scores, key_end - key, block);
                     let c = RowsMut::packed(sums, block, wide);
-                    tile.run::<T, I, MR, NR>(TransposedProduct { s, panels: values, keys, key, c });
+                    tile::run_for::<T, I, MR, NR>(size, TransposedProduct { s, panels: values, keys, key, c });
                 }
                 for (lane, i) in (first - self.first..end - self.first).enumerate() {
                     let target = &mut self.o.row_mut(i)[h * size..][..size];

@@ -8,7 +8,7 @@
 //!
 //! c is `[m, n]` and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
 //! stays in the first-level cache; a is read where it lies (tile.rs). A result of a few rows is computed from b where it lies, for
-//! packing would cost more than the product; a result no wider than a register with the tall tile. Written for the sizes of this project: n from 6 to a few
+//! packing would cost more than the product; and the tile is tall or wide as suits the result. Written for the sizes of this project: n from 6 to a few
 //! hundred, k up to a few thousand, any m.
 
 use crate::level::{Isa, Level, Tiled};
@@ -86,10 +86,8 @@ impl<T: Real> Tiled<T> for Product<'_, T> {
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         if self.c.rows() < FEW {
             self.few_rows::<I>();
-        } else if self.c.cols() <= NR / 2 {
-            I::tall(ByTiles(self));
         } else {
-            ByTiles(self).run::<I, MR, NR>();
+            tile::run_for::<T, I, MR, NR>(self.c.cols(), ByTiles(self));
         }
     }
 }
@@ -160,7 +158,7 @@ pub(crate) struct TransposedProduct<'a, T> {
 impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        if self.b.cols() <= NR / 2 { I::tall(TransposedByTiles(self)) } else { TransposedByTiles(self).run::<I, MR, NR>() }
+        tile::run_for::<T, I, MR, NR>(self.b.cols(), TransposedByTiles(self));
     }
 }
 

@@ -201,12 +201,6 @@ pub(crate) trait Isa {
     /// One register of numbers.
     type Vector<T: Real>: Vector<T>;
 
-    /// The same number in every lane of a register.
-    #[inline(always)]
-    fn splat<T: Real>(x: T) -> Self::Vector<T> {
-        Self::Vector::splat(x)
-    }
-
     /// Runs a body with the accumulator tile that fills this level's registers: two registers wide, as tall as leaves room for
     /// two of the right operand and one of the left.
     fn tiled<T: Real, K: Tiled<T>>(kernel: K);

@@ -10,7 +10,7 @@
 //!
 //! Not here: blocking for the caches (gemm.rs), shapes, dispatch.
 
-use crate::level::Isa;
+use crate::level::{Isa, Tiled};
 use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -25,6 +25,19 @@ pub(crate) const CUT: usize = if cfg!(target_arch = "aarch64") { 8 } else { 12 }
 
 /// Lines of a panel that the column form takes at a time: with a left operand of 64 columns, 30 KiB in f32.
 pub(crate) const COLUMN_DEPTH: usize = 96;
+
+/// Columns of a panel for a result of `n` columns, where the wide tile has `NR`: half of that, the tall tile's, if it leaves less of
+/// the last panel empty.
+#[inline(always)]
+pub(crate) const fn panel_width<const NR: usize>(n: usize) -> usize {
+    if n.next_multiple_of(NR / 2) < n.next_multiple_of(NR) { NR / 2 } else { NR }
+}
+
+/// Runs a product whose result has `n` columns with the tile that suits them.
+#[inline(always)]
+pub(crate) fn run_for<T: Real, I: Isa, const MR: usize, const NR: usize>(n: usize, product: impl Tiled<T>) {
+    if panel_width::<NR>(n) < NR { I::tall(product) } else { product.run::<I, MR, NR>() }
+}
 
 /// Numbers that the panels of a right operand `[depth, n]` take at any level.
 pub(crate) const fn panels_len(depth: usize, n: usize) -> usize {

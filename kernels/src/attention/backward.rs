@@ -5,10 +5,11 @@
 //! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do           (ds is the gradient of q·kᵀ/√d_k)
 //! ```
 
-use super::{HeadTile, KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
+use super::{KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
 use crate::dropout::{Keep, Mask, MaskLanes};
 use crate::elementary::power_of_two;
 use crate::level::{Isa, Level, Tiled};
+use crate::tile;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Where [`backward`] puts its three gradients, and whether it overwrites or adds.
@@ -71,8 +72,8 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         let Shape { heads, queries, keys, size } = self.shape;
-        let (most, tile) = (block_of_queries::<NR>(), HeadTile::new::<NR>(size));
-        let HeadTile { columns, wide, .. } = tile;
+        let (most, columns) = (block_of_queries::<NR>(), tile::panel_width::<NR>(size));
+        let wide = size.next_multiple_of(columns);
         let Gradients { mut dq, mut dk, mut dv, write_q, write_k, write_v } = self.gradients;
         let mut scratch = self.scratch;
         let [key_panels, key_sums, value_sums] = [(); 3].map(|()| take(&mut scratch, keys * wide));
@@ -119,10 +120,10 @@ impl<T: Real> Tiled<T> for Backward<'_, T> {
                     let (s, ds) = (Rows::packed(scores, count, block), Rows::packed(d_scores, count, block));
                     for (rows, panels, sums) in [(s, &*output_panels, &mut *value_sums), (ds, &*query_panels, &mut *key_sums)] {
                         let c = RowsMut::packed(&mut sums[key * wide..key_end * wide], count, wide);
-                        tile.run::<T, I, MR, NR>(Product { rows, panels, c, write: Write::Add });
+                        tile::run_for::<T, I, MR, NR>(size, Product { rows, panels, c, write: Write::Add });
                     }
                     let c = RowsMut::packed(query_sums, block, wide);
-                    tile.run::<T, I, MR, NR>(TransposedProduct { s: ds, panels: key_panels, keys, key, c });
+                    tile::run_for::<T, I, MR, NR>(size, TransposedProduct { s: ds, panels: key_panels, keys, key, c });
                 }
                 emit(query_sums, wide, end - first, dq.reborrow().columns(h * size, size).range(first, end), write_q);
             }

@@ -15,6 +15,7 @@
 use super::Geometry;
 use crate::level::Isa;
 use crate::tile::{self, Pair, Sink, Store};
+use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Points, and products.
@@ -36,8 +37,8 @@ const INPUT: [[f64; POINTS]; POINTS] = [
     [0.0, 2.0, 3.0, -4.0, -3.0, 2.0],
 ];
 
-/// Groups of output rows that are worked on at a time: a multiple of every tile's rows.
-const GROUPS: usize = 12;
+/// Groups of output rows that are worked on at a time.
+const GROUPS: usize = tile::CUT;
 
 /// Groups of a block in the gradient of the weight, where the sum runs along them.
 const WEIGHT_GROUPS: usize = 96;
@@ -142,7 +143,7 @@ impl<T: Real> Weights<'_, T> {
     /// `Σ_j G[point, j]·W[j]`
     #[inline(always)]
     fn combined<I: Isa, const NR: usize>(&self, point: usize, taps: usize) -> Pair<T, I> {
-        let mut sum = [I::splat(T::ZERO); 2];
+        let mut sum = [I::Vector::splat(T::ZERO); 2];
         for j in 0..taps {
             let start = self.start.wrapping_add_signed(j.cast_signed() * self.tap);
             if let Some(row) = self.weight[start..].first_chunk::<NR>() {
@@ -197,7 +198,7 @@ fn groups<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const M: usize, const MR:
                 tile::rows::<T, I, _, _, MR, NR>(&Rows::packed(v, count, inputs), NR, u, &mut sink);
             }
             for group in 0..count {
-                let mut z = [[I::splat(T::ZERO); 2]; M];
+                let mut z = [[I::Vector::splat(T::ZERO); 2]; M];
                 for point in 0..POINTS {
                     let Some(product) = products[point * apart(GROUPS * NR) + group * NR..].first_chunk::<NR>() else { return };
                     let product = tile::load::<T, I, NR>(product);
@@ -240,13 +241,13 @@ fn transform<T: Real, I: Isa, X: Sequence<T>, const NR: usize>(
             *row = &x.row(start + k)[..inputs];
         }
         for c in (0..inputs).step_by(NR) {
-            let mut x = [[I::splat(T::ZERO); 2]; POINTS];
+            let mut x = [[I::Vector::splat(T::ZERO); 2]; POINTS];
             for (x, row) in x.iter_mut().zip(rows) {
                 let Some(row) = row[c..].first_chunk::<NR>() else { return };
                 *x = tile::load::<T, I, NR>(row);
             }
             for (point, factors) in INPUT.iter().enumerate() {
-                let mut sum = [I::splat(T::ZERO); 2];
+                let mut sum = [I::Vector::splat(T::ZERO); 2];
                 for (factor, x) in factors.iter().zip(x) {
                     add_multiple::<T, I, NR>(&mut sum, *factor, x);
                 }
@@ -308,7 +309,7 @@ fn gradient_groups<T: Real, I: Isa, X: Sequence<T>, const M: usize, const MR: us
     // dW[j] = Σ_τ G[τ, j]·du[τ]
     let (taps, size) = (POINTS + 1 - M, inputs * outputs);
     for at in (0..size).step_by(NR) {
-        let mut sums = [[I::splat(T::ZERO); 2]; POINTS];
+        let mut sums = [[I::Vector::splat(T::ZERO); 2]; POINTS];
         for point in 0..POINTS {
             let Some(du) = du[point * apart(size) + at..].first_chunk::<NR>() else { return };
             let du = tile::load::<T, I, NR>(du);
@@ -334,7 +335,7 @@ fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(
     let outputs = dz.cols();
     for group in 0..count {
         for (panel, j) in (0..outputs).step_by(NR).enumerate() {
-            let mut z = [[I::splat(T::ZERO); 2]; M];
+            let mut z = [[I::Vector::splat(T::ZERO); 2]; M];
             for (i, z) in z.iter_mut().enumerate() {
                 let row = start + group * M + i;
                 if row < dz.rows()
@@ -344,7 +345,7 @@ fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(
                 }
             }
             for point in 0..POINTS {
-                let mut sum = [I::splat(T::ZERO); 2];
+                let mut sum = [I::Vector::splat(T::ZERO); 2];
                 for (i, z) in z.iter().enumerate() {
                     add_multiple::<T, I, NR>(&mut sum, power(point, i, M), *z);
                 }
