@@ -19,7 +19,7 @@ use crate::{Real, Rows, RowsMut, Write, sums};
 const LONGEST_BLOCK: usize = 256;
 
 /// Blocks of the summed index, of nearly equal length; one empty block if there is nothing to sum.
-fn blocks(k: usize) -> impl Iterator<Item = (usize, usize)> {
+pub(crate) fn blocks(k: usize) -> impl Iterator<Item = (usize, usize)> {
     let count = k.div_ceil(LONGEST_BLOCK).max(1);
     let length = k.div_ceil(count);
     (0..count).map(move |i| ((i * length).min(k), ((i + 1) * length).min(k)))

@@ -182,10 +182,34 @@ pub trait Op<T: Real>: Send + Sync {
         None
     }
 
+    /// How it works on a bundle of samples, if that is worth while for operands of these shapes.
+    fn bundled(&self, _operands: &[Shape]) -> Option<&dyn Bundled<T>> {
+        None
+    }
+
     /// How it couples the samples of a step, if it does.
     fn coupling(&self) -> Option<&dyn Coupling<T>> {
         None
     }
+}
+
+/// Most samples that an operation is given at once.
+pub const BUNDLE: usize = 4;
+
+/// Numbers of a weight from which on it is read once for a bundle of samples: with its gradient it fills half of a second-level cache
+/// of 512 KiB in f32.
+pub(crate) const LARGE_WEIGHT: usize = 1 << 15;
+
+/// An operation with a weight so large that, sample by sample, it would come from memory for each one: it works on some samples at once,
+/// and so do all other operations of its plan, in turn.
+///
+/// What a sample gives must not depend on the others in its bundle, to the bit. Operands from [`WEIGHT`] on are parameters.
+pub trait Bundled<T: Real>: Differentiable<T> {
+    /// [`Op::forward`] for each of 1 to [`BUNDLE`] samples.
+    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]);
+
+    /// [`Differentiable::backward`] for each. Gradients of parameters are those of all together, and asked of the first sample alone.
+    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]);
 }
 
 /// An operation whose result for one sample depends on all samples of the step, as that of a batch normalisation does.

@@ -9,7 +9,7 @@
 //! A plan holds no numbers; `session` replays it.
 
 use super::graph::{Graph, Source, Var};
-use super::op::{Memory, Op, WEIGHT};
+use super::op::{BUNDLE, Memory, Op, WEIGHT};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::{Real, Write};
@@ -57,6 +57,8 @@ pub(crate) struct Step<T> {
     pub parameter_gradients: Vec<Piece>,
     /// The weight's place in the flat slab, and its packed form's place in that of the pass; `None` if nothing is packed.
     pub packed: Option<(Range<usize>, Range<usize>)>,
+    /// Whether the operation takes some samples at once.
+    pub bundled: bool,
 }
 
 /// A stretch of the slab and the times in which it is in use, both ends included.
@@ -80,6 +82,8 @@ pub(crate) struct Plan<T> {
     /// Value and gradient of the loss in the slab.
     pub loss: Option<(usize, usize)>,
     pub slab_len: usize,
+    /// Samples that are in flight together on one worker.
+    pub bundle: usize,
     /// Packed weights of the forward and of the backward list, one after another in the order of the list.
     pub packed_len: [usize; 2],
     pub parameter_len: usize,
@@ -154,6 +158,11 @@ impl<T: Real> Plan<T> {
             return Err(Error::Shape { operation: "train", message });
         }
         Self::compile(graph, Some(loss), outputs)
+    }
+
+    /// Numbers from one sample's slab to the next one's in a bundle.
+    pub const fn lane_len(&self) -> usize {
+        self.slab_len.next_multiple_of(alignment::<T>())
     }
 
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
@@ -269,7 +278,9 @@ impl<T: Real> Plan<T> {
             let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var)).filter(|_| len > 0);
             let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
             *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
-            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed })
+            let weights_are_shared = operands.iter().skip(WEIGHT).all(|&var| parameter_range(var).is_some());
+            let bundled = weights_are_shared && op.bundled(&shapes).is_some();
+            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, bundled })
         };
         let mut written = vec![false; nodes.len()];
         let mut packed_len = [0; 2];
@@ -279,6 +290,7 @@ impl<T: Real> Plan<T> {
         };
         let forward_steps = steps(&forward_order, false);
         let backward_steps = steps(&backward_order, true);
+        let bundle = if forward_steps.iter().any(|step| step.bundled) { BUNDLE } else { 1 };
         // Every step borrows only buffers opened above.
         debug_assert_eq!((forward_steps.len(), backward_steps.len()), (forward_order.len(), backward_order.len()));
 
@@ -297,6 +309,7 @@ impl<T: Real> Plan<T> {
                 .collect(),
             loss: loss.and_then(|loss| Some((lifetimes.range(values[loss.0]?).start, lifetimes.range(gradients[loss.0]?).start))),
             slab_len,
+            bundle,
             packed_len,
             parameter_len: graph.parameter_count(),
             unreached,

@@ -1,6 +1,7 @@
 //! Replaying a plan: one sample at a time, one worker a core, the same bits on any number of threads.
 //!
-//! The batch is the outermost loop. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
+//! The batch is the outermost loop, or, where weights are large, some samples go through the plan side by side, so that a weight comes
+//! from memory once for all of them. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
 //! gradient slab of its own; shards are summed in order. Where there are fewer samples than threads, large operations work on pieces
 //! of their rows, which have the bits of the whole. So neither the number of threads nor their timing can change a bit.
 //! In the steady state (no more samples than in an earlier call) nothing is allocated.
@@ -93,7 +94,7 @@ impl<T: Real> Session<T> {
             level,
             poison: false,
             packed: plan.packed_len.map(Slab::new),
-            slabs: Slabs::new(count.min(shards), plan.slab_len),
+            slabs: Slabs::new(count.min(shards), plan.bundle * plan.lane_len()),
             loaded: Vec::new(),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
@@ -275,7 +276,8 @@ impl<T: Real> Session<T> {
 #[cfg(test)]
 mod tests {
     use super::super::gradcheck;
-    use super::super::ops::{Dropout, Linear, SquaredError};
+    use super::super::op::BUNDLE;
+    use super::super::ops::{Dropout, Flatten, Linear, SquaredError, Temporal};
     use super::super::plan::tests::{random_graph, recipe};
     use super::*;
     use phyture_kernels::Tolerance;
@@ -352,6 +354,64 @@ mod tests {
         assert_eq!(gradients[..3], [0.0; 3], "a parameter that nothing reads has gradient zero");
         gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &|name| name == "unused", 3)
             .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+    }
+
+    /// Two large maps over time and a large map of one row, the first shared, with small operations between.
+    fn large_weights<T: Real>() -> Result<(Graph<T>, Var, Var)> {
+        let (length, channels) = (256, 3);
+        let mut graph = Graph::<T>::new();
+        let (x, target) = (graph.input_with_gradient("x", &[length, channels])?, graph.input("target", &[1, 48])?);
+        let (weight, bias) = (graph.parameter("time", &[length, length])?, graph.parameter("bias", &[length])?);
+        let rows = graph.parameter("rows", &[48, length * channels])?;
+        let mixed = graph.apply(Temporal, &[x, weight, bias])?;
+        let dropped = graph.apply(Dropout { rate: 0.3 }, &[mixed])?;
+        let mixed = graph.apply(Temporal, &[dropped, weight])?;
+        let flat = graph.apply(Flatten, &[mixed])?;
+        let output = graph.apply(Linear, &[flat, rows])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[output, target])?;
+        Ok((graph, loss, output))
+    }
+
+    #[test]
+    fn a_sample_does_not_depend_on_its_bundle() -> Result<()> {
+        let (graph, loss, output) = large_weights::<f64>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut alone = Session::train(&graph, loss, &[output], Threads(1))?;
+        assert!(alone.plan.bundle > 1, "these weights are not worth a bundle");
+        // A power of 2, by which a loss can be divided without rounding.
+        let samples = SHARDS * BUNDLE;
+        let mut session = Session::train(&graph, loss, &[output], Threads(2))?;
+        session.set_poison(true);
+        session.step(&parameters, samples, None, &fill)?;
+        let mut sums = vec![0.0; graph.parameter_count()];
+        for sample in 0..samples {
+            alone.step(&parameters, 1, None, &|_, inputs: &mut [&mut [f64]]| fill(sample, inputs))?;
+            assert_eq!(session.output(0, sample), alone.output(0, 0));
+            let scaled: Vec<f64> = alone.input_gradient(0, 0).iter().map(|value| value / samples as f64).collect();
+            assert_eq!(session.input_gradient(0, sample), scaled);
+            sums.iter_mut().zip(alone.gradients()).for_each(|(sum, value)| *sum += value / samples as f64);
+        }
+        let largest = sums.iter().fold(0.0_f64, |largest, sum| largest.max(sum.abs()));
+        let allowed = Tolerance::Close.relative_f64() * largest;
+        assert!(session.gradients().iter().zip(&sums).all(|(found, sum)| (found - sum).abs() <= allowed));
+        gradcheck::graph(&graph, loss, &parameters, 11, KEY, &fill, &|_| false, 3)
+            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+    }
+
+    #[test]
+    fn bundles_give_the_same_bits_on_any_number_of_threads() -> Result<()> {
+        let (graph, loss, output) = large_weights::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        for samples in [2, SHARDS * BUNDLE + 3] {
+            let mut found = Vec::new();
+            for threads in [1, 2, 5] {
+                let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
+                let loss = session.step(&parameters, samples, KEY, &fill)?;
+                found.push((loss.to_bits(), bits(session.gradients()), bits(session.output(0, samples - 1))));
+            }
+            assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
+        }
+        Ok(())
     }
 
     #[test]

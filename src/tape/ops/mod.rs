@@ -18,6 +18,7 @@ mod encoding;
 mod flatten;
 mod fold_convolution;
 mod halves;
+mod large_weight;
 mod last_rows;
 mod layer_norm;
 mod linear;

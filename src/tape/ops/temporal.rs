@@ -2,15 +2,22 @@
 //!   dx = Wᵀ·dy,  dW = dy·xᵀ,  db = Σ_channels dy
 //! x [n, C], W [rows, n], b [rows] or absent, y [rows, C]. The backward pass reads x and W.
 
+use super::large_weight::{self, Sizes};
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
-use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, misfit};
+use crate::tape::op::{Backward, Bundled, Differentiable, Forward, Memory, Op, Reads, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, temporal};
 
 /// Operands x, W and, optionally, b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Temporal;
+
+fn sizes(operands: &[Shape]) -> Option<Sizes> {
+    let [x, weight, ..] = operands else { return None };
+    let (inputs, channels) = x.rows();
+    Some(Sizes { inputs, outputs: weight.rows().0, channels })
+}
 
 impl<T: Real> Op<T> for Temporal {
     fn name(&self) -> &'static str {
@@ -30,8 +37,8 @@ impl<T: Real> Op<T> for Temporal {
     }
 
     fn memory(&self, operands: &[Shape]) -> Memory {
-        let [x, weight, ..] = operands else { return Memory::default() };
-        let scratch = temporal::scratch_len(x.rows().0, weight.rows().0, x.rows().1);
+        let Some(sizes @ Sizes { inputs, outputs, channels }) = sizes(operands) else { return Memory::default() };
+        let scratch = temporal::scratch_len(inputs, outputs, channels).max(sizes.bundle_scratch_len());
         Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
@@ -44,6 +51,24 @@ impl<T: Real> Op<T> for Temporal {
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         Some(self)
+    }
+
+    fn bundled(&self, operands: &[Shape]) -> Option<&dyn Bundled<T>> {
+        sizes(operands).filter(|sizes| sizes.are_large()).map(|_| self as _)
+    }
+}
+
+impl<T: Real> Bundled<T> for Temporal {
+    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]) {
+        if let Some(sizes) = bundle.first().and_then(|io| sizes(io.shapes)) {
+            large_weight::forward(bundle, sizes);
+        }
+    }
+
+    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]) {
+        if let Some(sizes) = bundle.first().and_then(|io| sizes(io.shapes)) {
+            large_weight::backward(bundle, sizes);
+        }
     }
 }
 

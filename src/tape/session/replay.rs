@@ -1,11 +1,11 @@
-//! The steps of a plan on the samples of a step: shards side by side, the samples of a shard in order, each in a slab.
+//! The steps of a plan on the samples of a step: shards side by side, the samples of a shard in order, one or a bundle at a time.
 //!
 //! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic.
 
 use super::shards::Shard;
 use super::{DropoutKey, Fill};
 use crate::tape::graph::MAX_INPUTS;
-use crate::tape::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS};
+use crate::tape::op::{BUNDLE, Backward, Coupled, Forward, Gradient, MAX_OPERANDS};
 use crate::tape::parts::Parts;
 use crate::tape::plan::{Piece, Plan, Role, Step};
 use crate::tape::slab::Slabs;
@@ -57,9 +57,10 @@ impl<T: Real> Replay<'_, T> {
             return;
         }
         self.slabs.lend(|slab| {
-            for (index, loss) in losses.iter_mut().enumerate() {
-                let result = &mut results[index * self.result_len..][..self.result_len];
-                *loss = self.sample(slab, &mut shard.gradients, first + index, index == 0, result);
+            let most = self.plan.bundle;
+            for (index, losses) in losses.chunks_mut(most).enumerate() {
+                let results = &mut results[index * most * self.result_len..][..losses.len() * self.result_len];
+                self.bundle(slab, &mut shard.gradients, (first + index * most, index == 0), losses, results);
             }
         });
     }
@@ -79,23 +80,78 @@ impl<T: Real> Replay<'_, T> {
         (self.fill)(sample, &mut inputs[..count]);
     }
 
-    fn sample(&self, slab: &mut [T], gradients: &mut [T], sample: usize, first: bool, result: &mut [T]) -> f64 {
-        self.begin(slab, sample);
-        for step in &self.plan.forward {
-            step.op.forward(self.forward(step, slab, sample, None));
+    /// Samples `first…`, step by step side by side, each in a stretch of the slab; the first bundle of a shard sets its gradients.
+    fn bundle(
+        &self,
+        slab: &mut [T],
+        gradients: &mut [T],
+        (first, sets): (usize, bool),
+        losses: &mut [f64],
+        results: &mut [T],
+    ) {
+        let mut stretches = slab.chunks_mut(self.plan.lane_len().max(1));
+        let mut lanes: [&mut [T]; BUNDLE] = std::array::from_fn(|_| stretches.next().unwrap_or_default());
+        let lanes = &mut lanes[..losses.len()];
+        for (index, lane) in lanes.iter_mut().enumerate() {
+            self.begin(lane, first + index);
         }
-        let mut loss = 0.0;
+        for step in &self.plan.forward {
+            self.forward_step(step, lanes, first);
+        }
         if let Some((value, gradient)) = self.plan.loss {
-            loss = slab[value].f64();
-            slab[gradient] = T::of(1.0 / self.samples as f64);
+            for (lane, loss) in lanes.iter_mut().zip(losses) {
+                *loss = lane[value].f64();
+                lane[gradient] = T::of(1.0 / self.samples as f64);
+            }
             for step in &self.plan.backward {
-                if let Some(differentiable) = step.op.differentiable() {
-                    differentiable.backward(self.backward(step, slab, gradients, (sample, first), None));
+                self.backward_step(step, lanes, gradients, (first, sets));
+            }
+        }
+        for (lane, result) in lanes.iter().zip(results.chunks_exact_mut(self.result_len.max(1))) {
+            self.finish(lane, result);
+        }
+    }
+
+    fn forward_step(&self, step: &Step<T>, lanes: &mut [&mut [T]], first: usize) {
+        let count = lanes.len();
+        let mut samples = (first..).zip(lanes);
+        match step.op.bundled(&step.shapes).filter(|_| step.bundled) {
+            Some(op) => {
+                let mut bundle: [Forward<'_, T>; BUNDLE] = std::array::from_fn(|_| match samples.next() {
+                    Some((sample, lane)) => self.forward(step, lane, sample, None),
+                    None => self.forward_of_nothing(step, first, None),
+                });
+                op.forward_bundle(&mut bundle[..count]);
+            }
+            None => {
+                for (sample, lane) in samples {
+                    step.op.forward(self.forward(step, lane, sample, None));
                 }
             }
         }
-        self.finish(slab, result);
-        loss
+    }
+
+    fn backward_step(&self, step: &Step<T>, lanes: &mut [&mut [T]], gradients: &mut [T], (first, sets): (usize, bool)) {
+        let count = lanes.len();
+        let mut samples = (first..).zip(lanes);
+        match step.op.bundled(&step.shapes).filter(|_| step.bundled) {
+            Some(op) => {
+                // Of all together: the first one's.
+                let mut gradients = Some(gradients);
+                let mut bundle: [Backward<'_, T>; BUNDLE] = std::array::from_fn(|_| match samples.next() {
+                    Some((sample, lane)) => self.backward(step, lane, gradients.take(), (sample, sets), None),
+                    None => self.backward_of_nothing(step, first, None),
+                });
+                op.backward_bundle(&mut bundle[..count]);
+            }
+            None => {
+                if let Some(op) = step.op.differentiable() {
+                    for (sample, lane) in samples {
+                        op.backward(self.backward(step, lane, Some(&mut *gradients), (sample, sets && sample == first), None));
+                    }
+                }
+            }
+        }
     }
 
     /// Copies outputs and gradients of inputs.
@@ -112,14 +168,8 @@ impl<T: Real> Replay<'_, T> {
         self.dropout.map(|key| Stream::new(key.seed, key.step, step.site, sample as u64))
     }
 
-    /// What the forward pass of a step is given.
-    pub fn forward<'b>(
-        &'b self,
-        step: &'b Step<T>,
-        slab: &'b mut [T],
-        sample: usize,
-        coupled: Option<Coupled<'b, T>>,
-    ) -> Forward<'b, T> {
+    /// What the forward pass of a step is given, but for the sample's numbers.
+    fn forward_of_nothing<'b>(&'b self, step: &'b Step<T>, sample: usize, coupled: Option<Coupled<'b, T>>) -> Forward<'b, T> {
         let mut io = Forward {
             x: [&[]; MAX_OPERANDS],
             y: Default::default(),
@@ -135,6 +185,18 @@ impl<T: Real> Replay<'_, T> {
         for (index, range) in &step.parameters {
             io.x[*index] = &self.parameters[range.clone()];
         }
+        io
+    }
+
+    /// What the forward pass of a step is given.
+    pub fn forward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        sample: usize,
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Forward<'b, T> {
+        let mut io = self.forward_of_nothing(step, sample, coupled);
         carve(slab, &step.pieces, |role, piece| match role {
             Role::X(index) => io.x[index] = piece,
             Role::Y => io.y = piece,
@@ -145,15 +207,8 @@ impl<T: Real> Replay<'_, T> {
         io
     }
 
-    /// What the backward pass of a step is given; the first sample of a shard sets parameter gradients.
-    pub fn backward<'b>(
-        &'b self,
-        step: &'b Step<T>,
-        slab: &'b mut [T],
-        gradients: &'b mut [T],
-        (sample, first): (usize, bool),
-        coupled: Option<Coupled<'b, T>>,
-    ) -> Backward<'b, T> {
+    /// What the backward pass of a step is given, but for the sample's numbers.
+    fn backward_of_nothing<'b>(&'b self, step: &'b Step<T>, sample: usize, coupled: Option<Coupled<'b, T>>) -> Backward<'b, T> {
         let mut io = Backward {
             x: [&[]; MAX_OPERANDS],
             y: &[],
@@ -170,6 +225,19 @@ impl<T: Real> Replay<'_, T> {
         for (index, range) in &step.parameters {
             io.x[*index] = &self.parameters[range.clone()];
         }
+        io
+    }
+
+    /// What the backward pass of a step is given; `gradients` of parameters, if these are wanted, are set if `sets`, else added to.
+    pub fn backward<'b>(
+        &'b self,
+        step: &'b Step<T>,
+        slab: &'b mut [T],
+        gradients: Option<&'b mut [T]>,
+        (sample, sets): (usize, bool),
+        coupled: Option<Coupled<'b, T>>,
+    ) -> Backward<'b, T> {
+        let mut io = self.backward_of_nothing(step, sample, coupled);
         carve(slab, &step.pieces, |role, piece| match role {
             Role::X(index) => io.x[index] = piece,
             Role::Y => io.y = piece,
@@ -178,13 +246,15 @@ impl<T: Real> Replay<'_, T> {
             Role::Dy => io.dy = piece,
             Role::Dx(index, write) => io.dx[index] = Some(Gradient { values: piece, write }),
         });
-        carve(gradients, &step.parameter_gradients, |role, piece| {
-            if let Role::Dx(index, write) = role {
-                // Over the samples of a shard the gradients add up; the first sample sets.
-                let write = if first { write } else { Write::Add };
-                io.dx[index] = Some(Gradient { values: piece, write });
-            }
-        });
+        if let Some(gradients) = gradients {
+            carve(gradients, &step.parameter_gradients, |role, piece| {
+                if let Role::Dx(index, write) = role {
+                    // Over the samples of a shard the gradients add up.
+                    let write = if sets { write } else { Write::Add };
+                    io.dx[index] = Some(Gradient { values: piece, write });
+                }
+            });
+        }
         io
     }
 }
