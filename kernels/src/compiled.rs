@@ -8,7 +8,7 @@
 
 use crate::level::Level;
 use crate::{
-    activation, adam, attention, batch_norm, bundle, conv1d, conv1d_general, dropout, elementary, fold, gemm, layer_norm, linear, loss,
+    activation, adam, attention, batch_norm, conv1d, conv1d_general, dropout, elementary, fold, gemm, layer_norm, linear, loss,
     lstm, moving_average, pool, prob_sparse, rows, sci, spectrum, temporal, temporal_each, weight_norm,
 };
 
@@ -85,9 +85,6 @@ kernels! {
         conv1d_backward_weight: conv1d::BackwardWeight,
         gemm_product: gemm::Product,
         gemm_transposed_product: gemm::TransposedProduct,
-        bundle_product: bundle::Product,
-        bundle_transposed_product: bundle::TransposedProduct,
-        bundle_sum_of_products: bundle::SumOfProducts,
         conv1d_general_forward: conv1d_general::Forward,
         conv1d_general_backward_input: conv1d_general::BackwardInput,
         conv1d_general_backward_weight: conv1d_general::BackwardWeight,

@@ -8,8 +8,8 @@
 //!
 //! c is `[m, n]` and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
 //! stays in the first-level cache; a is read where it lies (tile.rs). A result of a few rows is computed from b where it lies, for
-//! packing would cost more than the product; and the tile is tall or wide as suits the result. Written for the sizes of this project: n from 6 to a few
-//! hundred, k up to a few thousand, any m.
+//! packing would cost more than the product; and the tile is tall or wide as suits the result. Written for the sizes of this project:
+//! n from 6 to a few hundred, k up to a few thousand, any m.
 
 use crate::level::{Isa, Level, Tiled};
 use crate::tile::{self, Store};
@@ -19,7 +19,7 @@ use crate::{Real, Rows, RowsMut, Write, sums};
 const LONGEST_BLOCK: usize = 256;
 
 /// Blocks of the summed index, of nearly equal length; one empty block if there is nothing to sum.
-pub(crate) fn blocks(k: usize) -> impl Iterator<Item = (usize, usize)> {
+fn blocks(k: usize) -> impl Iterator<Item = (usize, usize)> {
     let count = k.div_ceil(LONGEST_BLOCK).max(1);
     let length = k.div_ceil(count);
     (0..count).map(move |i| ((i * length).min(k), ((i + 1) * length).min(k)))
@@ -122,6 +122,10 @@ impl<T: Real> Product<'_, T> {
     }
 }
 
+/// Rows that lie so far apart are read once in their order, before tiles go down their columns: no processor foresees reading 96 rows
+/// side by side.
+const FAR_BYTES: usize = 2048;
+
 /// A product by tiles, whatever their shape.
 struct ByTiles<'a, T>(Product<'a, T>);
 
@@ -177,6 +181,9 @@ impl<T: Real> Tiled<T> for TransposedByTiles<'_, T> {
         for start in (0..a.rows()).step_by(tile::COLUMN_DEPTH) {
             let end = a.rows().min(start + tile::COLUMN_DEPTH);
             let write = if start == 0 { write } else { Write::Add };
+            if a.stride() * size_of::<T>() >= FAR_BYTES {
+                a.range(start, end).touch();
+            }
             for j in (0..n).step_by(NR) {
                 let panel = &mut panel[..end - start];
                 tile::pack_panel(&b.range(start, end), j, panel);

@@ -14,7 +14,6 @@ pub mod activation;
 pub mod adam;
 pub mod attention;
 pub mod batch_norm;
-pub mod bundle;
 mod compiled;
 pub mod conv1d;
 pub mod conv1d_general;

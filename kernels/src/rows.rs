@@ -7,6 +7,9 @@
 use crate::level::{Isa, Kernel, Level};
 use crate::{Real, Write};
 
+/// Bytes of a cache line.
+const CACHE_LINE_BYTES: usize = 64;
+
 /// Read-only rows: element (i, j) is `data[i·stride + j]`.
 #[derive(Clone, Copy, Debug)]
 pub struct Rows<'a, T> {
@@ -75,6 +78,19 @@ impl<'a, T> Rows<'a, T> {
     #[inline(always)]
     pub fn row(&self, i: usize) -> &'a [T] {
         &self.data[i * self.stride..][..self.cols]
+    }
+
+    /// Reads a number of every cache line, row by row, to have them in the cache.
+    #[inline(always)]
+    pub(crate) fn touch(self)
+    where
+        T: Copy,
+    {
+        for i in 0..self.rows {
+            for x in self.row(i).iter().step_by(CACHE_LINE_BYTES / size_of::<T>()) {
+                std::hint::black_box(*x);
+            }
+        }
     }
 
     /// Rows `start..end`.

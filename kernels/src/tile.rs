@@ -20,6 +20,13 @@ pub(crate) const WIDEST: usize = 32;
 /// Rows of the left operand that pass over one panel before the next panel is taken: they stay in the second-level cache.
 const ROW_BLOCK: usize = 240;
 
+/// The same for a wide result, which is then written nearly in the order in which it lies in memory; the panels are read from the
+/// second-level cache.
+const ROW_BLOCK_OF_WIDE: usize = 24;
+
+/// From this many columns on a result is wide.
+const WIDE_RESULT: usize = 128;
+
 /// A multiple of the height of every tile of this architecture: cut here, rows are in the same tiles as uncut.
 pub(crate) const CUT: usize = if cfg!(target_arch = "aarch64") { 8 } else { 12 };
 
@@ -282,7 +289,11 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     panels: &[T],
     sink: &mut S,
 ) {
-    const { assert!(ROW_BLOCK.is_multiple_of(MR) && ROW_BLOCK.is_multiple_of(CUT), "a block ends inside a tile, or between cuts") };
+    const {
+        let blocks_end_with_a_tile = ROW_BLOCK.is_multiple_of(MR) && ROW_BLOCK_OF_WIDE.is_multiple_of(MR);
+        let blocks_end_at_a_cut = ROW_BLOCK.is_multiple_of(CUT) && ROW_BLOCK_OF_WIDE.is_multiple_of(CUT);
+        assert!(blocks_end_with_a_tile && blocks_end_at_a_cut, "a block ends inside a tile, or between cuts");
+    }
     let (m, lines) = (left.rows(), left.taps() * left.depth());
     if lines == 0 {
         for (i, j) in (0..m).flat_map(|i| (0..n).step_by(NR).map(move |j| (i, j))) {
@@ -290,8 +301,9 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
         }
         return;
     }
-    for block in (0..m).step_by(ROW_BLOCK) {
-        let block_end = m.min(block + ROW_BLOCK);
+    let height = if n < WIDE_RESULT { ROW_BLOCK } else { ROW_BLOCK_OF_WIDE };
+    for block in (0..m).step_by(height) {
+        let block_end = m.min(block + height);
         for (panel, j) in panels.chunks_exact(lines * NR).zip((0..n).step_by(NR)) {
             let panel = panel.as_chunks::<NR>().0;
             let width = NR.min(n - j);

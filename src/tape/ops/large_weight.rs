@@ -1,9 +1,12 @@
 //! y = W·x + b with one large W for a bundle of samples: what `linear` and `temporal` share. Not an operation of its own.
 //!   dx = Wᵀ·dy,  dW = Σ_samples dy·xᵀ,  db = Σ_samples Σ_channels dy
 //! x [inputs, channels], W [outputs, inputs], b [outputs] or absent, y [outputs, channels].
+//!
+//! The samples are laid side by side, `[.., samples·channels]`, so that each product is one. Beside a large W these copies are small.
 
 use crate::tape::op::{BUNDLE, Backward, Forward, LARGE_WEIGHT, WEIGHT};
-use phyture_kernels::{Real, Rows, RowsMut, Write, bundle, temporal};
+use phyture_kernels::level::Level;
+use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, rows, temporal};
 
 /// The operand after the weight.
 const BIAS: usize = WEIGHT + 1;
@@ -22,27 +25,40 @@ impl Sizes {
         self.inputs * self.outputs >= LARGE_WEIGHT
     }
 
-    /// Scratch of the first sample of a bundle; 0 if there will be none.
+    /// Scratch that the first sample of a bundle has to bring; 0 if there will be none.
     pub fn bundle_scratch_len(self) -> usize {
-        if self.are_large() { bundle::scratch_len(self.outputs, self.inputs, self.channels, BUNDLE) } else { 0 }
+        let Self { inputs, outputs, channels } = self;
+        let columns = BUNDLE * channels;
+        let products = [(outputs, inputs, columns), (inputs, outputs, columns), (outputs, columns, inputs)];
+        let product = products.into_iter().map(|(m, k, n)| gemm::scratch_len(m, k, n)).max();
+        if self.are_large() { (inputs + outputs) * columns + product.unwrap_or(0) } else { 0 }
+    }
+
+    /// The scratch of a bundle: for matrices of `[inputs, samples·channels]` and `[outputs, samples·channels]`, and for a product.
+    fn divide<T>(self, samples: usize, scratch: &mut [T]) -> (RowsMut<'_, T>, RowsMut<'_, T>, &mut [T]) {
+        let columns = samples * self.channels;
+        let (low, rest) = scratch.split_at_mut(self.inputs * columns);
+        let (high, rest) = rest.split_at_mut(self.outputs * columns);
+        (RowsMut::packed(low, self.inputs, columns), RowsMut::packed(high, self.outputs, columns), rest)
     }
 
     fn weight<T>(self, weight: &[T]) -> Rows<'_, T> {
         Rows::packed(weight, self.outputs, self.inputs)
     }
+
+    /// Columns of a sample among those of all.
+    fn sample<T>(self, index: usize, all: RowsMut<'_, T>) -> RowsMut<'_, T> {
+        all.columns(index * self.channels, self.channels)
+    }
 }
 
-/// One matrix of each sample, where it lies.
-fn each<'a, T: Real>(mut values: impl Iterator<Item = &'a [T]>, rows: usize, columns: usize) -> [Rows<'a, T>; BUNDLE] {
-    std::array::from_fn(|_| values.next().map_or(Rows::packed(&[], 0, 0), |values| Rows::packed(values, rows, columns)))
-}
-
-/// The same, to be written.
-fn each_mut<'a, T: Real>(mut values: impl Iterator<Item = &'a mut [T]>, rows: usize, columns: usize) -> [RowsMut<'a, T>; BUNDLE] {
-    std::array::from_fn(|_| match values.next() {
-        Some(values) => RowsMut::packed(values, rows, columns),
-        None => RowsMut::packed(&mut [], 0, 0),
-    })
+/// Lays matrices side by side.
+fn join<'a, T: Real>(level: Level, sizes: Sizes, values: impl Iterator<Item = &'a [T]>, all: &mut RowsMut<'_, T>) {
+    let rows = all.rows();
+    for (index, values) in values.enumerate() {
+        let x = Rows::packed(values, rows, sizes.channels);
+        rows::copy(level, x, sizes.sample(index, all.reborrow()), Write::Set);
+    }
 }
 
 /// y of every sample.
@@ -50,38 +66,47 @@ pub(super) fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
     let (level, [_, weight, bias, ..], scratch) = (first.level, first.x, std::mem::take(&mut first.scratch));
-    for io in &mut *samples {
-        io.y.fill(T::ZERO);
+    let (mut x, mut y, scratch) = sizes.divide(count, scratch);
+    join(level, sizes, samples.iter().map(|io| io.x[0]), &mut x);
+    gemm::ab(level, sizes.weight(weight), x.view(), y.reborrow(), Write::Set, scratch);
+    let all = y.view();
+    for (index, io) in samples.iter_mut().enumerate() {
+        let write = if bias.is_empty() { Write::Set } else { Write::Add };
         for (row, bias) in io.y.chunks_exact_mut(sizes.channels).zip(bias) {
             row.fill(*bias);
         }
+        let y = RowsMut::packed(&mut *io.y, sizes.outputs, sizes.channels);
+        rows::copy(level, all.columns(index * sizes.channels, sizes.channels), y, write);
     }
-    let x = each(samples.iter().map(|io| io.x[0]), sizes.inputs, sizes.channels);
-    let mut y = each_mut(samples.iter_mut().map(|io| &mut *io.y), sizes.outputs, sizes.channels);
-    bundle::ab(level, sizes.weight(weight), &x[..count], &mut y[..count], scratch);
 }
 
 /// Gradients of x of every sample; those of W and b, of all together, where the first sample asks for them.
 pub(super) fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
-    let Sizes { inputs, outputs, channels } = sizes;
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
     let (level, weight, scratch) = (first.level, first.x[WEIGHT], std::mem::take(&mut first.scratch));
     let [dweight, dbias] = [WEIGHT, BIAS].map(|operand| first.dx[operand].take());
-    let x = each(samples.iter().map(|io| io.x[0]), inputs, channels);
-    let dy = each(samples.iter().map(|io| io.dy), outputs, channels);
+    let (mut x, mut dy, scratch) = sizes.divide(count, scratch);
+    join(level, sizes, samples.iter().map(|io| io.dy), &mut dy);
     if let Some(dweight) = dweight {
-        let values = RowsMut::packed(dweight.values, outputs, inputs);
-        bundle::abt(level, &dy[..count], &x[..count], values, dweight.write, scratch);
+        join(level, sizes, samples.iter().map(|io| io.x[0]), &mut x);
+        let values = RowsMut::packed(dweight.values, sizes.outputs, sizes.inputs);
+        gemm::abt(level, dy.view(), x.view(), values, dweight.write, scratch);
     }
     if let Some(dbias) = dbias {
-        for (index, dy) in dy[..count].iter().enumerate() {
-            temporal::backward_bias(level, *dy, dbias.values, if index == 0 { dbias.write } else { Write::Add });
+        temporal::backward_bias(level, dy.view(), dbias.values, dbias.write);
+    }
+    // All samples ask for the gradient of x, or none does.
+    if samples.iter().all(|io| io.dx[0].is_none()) {
+        return;
+    }
+    let mut dx = x;
+    gemm::atb(level, sizes.weight(weight), dy.view(), dx.reborrow(), Write::Set, scratch);
+    let all = dx.view();
+    for (index, gradient) in samples.iter_mut().map(|io| io.dx[0].as_mut()).enumerate() {
+        if let Some(gradient) = gradient {
+            let dx = RowsMut::packed(&mut *gradient.values, sizes.inputs, sizes.channels);
+            rows::copy(level, all.columns(index * sizes.channels, sizes.channels), dx, gradient.write);
         }
     }
-    // All samples ask for the gradient of x, or none.
-    let Some(write) = samples[0].dx[0].as_ref().map(|dx| dx.write) else { return };
-    let dx = samples.iter_mut().filter_map(|io| io.dx[0].as_mut()).map(|dx| &mut *dx.values);
-    let mut dx = each_mut(dx, inputs, channels);
-    bundle::atb(level, sizes.weight(weight), &dy[..count], &mut dx[..count], write);
 }

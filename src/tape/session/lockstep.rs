@@ -102,7 +102,13 @@ impl<T: Real> Lockstep<T> {
                         Pass::Forward => step.op.forward(replay.forward(step, slab, sample, coupled)),
                         Pass::Backward => {
                             if let Some(differentiable) = step.op.differentiable() {
-                                differentiable.backward(replay.backward(step, slab, Some(&mut *gradients), (sample, first), coupled));
+                                differentiable.backward(replay.backward(
+                                    step,
+                                    slab,
+                                    Some(&mut *gradients),
+                                    (sample, first),
+                                    coupled,
+                                ));
                             }
                         }
                     }
@@ -112,7 +118,8 @@ impl<T: Real> Lockstep<T> {
                     match pass {
                         Pass::Forward => coupling.gather(&replay.forward(step, slab, sample, None), part),
                         Pass::Backward => {
-                            coupling.gather_backward(&replay.backward(step, slab, Some(&mut *gradients), (sample, first), None), part);
+                            coupling
+                                .gather_backward(&replay.backward(step, slab, Some(&mut *gradients), (sample, first), None), part);
                         }
                     }
                 }

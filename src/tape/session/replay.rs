@@ -81,14 +81,7 @@ impl<T: Real> Replay<'_, T> {
     }
 
     /// Samples `first…`, step by step side by side, each in a stretch of the slab; the first bundle of a shard sets its gradients.
-    fn bundle(
-        &self,
-        slab: &mut [T],
-        gradients: &mut [T],
-        (first, sets): (usize, bool),
-        losses: &mut [f64],
-        results: &mut [T],
-    ) {
+    fn bundle(&self, slab: &mut [T], gradients: &mut [T], (first, sets): (usize, bool), losses: &mut [f64], results: &mut [T]) {
         let mut stretches = slab.chunks_mut(self.plan.lane_len().max(1));
         let mut lanes: [&mut [T]; BUNDLE] = std::array::from_fn(|_| stretches.next().unwrap_or_default());
         let lanes = &mut lanes[..losses.len()];
