@@ -2,8 +2,8 @@
 //!
 //! `cargo bench --bench peers -- CASE THREADS BATCH HISTORY REPEATS`, where CASE is `dropout`, `nodropout`, `forward`, or `peer-KIND` for a
 //! training step of another network (`peer-tcn`) at its own sizes without dropout. Also printed:
-//! the instruction-set level, the peak of fused multiply-adds on one thread measured just before, and the peak memory of the
-//! process. Started by `run.py` beside it, in turn with the other programs; statistics are made there.
+//! the instruction-set level, the peak of fused multiply-adds measured just before and just after, on one thread and on as many as work,
+//! and the peak memory of the process. Started by `run.py` beside it, in turn with the other programs; statistics are made there.
 
 use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
@@ -30,6 +30,16 @@ fn peak_mib() -> Option<f64> {
     Some(kib / 1024.0)
 }
 
+/// Peak of multiply-adds, 10⁹ operations a second, of this many threads together (0: all cores).
+fn peak_gflops(level: Level, threads: usize) -> f64 {
+    let threads = if threads == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { threads };
+    std::thread::scope(|scope| {
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(|| peak::f32_gflops(level))).collect();
+        let own = peak::f32_gflops(level);
+        own + others.into_iter().filter_map(|other| other.join().ok()).sum::<f64>()
+    })
+}
+
 fn run() -> Result<String, String> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let usage = "usage: dropout|nodropout|forward|peer-KIND THREADS BATCH HISTORY REPEATS";
@@ -41,7 +51,7 @@ fn run() -> Result<String, String> {
     }
     let text = |error: phyture::Error| error.to_string();
     let level = Level::detect().map_err(|error| error.to_string())?;
-    let fma_gflops = peak::f32_gflops(level);
+    let (alone, before) = (peak_gflops(level, 1), peak_gflops(level, threads));
     let config: Architecture = match case.strip_prefix("peer-") {
         Some(kind) => {
             let sizes = serde_json::json!({ "kind": kind, "history": history, "dropout": 0.0 });
@@ -80,8 +90,10 @@ fn run() -> Result<String, String> {
         }
     }
     seconds.drain(..WARM_UP);
+    let after = peak_gflops(level, threads);
     let line = serde_json::json!({
-        "seconds": seconds, "peak_mib": peak_mib(), "parameters": parameters.len(), "level": level.name(), "fma_gflops": fma_gflops,
+        "seconds": seconds, "peak_mib": peak_mib(), "parameters": parameters.len(), "level": level.name(),
+        "peak_gflops_alone": alone, "peak_gflops": [before, after],
         "version": format!("phyture {}", env!("CARGO_PKG_VERSION")),
     });
     Ok(line.to_string())

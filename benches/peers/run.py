@@ -1,7 +1,7 @@
 """Training steps and forward passes of Phy-Ture beside other programs, on this machine, in turn.
 
     python3 benches/peers/run.py OUT [--rounds 3] [--repeats 5] [--sizes | --only-sizes] [--peers | --only-peers] [--without jax]
-                                   [--only "no dropout"]
+                                   [--only "no dropout"] [--only timemixer]
 
 Makes a virtual environment under target/ with the pinned versions below, builds this project's own row, and starts every row in a
 process of its own, one after another, ROUNDS times: so that whatever else the machine does hits all alike. Writes OUT.json (every
@@ -24,6 +24,8 @@ VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "jax==0.10.2"]
 TUNED = {"MALLOC_TOP_PAD_": "4294967296", "MALLOC_MMAP_THRESHOLD_": "4294967296", "MALLOC_TRIM_THRESHOLD_": "8589934592",
          "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 HISTORY, BATCH = 1000, 32
+# Operations of a training step of Phy-Ture at these sizes, as its sums stand: convolutions 78, attention 20, maps of rows 9.
+STEP_GFLOP = 107
 
 # Title, program, case, tuned memory. Within a group all are compared with the first.
 GROUPS = {
@@ -112,6 +114,14 @@ def table(title, found):
     return [*lines, ""]
 
 
+def share_of_peak(found):
+    """Of the peak that as many threads reach together, measured in the same processes before and after the steps."""
+    shares = [100 * STEP_GFLOP / statistics.median(result["seconds"]) / statistics.mean(result["peak_gflops"]) for result in found["phyture"]]
+    peaks = [peak for result in found["phyture"] for peak in result["peak_gflops"]]
+    return [f"phyture: {STEP_GFLOP} GFLOP a step, {statistics.median(shares):.0f} % ({min(shares):.0f}–{max(shares):.0f}) of the peak of all "
+            f"threads together, {min(peaks):.0f}–{max(peaks):.0f} GFLOP/s.", ""]
+
+
 def size_row(history, batch, pair):
     own, other = ([second for result in results for second in result["seconds"]] for results in pair)
     own = statistics.median(own)
@@ -129,10 +139,11 @@ def main():
     parser.add_argument("--peers", action="store_true", help="also a training step of every peer network beside PyTorch")
     parser.add_argument("--only-peers", action="store_true", help="the peer networks and nothing else")
     parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
-    parser.add_argument("--only", action="append", help="of the main tables, those whose title holds this text")
+    parser.add_argument("--only", action="append", help="tables whose title, or network, holds this text")
     options = parser.parse_args()
     python, own = environment(), own_program()
     keep = lambda rows: [row for row in rows if row[1] not in options.without]
+    wanted = lambda title: not options.only or any(text in title for text in options.only)
     threads, record, lines = os.cpu_count(), {}, []
 
     def add(title, rows, threads, batch, history):
@@ -143,13 +154,18 @@ def main():
     if not options.only_peers and not options.only_sizes:
         main_tables = [(title, rows, threads, BATCH) for title, rows in GROUPS.items()] + [("latency", LATENCY, 1, 1)]
         for title, rows, count, batch in main_tables:
-            if not options.only or any(text in title for text in options.only):
-                add(f"{title}: history {HISTORY}, batch {batch}, threads {count}", rows, count, batch, HISTORY)
-    for kind in PEERS if options.peers or options.only_peers else []:
+            if wanted(title):
+                whole_title = f"{title}: history {HISTORY}, batch {batch}, threads {count}"
+                add(whole_title, rows, count, batch, HISTORY)
+                if title.startswith("training"):
+                    lines.extend(share_of_peak(record[whole_title]))
+    for kind in filter(wanted, PEERS) if options.peers or options.only_peers else []:
         rows = [("phyture", "phyture", f"peer-{kind}", False), ("PyTorch", "torch", f"peer-{kind}", False),
                 ("PyTorch, tuned memory", "torch", f"peer-{kind}", True)]
         add(f"{kind}, training step: history {HISTORY}, batch {BATCH}, {threads} threads", rows, threads, BATCH, HISTORY)
     for title, rows in GROUPS.items() if options.sizes or options.only_sizes else []:
+        if not wanted(title):
+            continue
         pair = [rows[0], next(row for row in rows if row[2] in ("naive-0.2", "fused-0", "forward-fused"))]
         lines += [f"### {title}, {threads} threads: medians, s", "", f"| history | batch | phyture | a window, ms | {pair[1][0]} | times phyture |",
                   "| ---: | ---: | ---: | ---: | ---: | ---: |"]
@@ -162,8 +178,8 @@ def main():
     own_results = [result for found in record.values() for result in found["phyture"]]
     versions = sorted({result["version"] for found in record.values() for results in found.values() for result in results})
     processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
-    peak = max(result["fma_gflops"] for result in own_results)
-    head = [f"{processor}, {os.cpu_count()} cores, level {own_results[0]['level']}, {peak:.0f} GFLOP/s of multiply-adds a core; "
+    peak = max(result["peak_gflops_alone"] for result in own_results)
+    head = [f"{processor}, {os.cpu_count()} cores, level {own_results[0]['level']}, {peak:.0f} GFLOP/s of multiply-adds on one core; "
             f"{'; '.join(versions)}; {options.rounds} rounds of {options.repeats} steps each, rows in turn.", ""]
     pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
     pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))

@@ -331,4 +331,27 @@ mod tests {
         linear::forward(Level::PLAIN, x.view(), &weight, None, map.view_mut(), &mut scratch);
         assert_near("conv1d with one tap", &conv.to_vec(), &map.to_vec(), Tolerance::Exact);
     }
+
+    #[test]
+    fn six_points_round_no_more_than_they_say() {
+        let (rows, channels) = (500, 64);
+        let x = numbers::<f64>(1, rows * channels).iter().map(|x| f64::from(*x as f32)).collect::<Vec<_>>();
+        let single: Vec<f32> = x.iter().map(|x| *x as f32).collect();
+        for taps in [3, 5] {
+            let geometry = Geometry { taps, left: taps / 2, right: taps / 2 };
+            let weight: Vec<f32> = numbers(2, taps * channels * channels);
+            let exact: Vec<f64> = weight.iter().map(|w| f64::from(*w)).collect();
+            let mut z = vec![0.0; rows * channels];
+            reference::conv1d(geometry, Rows::packed(&x, rows, channels), &exact, None, RowsMut::packed(&mut z, rows, channels));
+            for level in Level::available() {
+                let (mut y, mut scratch) = (vec![f32::NAN; rows * channels], vec![f32::NAN; scratch_len(geometry, channels, channels)]);
+                let (x, to) = (Rows::packed(&single, rows, channels), RowsMut::packed(&mut y, rows, channels));
+                forward(level, geometry, x, Weight::Plain(&weight), None, Epilogue::NONE, to, &mut scratch);
+                let squares = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(|x| x * x).sum::<f64>().sqrt();
+                let error = squares(&mut y.iter().zip(&z).map(|(y, z)| f64::from(*y) - z)) / squares(&mut z.iter().copied());
+                println!("{taps} taps, level {level}: {error:.1e} of the root mean square");
+                assert!(error <= six_points::ROUNDING, "{taps} taps, level {level}: {error:e}");
+            }
+        }
+    }
 }
