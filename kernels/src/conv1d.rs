@@ -344,7 +344,8 @@ mod tests {
             let mut z = vec![0.0; rows * channels];
             reference::conv1d(geometry, Rows::packed(&x, rows, channels), &exact, None, RowsMut::packed(&mut z, rows, channels));
             for level in Level::available() {
-                let (mut y, mut scratch) = (vec![f32::NAN; rows * channels], vec![f32::NAN; scratch_len(geometry, channels, channels)]);
+                let (mut y, mut scratch) =
+                    (vec![f32::NAN; rows * channels], vec![f32::NAN; scratch_len(geometry, channels, channels)]);
                 let (x, to) = (Rows::packed(&single, rows, channels), RowsMut::packed(&mut y, rows, channels));
                 forward(level, geometry, x, Weight::Plain(&weight), None, Epilogue::NONE, to, &mut scratch);
                 let squares = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(|x| x * x).sum::<f64>().sqrt();
