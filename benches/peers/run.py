@@ -76,11 +76,12 @@ def own_program():
     return [json.loads(line)["executable"] for line in lines if '"peers"' in line and '"executable":"' in line][-1]
 
 
-def measure(python, own, row, threads, batch, history, repeats):
+def measure(programs, row, threads, batch, history, repeats):
+    """Starts a row's program, whose name stands for the start of its command in `programs`."""
     _, program, case, tuned = row
-    start = [own] if program == "phyture" else [python, HERE / f"{program}_step.py"]
-    command = [*map(str, start), case, str(threads), str(batch), str(history), str(repeats)]
-    variables = {**os.environ, "OMP_NUM_THREADS": str(threads), **(TUNED if tuned else {})}
+    command = [str(part) for part in (*programs[program], case, threads, batch, history, repeats)]
+    count = {name: str(threads) for name in ("OMP_NUM_THREADS", "RAYON_NUM_THREADS")}
+    variables = {**os.environ, **count, **(TUNED if tuned else {})}
     done = subprocess.run(command, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     if done.returncode != 0:
         print(f"  {row[0]}: {done.stderr.strip().splitlines()[-1:]}", file=sys.stderr)
@@ -88,11 +89,11 @@ def measure(python, own, row, threads, batch, history, repeats):
     return json.loads(done.stdout.strip().splitlines()[-1])
 
 
-def compare(python, own, rows, threads, batch, history, rounds, repeats):
+def compare(programs, rows, threads, batch, history, rounds, repeats):
     found = {row[0]: [] for row in rows}
     for turn in range(rounds):
         for row in rows:
-            result = measure(python, own, row, threads, batch, history, repeats)
+            result = measure(programs, row, threads, batch, history, repeats)
             if result:
                 found[row[0]].append(result)
                 print(f"  round {turn + 1}: {row[0]}: {statistics.median(result['seconds']):.4f} s", file=sys.stderr)
@@ -129,6 +130,19 @@ def size_row(history, batch, pair):
     return f"| {history} | {batch} | {own:.4f} | {1e3 * own / batch:.2f} | {there} |"
 
 
+def report(options, record, lines):
+    """Writes every time of every step, and the tables under a line that says on what and with what they were measured."""
+    results = [result for found in record.values() for results in found.values() for result in results]
+    own = [result for found in record.values() for result in found["phyture"]]
+    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
+    head = [f"{processor}, {os.cpu_count()} cores, level {own[0]['level']}, {max(result['peak_gflops_alone'] for result in own):.0f} GFLOP/s of "
+            f"multiply-adds on one core; {'; '.join(sorted({result['version'] for result in results}))}; {options.rounds} rounds of "
+            f"{options.repeats} steps each, rows in turn.", ""]
+    pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
+    pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))
+    print("\n".join([*head, *lines]))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out")
@@ -141,14 +155,15 @@ def main():
     parser.add_argument("--without", action="append", default=[], help="leave a program out: torch or jax")
     parser.add_argument("--only", action="append", help="tables whose title, or network, holds this text")
     options = parser.parse_args()
-    python, own = environment(), own_program()
+    python = environment()
+    programs = {"phyture": [own_program()], **{name: [python, HERE / f"{name}_step.py"] for name in ("torch", "jax")}}
     keep = lambda rows: [row for row in rows if row[1] not in options.without]
     wanted = lambda title: not options.only or any(text in title for text in options.only)
     threads, record, lines = os.cpu_count(), {}, []
 
     def add(title, rows, threads, batch, history):
         print(title, file=sys.stderr)
-        record[title] = compare(python, own, keep(rows), threads, batch, history, options.rounds, options.repeats)
+        record[title] = compare(programs, keep(rows), threads, batch, history, options.rounds, options.repeats)
         lines.extend(table(title, record[title]))
 
     if not options.only_peers and not options.only_sizes:
@@ -172,18 +187,10 @@ def main():
         for history, batch in SIZES:
             size = f"{title}: history {history}, batch {batch}"
             print(size, file=sys.stderr)
-            record[size] = compare(python, own, keep(pair), threads, batch, history, options.rounds, options.repeats)
+            record[size] = compare(programs, keep(pair), threads, batch, history, options.rounds, options.repeats)
             lines.append(size_row(history, batch, [record[size].get(row[0], []) for row in pair]))
         lines.append("")
-    own_results = [result for found in record.values() for result in found["phyture"]]
-    versions = sorted({result["version"] for found in record.values() for results in found.values() for result in results})
-    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
-    peak = max(result["peak_gflops_alone"] for result in own_results)
-    head = [f"{processor}, {os.cpu_count()} cores, level {own_results[0]['level']}, {peak:.0f} GFLOP/s of multiply-adds on one core; "
-            f"{'; '.join(versions)}; {options.rounds} rounds of {options.repeats} steps each, rows in turn.", ""]
-    pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
-    pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))
-    print("\n".join([*head, *lines]))
+    report(options, record, lines)
 
 
 if __name__ == "__main__":

@@ -8,10 +8,7 @@ OUT.md. Not part of `run.py`, for a step of these frameworks takes many seconds.
 """
 
 import argparse
-import json
 import os
-import pathlib
-import platform
 import shutil
 import subprocess
 import sys
@@ -38,22 +35,6 @@ def other_program():
     return FOLDER / "release" / "peers-rust"
 
 
-def measure(other, own, row, threads, batch, history, repeats):
-    if row[1] == "phyture":
-        return own_measure(other, own, row, threads, batch, history, repeats)
-    command = [str(part) for part in (other, row[1], row[2], threads, batch, history, repeats)]
-    variables = {**os.environ, "RAYON_NUM_THREADS": str(threads)}
-    done = subprocess.run(command, env=variables, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    if done.returncode != 0:
-        print(f"  {row[0]}: {done.stderr.strip().splitlines()[-1:]}", file=sys.stderr)
-        return None
-    return json.loads(done.stdout)
-
-
-# run.compare() starts its rows through this name.
-own_measure, run.measure = run.measure, measure
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out")
@@ -61,7 +42,8 @@ def main():
     parser.add_argument("--repeats", type=int, default=2)
     parser.add_argument("--only", action="append", help="those tables whose title holds this text")
     options = parser.parse_args()
-    other, own = other_program(), run.own_program()
+    other = other_program()
+    programs = {"phyture": [run.own_program()], "candle": [other, "candle"], "burn": [other, "burn"]}
     record, lines = {}, []
     tables = [(title, rows, os.cpu_count(), run.BATCH) for title, rows in GROUPS.items()] + [("latency", GROUPS["forward pass"], 1, 1)]
     for name, rows, threads, batch in tables:
@@ -69,17 +51,12 @@ def main():
             continue
         title = f"{name}: history {run.HISTORY}, batch {batch}, threads {threads}"
         print(title, file=sys.stderr)
-        record[title] = run.compare(other, own, rows, threads, batch, run.HISTORY, options.rounds, options.repeats)
+        record[title] = run.compare(programs, rows, threads, batch, run.HISTORY, options.rounds, options.repeats)
         lines.extend(run.table(title, record[title]))
     results = [result for found in record.values() for results in found.values() for result in results]
     if len({result["parameters"] for result in results}) > 1:
         sys.exit("the programs do not have the same number of parameters")
-    versions = sorted({result["version"] for result in results})
-    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
-    head = [f"{processor}, {os.cpu_count()} cores; {'; '.join(versions)}; {options.rounds} rounds of {options.repeats} steps each, rows in turn.", ""]
-    pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
-    pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))
-    print("\n".join([*head, *lines]))
+    run.report(options, record, lines)
 
 
 if __name__ == "__main__":

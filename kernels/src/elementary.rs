@@ -442,8 +442,10 @@ mod tests {
             let value = |function, x: f64| {
                 let mut values = [T::of(x); 17];
                 apply(level, function, &mut values);
-                assert!(values.iter().all(|v| v.f64().to_bits() == values[0].f64().to_bits()));
-                values[0].f64()
+                let [first, ..] = values.map(T::f64);
+                // The sign and payload of NaN are nobody's promise.
+                assert!(values.iter().all(|v| v.f64().to_bits() == first.to_bits() || (v.f64().is_nan() && first.is_nan())));
+                first
             };
             assert_eq!(value(Function::Exp, f64::NEG_INFINITY), 0.0);
             assert_eq!(value(Function::Exp, f64::INFINITY), f64::INFINITY);

@@ -11,8 +11,6 @@ use std::marker::PhantomData;
 use std::sync::OnceLock;
 
 use crate::Real;
-#[cfg(target_arch = "aarch64")]
-use crate::vector::Array;
 use crate::vector::Vector;
 
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
@@ -266,7 +264,7 @@ pub(crate) struct Neon;
 #[cfg(target_arch = "aarch64")]
 impl Isa for Neon {
     const FMA: bool = true;
-    type Vector<T: Real> = Array<T, 4, true>;
+    type Vector<T: Real> = T::Neon;
     #[inline(always)]
     fn tiled<T: Real, K: Tiled<T>>(kernel: K) {
         T::neon_tile(kernel);

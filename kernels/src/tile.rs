@@ -27,8 +27,8 @@ const ROW_BLOCK_OF_WIDE: usize = 24;
 /// From this many columns on a result is wide.
 const WIDE_RESULT: usize = 128;
 
-/// A multiple of the height of every tile of this architecture: cut here, rows are in the same tiles as uncut.
-pub(crate) const CUT: usize = if cfg!(target_arch = "aarch64") { 8 } else { 12 };
+/// A multiple of the height of every level's wide tile: cut here, rows are in the same tiles as uncut.
+pub(crate) const CUT: usize = 12;
 
 /// Lines of a panel that the column form takes at a time: with a left operand of 64 columns, 30 KiB in f32.
 pub(crate) const COLUMN_DEPTH: usize = 96;

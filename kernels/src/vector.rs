@@ -39,7 +39,7 @@ pub(crate) trait Vector<T>: Copy {
 /// An array in the place of a register; `FMA` says whether a multiply-add is one instruction.
 #[derive(Clone, Copy)]
 #[cfg_attr(all(target_arch = "x86_64", not(test)), expect(dead_code, reason = "every level of this architecture has registers"))]
-pub(crate) struct Array<T, const N: usize, const FMA: bool>([T; N]);
+pub struct Array<T, const N: usize, const FMA: bool>([T; N]);
 
 impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
     const LANES: usize = N;
@@ -87,6 +87,10 @@ pub trait Registers: Sized {
     #[cfg(target_arch = "x86_64")]
     #[doc(hidden)]
     type Avx512: Vector<Self>;
+    /// 128 bits, with a fused multiply-add.
+    #[cfg(target_arch = "aarch64")]
+    #[doc(hidden)]
+    type Neon: Vector<Self>;
     #[doc(hidden)]
     fn plain_tile<K: Tiled<Self>>(kernel: K);
     #[doc(hidden)]
@@ -112,7 +116,7 @@ pub trait Registers: Sized {
 }
 
 macro_rules! registers {
-    ($t:ident: plain $sse:ident of $lanes:literal $plain:tt avx2 $avx2:ident $avx2_tile:tt avx512 $avx512:ident $avx512_tile:tt neon $neon:tt) => {
+    ($t:ident: plain $sse:ident of $lanes:literal $plain:tt avx2 $avx2:ident $avx2_tile:tt avx512 $avx512:ident $avx512_tile:tt neon $neon:ident $neon_tile:tt) => {
         #[expect(private_bounds, reason = "as above")]
         impl Registers for $t {
             #[cfg(target_arch = "x86_64")]
@@ -123,13 +127,15 @@ macro_rules! registers {
             type Avx2 = std::arch::x86_64::$avx2;
             #[cfg(target_arch = "x86_64")]
             type Avx512 = std::arch::x86_64::$avx512;
+            #[cfg(target_arch = "aarch64")]
+            type Neon = std::arch::aarch64::$neon;
             registers!(@tiles plain_tile plain_tall_tile Plain $plain);
             #[cfg(target_arch = "x86_64")]
             registers!(@tiles avx2_tile avx2_tall_tile crate::level::Avx2 $avx2_tile);
             #[cfg(target_arch = "x86_64")]
             registers!(@tiles avx512_tile avx512_tall_tile crate::level::Avx512 $avx512_tile);
             #[cfg(target_arch = "aarch64")]
-            registers!(@tiles neon_tile neon_tall_tile crate::level::Neon $neon);
+            registers!(@tiles neon_tile neon_tall_tile crate::level::Neon $neon_tile);
         }
     };
     (@tiles $wide:ident $tall:ident $level:path [$rows:literal x $columns:literal, $tall_rows:literal x $tall_columns:literal]) => {
@@ -144,11 +150,15 @@ macro_rules! registers {
     };
 }
 
-registers!(f32: plain __m128 of 4 [4 x 8, 8 x 4] avx2 __m256 [6 x 16, 12 x 8] avx512 __m512 [12 x 32, 24 x 16] neon [8 x 8, 16 x 4]);
-registers!(f64: plain __m128d of 2 [4 x 4, 8 x 2] avx2 __m256d [6 x 8, 12 x 4] avx512 __m512d [12 x 16, 24 x 8] neon [4 x 8, 8 x 4]);
+registers!(f32: plain __m128 of 4 [4 x 8, 8 x 4] avx2 __m256 [6 x 16, 12 x 8] avx512 __m512 [12 x 32, 24 x 16] neon float32x4_t [12 x 8, 24 x 4]);
+registers!(f64: plain __m128d of 2 [4 x 4, 8 x 2] avx2 __m256d [6 x 8, 12 x 4] avx512 __m512d [12 x 16, 24 x 8] neon float64x2_t [12 x 4, 24 x 2]);
 
-#[cfg(target_arch = "x86_64")]
-mod x86 {
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[cfg_attr(target_arch = "aarch64", allow(unused_unsafe, reason = "every processor of that architecture has these instructions"))]
+mod instructions {
+    #[cfg(target_arch = "aarch64")]
+    use std::arch::aarch64 as arch;
+    #[cfg(target_arch = "x86_64")]
     use std::arch::x86_64 as arch;
 
     use super::Vector;
@@ -189,12 +199,22 @@ mod x86 {
         };
     }
 
+    #[cfg(target_arch = "aarch64")]
+    register!(float32x4_t of 4 f32: vdupq_n_f32 vld1q_f32 vst1q_f32 vaddq_f32 |x, a, b| arch::vfmaq_f32(b, x, a));
+    #[cfg(target_arch = "aarch64")]
+    register!(float64x2_t of 2 f64: vdupq_n_f64 vld1q_f64 vst1q_f64 vaddq_f64 |x, a, b| arch::vfmaq_f64(b, x, a));
     // SSE has no multiply-add: two instructions, rounded twice.
+    #[cfg(target_arch = "x86_64")]
     register!(__m128 of 4 f32: _mm_set1_ps _mm_loadu_ps _mm_storeu_ps _mm_add_ps |x, a, b| arch::_mm_add_ps(arch::_mm_mul_ps(x, a), b));
+    #[cfg(target_arch = "x86_64")]
     register!(__m128d of 2 f64: _mm_set1_pd _mm_loadu_pd _mm_storeu_pd _mm_add_pd |x, a, b| arch::_mm_add_pd(arch::_mm_mul_pd(x, a), b));
+    #[cfg(target_arch = "x86_64")]
     register!(__m256 of 8 f32: _mm256_set1_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_add_ps arch::_mm256_fmadd_ps);
+    #[cfg(target_arch = "x86_64")]
     register!(__m256d of 4 f64: _mm256_set1_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_add_pd arch::_mm256_fmadd_pd);
+    #[cfg(target_arch = "x86_64")]
     register!(__m512 of 16 f32: _mm512_set1_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_add_ps arch::_mm512_fmadd_ps);
+    #[cfg(target_arch = "x86_64")]
     register!(__m512d of 8 f64: _mm512_set1_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_add_pd arch::_mm512_fmadd_pd);
 }
 

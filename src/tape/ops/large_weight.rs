@@ -4,7 +4,8 @@
 //!
 //! The samples are laid side by side, `[.., samples·channels]`, so that each product is one. Beside a large W these copies are small.
 
-use crate::tape::op::{BUNDLE, Backward, Forward, LARGE_WEIGHT, WEIGHT};
+use crate::tape::Shape;
+use crate::tape::op::{BUNDLE, Backward, Bundled, Differentiable, Forward, LARGE_WEIGHT, WEIGHT};
 use phyture_kernels::level::Level;
 use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, rows, temporal};
 
@@ -52,6 +53,31 @@ impl Sizes {
     }
 }
 
+/// An operation that is this product, for some shapes of its operands at least.
+pub(super) trait Product {
+    /// Sizes, if it is.
+    fn sizes(&self, operands: &[Shape]) -> Option<Sizes>;
+}
+
+/// The operation as one that works on bundles, if its weight is worth it.
+pub(super) fn bundled<'a, T: Real, O: Product + Differentiable<T>>(op: &'a O, operands: &[Shape]) -> Option<&'a dyn Bundled<T>> {
+    op.sizes(operands).filter(|sizes| sizes.are_large()).map(|_| op as _)
+}
+
+impl<T: Real, O: Product + Differentiable<T>> Bundled<T> for O {
+    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]) {
+        if let Some(sizes) = bundle.first().and_then(|io| self.sizes(io.shapes)) {
+            forward(bundle, sizes);
+        }
+    }
+
+    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]) {
+        if let Some(sizes) = bundle.first().and_then(|io| self.sizes(io.shapes)) {
+            backward(bundle, sizes);
+        }
+    }
+}
+
 /// Lays matrices side by side.
 fn join<'a, T: Real>(level: Level, sizes: Sizes, values: impl Iterator<Item = &'a [T]>, all: &mut RowsMut<'_, T>) {
     let rows = all.rows();
@@ -62,7 +88,7 @@ fn join<'a, T: Real>(level: Level, sizes: Sizes, values: impl Iterator<Item = &'
 }
 
 /// y of every sample.
-pub(super) fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
+fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
     let (level, [_, weight, bias, ..], scratch) = (first.level, first.x, std::mem::take(&mut first.scratch));
@@ -81,7 +107,7 @@ pub(super) fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
 }
 
 /// Gradients of x of every sample; those of W and b, of all together, where the first sample asks for them.
-pub(super) fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
+fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
     let (level, weight, scratch) = (first.level, first.x[WEIGHT], std::mem::take(&mut first.scratch));

@@ -2,7 +2,7 @@
 //!   dx = dy·W,  dW = dyᵀ·x,  db = Σ_rows dy
 //! x [n, in], W [out, in] as PyTorch stores it, b [out] or absent, y [n, out]. The backward pass reads x and W.
 
-use super::large_weight::{self, Sizes};
+use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
@@ -13,11 +13,13 @@ use phyture_kernels::{Real, Rows, RowsMut, linear};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Linear;
 
-/// Sizes of the product with a single row, which is W·xᵀ; more rows are a product worth its weight by themselves.
-fn sizes_of_row(operands: &[Shape]) -> Option<Sizes> {
-    let [x, weight, ..] = operands else { return None };
-    let (rows, inputs) = x.rows();
-    (rows == 1).then_some(Sizes { inputs, outputs: weight.rows().0, channels: 1 })
+impl Product for Linear {
+    // The product with a single row is W·xᵀ; more rows are a product worth its weight by themselves.
+    fn sizes(&self, operands: &[Shape]) -> Option<Sizes> {
+        let [x, weight, ..] = operands else { return None };
+        let (rows, inputs) = x.rows();
+        (rows == 1).then_some(Sizes { inputs, outputs: weight.rows().0, channels: 1 })
+    }
 }
 
 impl<T: Real> Op<T> for Linear {
@@ -40,7 +42,7 @@ impl<T: Real> Op<T> for Linear {
     fn memory(&self, operands: &[Shape]) -> Memory {
         let [x, weight, ..] = operands else { return Memory::default() };
         let scratch = linear::scratch_len(x.rows().0, x.rows().1, weight.rows().0);
-        let scratch = scratch.max(sizes_of_row(operands).map_or(0, Sizes::bundle_scratch_len));
+        let scratch = scratch.max(self.sizes(operands).map_or(0, Sizes::bundle_scratch_len));
         Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
@@ -56,21 +58,7 @@ impl<T: Real> Op<T> for Linear {
     }
 
     fn bundled(&self, operands: &[Shape]) -> Option<&dyn Bundled<T>> {
-        sizes_of_row(operands).filter(|sizes| sizes.are_large()).map(|_| self as _)
-    }
-}
-
-impl<T: Real> Bundled<T> for Linear {
-    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| sizes_of_row(io.shapes)) {
-            large_weight::forward(bundle, sizes);
-        }
-    }
-
-    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| sizes_of_row(io.shapes)) {
-            large_weight::backward(bundle, sizes);
-        }
+        large_weight::bundled(self, operands)
     }
 }
 

@@ -2,7 +2,7 @@
 //!   dx = Wᵀ·dy,  dW = dy·xᵀ,  db = Σ_channels dy
 //! x [n, C], W [rows, n], b [rows] or absent, y [rows, C]. The backward pass reads x and W.
 
-use super::large_weight::{self, Sizes};
+use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
@@ -13,10 +13,12 @@ use phyture_kernels::{Real, Rows, RowsMut, temporal};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Temporal;
 
-fn sizes(operands: &[Shape]) -> Option<Sizes> {
-    let [x, weight, ..] = operands else { return None };
-    let (inputs, channels) = x.rows();
-    Some(Sizes { inputs, outputs: weight.rows().0, channels })
+impl Product for Temporal {
+    fn sizes(&self, operands: &[Shape]) -> Option<Sizes> {
+        let [x, weight, ..] = operands else { return None };
+        let (inputs, channels) = x.rows();
+        Some(Sizes { inputs, outputs: weight.rows().0, channels })
+    }
 }
 
 impl<T: Real> Op<T> for Temporal {
@@ -37,7 +39,7 @@ impl<T: Real> Op<T> for Temporal {
     }
 
     fn memory(&self, operands: &[Shape]) -> Memory {
-        let Some(sizes @ Sizes { inputs, outputs, channels }) = sizes(operands) else { return Memory::default() };
+        let Some(sizes @ Sizes { inputs, outputs, channels }) = self.sizes(operands) else { return Memory::default() };
         let scratch = temporal::scratch_len(inputs, outputs, channels).max(sizes.bundle_scratch_len());
         Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
@@ -54,21 +56,7 @@ impl<T: Real> Op<T> for Temporal {
     }
 
     fn bundled(&self, operands: &[Shape]) -> Option<&dyn Bundled<T>> {
-        sizes(operands).filter(|sizes| sizes.are_large()).map(|_| self as _)
-    }
-}
-
-impl<T: Real> Bundled<T> for Temporal {
-    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| sizes(io.shapes)) {
-            large_weight::forward(bundle, sizes);
-        }
-    }
-
-    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| sizes(io.shapes)) {
-            large_weight::backward(bundle, sizes);
-        }
+        large_weight::bundled(self, operands)
     }
 }
 
