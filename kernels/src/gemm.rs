@@ -16,7 +16,7 @@ use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write, sums};
 
 /// Longest block of the summed index: a panel of 16 numbers a line is 16 KiB in f32 (8 numbers in f64), half the first-level cache.
-const LONGEST_BLOCK: usize = 256;
+pub const LONGEST_BLOCK: usize = 256;
 
 /// Blocks of the summed index, of nearly equal length; one empty block if there is nothing to sum.
 fn blocks(k: usize) -> impl Iterator<Item = (usize, usize)> {

@@ -6,7 +6,8 @@ use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::level::Level;
 use phyture_kernels::random::Stream;
-use phyture_kernels::{Real, Write};
+use phyture_kernels::{Real, Rows, Write};
+use std::ops::Range;
 
 /// Largest number of operands of one operation: the kernels that an inception layer merges into one.
 pub const MAX_OPERANDS: usize = 8;
@@ -200,16 +201,42 @@ pub const BUNDLE: usize = 4;
 /// of 512 KiB in f32.
 pub(crate) const LARGE_WEIGHT: usize = 1 << 15;
 
+/// What the gradient of a large weight is made of.
+pub struct WeightGradient<'a, T> {
+    /// Operand 0 of all samples of a step, `[samples, its length]`.
+    pub x: Rows<'a, T>,
+    /// Gradients of the results of the same samples, `[samples, its length]`.
+    pub dy: Rows<'a, T>,
+    /// The rows of the weight that are asked for.
+    pub rows: Range<usize>,
+    /// Their gradient.
+    pub gradient: Gradient<'a, T>,
+    /// Scratch, as [`Bundled::weight_scratch`] says; holds anything.
+    pub scratch: &'a mut [T],
+    /// Shapes of the operands.
+    pub shapes: &'a [Shape],
+    /// Instruction-set level for the kernels.
+    pub level: Level,
+}
+
 /// An operation with a weight so large that, sample by sample, it would come from memory for each one: it works on some samples at once,
-/// and so do all other operations of its plan, in turn.
+/// and so do all other operations of its plan, in turn. The gradient of the weight, as large, is made once a step from all samples.
 ///
-/// What a sample gives must not depend on the others in its bundle, to the bit. Operands from [`WEIGHT`] on are parameters.
+/// What a sample gives must not depend on the others in its bundle, to the bit. Operands from [`WEIGHT`] on are parameters, and operand 0
+/// is none; its backward pass reads it.
 pub trait Bundled<T: Real>: Differentiable<T> {
     /// [`Op::forward`] for each of 1 to [`BUNDLE`] samples.
     fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]);
 
-    /// [`Differentiable::backward`] for each. Gradients of parameters are those of all together, and asked of the first sample alone.
+    /// [`Differentiable::backward`] for each. The gradient of the weight is not asked for; those of the other parameters are those of all
+    /// together, and asked of the first sample alone.
     fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]);
+
+    /// Some rows of the gradient of the weight. The bits of a row may depend on which rows are asked for together.
+    fn weight_gradient(&self, io: WeightGradient<'_, T>);
+
+    /// Scratch, in numbers, for the gradient of this many rows of the weight.
+    fn weight_scratch(&self, operands: &[Shape], rows: usize) -> usize;
 }
 
 /// An operation whose result for one sample depends on all samples of the step, as that of a batch normalisation does.

@@ -13,6 +13,7 @@ use super::op::{BUNDLE, Memory, Op, WEIGHT};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::{Real, Write};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -53,12 +54,36 @@ pub(crate) struct Step<T> {
     pub pieces: Vec<Piece>,
     /// Operands that are parameters, and their place in the flat slab.
     pub parameters: Vec<(usize, Range<usize>)>,
-    /// Parameter gradients to write; disjoint, sorted by start. `Write::Set` means: set for the first sample of a shard.
+    /// Parameter gradients to write, by their place in a shard; disjoint, sorted by start. `Write::Set` means: set for the first sample
+    /// of a shard.
     pub parameter_gradients: Vec<Piece>,
     /// The weight's place in the flat slab, and its packed form's place in that of the pass; `None` if nothing is packed.
     pub packed: Option<(Range<usize>, Range<usize>)>,
     /// Whether the operation takes some samples at once.
     pub bundled: bool,
+    /// In the backward list, for the gradient of a large weight.
+    pub kept: Option<Kept>,
+}
+
+/// What of a sample is kept until all samples are through: operand 0 and the gradient of the result.
+#[derive(Clone, Debug)]
+pub(crate) struct Kept {
+    /// Their places in the slab.
+    pub from: [Range<usize>; 2],
+    /// Their places among what is kept of a sample.
+    pub to: [Range<usize>; 2],
+}
+
+/// A parameter whose gradient is made once from all samples of a step.
+#[derive(Clone, Debug)]
+pub(crate) struct LargeWeight {
+    /// Its place in the flat slab.
+    pub range: Range<usize>,
+    /// Its rows, and how many of them are worked on at a time.
+    pub rows: usize,
+    pub piece: usize,
+    /// The steps of the backward list that it takes part in.
+    pub steps: Vec<usize>,
 }
 
 /// A stretch of the slab and the times in which it is in use, both ends included.
@@ -69,6 +94,9 @@ pub(crate) struct Buffer {
     pub first: usize,
     pub last: usize,
 }
+
+/// Numbers of a large weight whose gradient one thread makes at a time: a megabyte in f32.
+const LARGE_WEIGHT_PIECE: usize = 1 << 18;
 
 /// What a session replays for each sample.
 pub(crate) struct Plan<T> {
@@ -87,6 +115,13 @@ pub(crate) struct Plan<T> {
     /// Packed weights of the forward and of the backward list, one after another in the order of the list.
     pub packed_len: [usize; 2],
     pub parameter_len: usize,
+    /// Parameters whose gradients are summed over the shards: their places in the flat slab, and in a shard.
+    pub summed: Vec<(Range<usize>, usize)>,
+    /// The other parameters, sorted by start.
+    pub large_weights: Vec<LargeWeight>,
+    /// Numbers kept of a sample for them, and scratch for their gradients.
+    pub kept_len: usize,
+    pub large_weight_scratch: usize,
     /// Parameters that no path joins to the loss: their gradient is zero.
     pub unreached: Vec<Range<usize>>,
     #[cfg(test)]
@@ -158,6 +193,11 @@ impl<T: Real> Plan<T> {
             return Err(Error::Shape { operation: "train", message });
         }
         Self::compile(graph, Some(loss), outputs)
+    }
+
+    /// Gradients of a shard.
+    pub fn shard_len(&self) -> usize {
+        self.summed.iter().map(|(range, _)| range.len()).sum()
     }
 
     /// Numbers from one sample's slab to the next one's in a bundle.
@@ -237,6 +277,20 @@ impl<T: Real> Plan<T> {
             Source::Parameter(index) => graph.parameters().get(index).map(|parameter| parameter.range()),
             _ => None,
         };
+        let bundles = Bundles::of(graph, &forward_order, &backward_order);
+        let weights = bundles.weights.iter().filter_map(|&node| Some((node, parameter_range(Var(node))?)));
+        let mut large_weights: Vec<(usize, LargeWeight)> = weights
+            .map(|(node, range)| {
+                let (rows, inputs) = nodes[node].shape.rows();
+                (node, LargeWeight { range, rows, piece: (LARGE_WEIGHT_PIECE / inputs).max(1).min(rows), steps: Vec::new() })
+            })
+            .collect();
+        large_weights.sort_by_key(|(_, weight)| weight.range.start);
+        let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
+        let in_shard = |range: Range<usize>| {
+            let (stretch, place) = summed.iter().find(|(stretch, _)| stretch.contains(&range.start))?;
+            Some(place + range.start - stretch.start)
+        };
         let step = |node: usize, backward: bool, written: &mut [bool], packed_len: &mut usize| -> Option<Step<T>> {
             let Source::Op { op, operands } = &nodes[node].source else { return None };
             let reads = if backward { Some(op.differentiable()?.reads()) } else { None };
@@ -256,7 +310,11 @@ impl<T: Real> Plan<T> {
                     let write = if std::mem::replace(&mut written[var.0], true) { Write::Add } else { Write::Set };
                     let role = Role::Dx(index, write);
                     match parameter {
-                        Some(range) => parameter_gradients.push(Piece { start: range.start, len: range.len(), role }),
+                        Some(_) if bundles.weights.contains(&var.0) => {}
+                        Some(range) => {
+                            let len = range.len();
+                            parameter_gradients.push(Piece { start: in_shard(range)?, len, role });
+                        }
                         None => pieces.push(lifetimes.piece(gradients[var.0]?, role)),
                     }
                 }
@@ -278,9 +336,8 @@ impl<T: Real> Plan<T> {
             let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var)).filter(|_| len > 0);
             let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
             *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
-            let weights_are_shared = operands.iter().skip(WEIGHT).all(|&var| parameter_range(var).is_some());
-            let bundled = weights_are_shared && op.bundled(&shapes).is_some();
-            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, bundled })
+            let bundled = bundles.nodes.contains(&node);
+            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, bundled, kept: None })
         };
         let mut written = vec![false; nodes.len()];
         let mut packed_len = [0; 2];
@@ -289,8 +346,23 @@ impl<T: Real> Plan<T> {
             order.iter().filter_map(|&node| step(node, backward, &mut written, packed_len)).collect()
         };
         let forward_steps = steps(&forward_order, false);
-        let backward_steps = steps(&backward_order, true);
+        let mut backward_steps = steps(&backward_order, true);
         let bundle = if forward_steps.iter().any(|step| step.bundled) { BUNDLE } else { 1 };
+        let (mut kept_len, mut large_weight_scratch) = (0, 0);
+        for (index, (&node, step)) in backward_order.iter().zip(&mut backward_steps).enumerate() {
+            let Source::Op { operands, .. } = &nodes[node].source else { continue };
+            let weight = operands.get(WEIGHT).filter(|_| step.bundled);
+            let weight = weight.and_then(|var| large_weights.iter_mut().find(|(node, _)| *node == var.0));
+            let (Some((_, weight)), Some(x), Some(dy)) = (weight, values[operands[0].0], gradients[node]) else { continue };
+            weight.steps.push(index);
+            let from = [x, dy].map(|buffer| lifetimes.range(buffer));
+            let middle = kept_len + from[0].len();
+            let end = middle + from[1].len();
+            step.kept = Some(Kept { from, to: [kept_len..middle, middle..end] });
+            kept_len = end;
+            let scratch = step.op.bundled(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
+            large_weight_scratch = large_weight_scratch.max(scratch);
+        }
         // Every step borrows only buffers opened above.
         debug_assert_eq!((forward_steps.len(), backward_steps.len()), (forward_order.len(), backward_order.len()));
 
@@ -312,11 +384,68 @@ impl<T: Real> Plan<T> {
             bundle,
             packed_len,
             parameter_len: graph.parameter_count(),
+            summed,
+            large_weights: large_weights.into_iter().map(|(_, weight)| weight).collect(),
+            kept_len,
+            large_weight_scratch,
             unreached,
             #[cfg(test)]
             buffers: lifetimes.buffers,
         })
     }
+}
+
+/// Which operations take some samples at once, and which parameters have their gradients made from all samples of a step.
+struct Bundles {
+    nodes: BTreeSet<usize>,
+    weights: BTreeSet<usize>,
+}
+
+impl Bundles {
+    /// None where samples wait for each other. A weight of which a part of the gradient comes sample by sample is no large weight.
+    fn of<T: Real>(graph: &Graph<T>, forward: &[usize], backward: &[usize]) -> Self {
+        let nodes = &graph.nodes;
+        let is_parameter = |var: &Var| matches!(nodes[var.0].source, Source::Parameter(_));
+        let operation = |&node: &usize| match &nodes[node].source {
+            Source::Op { op, operands } => Some((node, op, operands)),
+            _ => None,
+        };
+        if forward.iter().filter_map(operation).any(|(_, op, _)| op.coupling().is_some()) {
+            return Self { nodes: BTreeSet::new(), weights: BTreeSet::new() };
+        }
+        let suits = |op: &Arc<dyn Op<T>>, operands: &[Var]| {
+            let (x, weights) = operands.split_at(WEIGHT.min(operands.len()));
+            !x.iter().any(is_parameter) && weights.iter().all(is_parameter) && op.bundled(&shapes_of(graph, operands)).is_some()
+        };
+        let (mut weights, mut others) = (BTreeSet::new(), BTreeSet::new());
+        for (_, op, operands) in backward.iter().filter_map(operation) {
+            let bundled = suits(op, operands);
+            for (index, var) in operands.iter().enumerate().filter(|(_, var)| is_parameter(var)) {
+                if bundled && index == WEIGHT {
+                    weights.insert(var.0)
+                } else {
+                    others.insert(var.0)
+                };
+            }
+        }
+        weights.retain(|weight| !others.contains(weight));
+        let whole = |operands: &[Var]| operands.get(WEIGHT).is_some_and(|weight| !others.contains(&weight.0));
+        let bundled = forward.iter().filter_map(operation).filter(|(_, op, operands)| suits(op, operands) && whole(operands));
+        Self { nodes: bundled.map(|(node, ..)| node).collect(), weights }
+    }
+}
+
+/// The stretches of `0..len` between some ranges, sorted by start, each with its place if they are laid one after another.
+fn complement(ranges: impl Iterator<Item = Range<usize>>, len: usize) -> Vec<(Range<usize>, usize)> {
+    let (mut at, mut place, mut stretches) = (0, 0, Vec::new());
+    for range in ranges.chain(std::iter::once(len..len)) {
+        if at < range.start {
+            stretches.push((at..range.start, place));
+            place += range.start - at;
+        }
+        at = range.end;
+    }
+    stretches
 }
 
 fn shapes_of<T: Real>(graph: &Graph<T>, operands: &[Var]) -> Vec<Shape> {
@@ -372,7 +501,7 @@ fn paths<T: Real>(graph: &Graph<T>, loss: Var) -> Result<Vec<bool>> {
 pub(crate) mod tests {
     use super::super::graph::Graph;
     use super::super::op::{Forward, Op};
-    use super::super::ops::{Activation, Add, Half, Interleave, Linear, ScaleExp, SquaredError, Subtract};
+    use super::super::ops::{Activation, Add, Half, Interleave, Linear, ScaleExp, SquaredError, Subtract, Temporal};
     use super::*;
     use phyture_kernels::activation::Activation as Kind;
     use proptest::prelude::*;
@@ -469,6 +598,36 @@ pub(crate) mod tests {
         // A chain needs an operand and a result at a time, beside the inputs.
         assert!(infer * 4 < train, "{infer} against {train}");
         Ok(())
+    }
+
+    #[test]
+    fn a_weight_with_a_use_of_another_kind_is_no_large_weight() -> Result<()> {
+        for other_use in [false, true] {
+            let mut graph = Graph::<f64>::new();
+            let (x, rows) = (graph.input("x", &[256, 2])?, graph.input("rows", &[2, 256])?);
+            let weight = graph.parameter("weight", &[256, 256])?;
+            let over_time = graph.apply(Temporal, &[x, weight])?;
+            let target = graph.input("target", &[256, 2])?;
+            let mut loss = graph.apply(SquaredError { scale: 1.0 }, &[over_time, target])?;
+            if other_use {
+                let target = graph.input("another", &[2, 256])?;
+                let linear = graph.apply(Linear, &[rows, weight])?;
+                let error = graph.apply(SquaredError { scale: 1.0 }, &[linear, target])?;
+                loss = graph.apply(Add, &[loss, error])?;
+            }
+            let plan = Plan::train(&graph, loss, &[])?;
+            assert_eq!((plan.bundle > 1, plan.large_weights.len()), (!other_use, usize::from(!other_use)));
+            assert_eq!(plan.shard_len(), if other_use { 256 * 256 } else { 0 });
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_complement_is_what_is_left_laid_end_to_end() {
+        let found = complement([2..5, 5..6, 9..12].into_iter(), 12);
+        assert_eq!(found, [(0..2, 0), (6..9, 2)]);
+        assert_eq!(complement(std::iter::empty(), 3), [(0..3, 0)]);
+        assert_eq!(complement(std::iter::once(0..3), 3), []);
     }
 
     struct OneWay;

@@ -14,6 +14,7 @@ use super::plan::Plan;
 use super::slab::{Slab, Slabs};
 use super::threads::{Threads, Workers};
 use crate::error::{Error, Result};
+use large_weights::LargeWeights;
 use lockstep::Lockstep;
 use packing::pack;
 use phyture_kernels::Real;
@@ -22,6 +23,7 @@ use replay::Replay;
 pub use shards::SHARDS;
 use shards::{Shard, reduce};
 
+mod large_weights;
 mod lockstep;
 mod packing;
 mod replay;
@@ -53,7 +55,7 @@ pub struct Session<T> {
     shards: Vec<Shard<T>>,
     gradients: Vec<T>,
     losses: Vec<f64>,
-    /// By sample: outputs in order, then the gradients of the inputs that have one.
+    /// By sample: outputs in order, then the gradients of the inputs that have one, then what is kept for the gradients of large weights.
     results: Vec<T>,
     /// All samples of a step at once, for a plan that couples them.
     lockstep: Option<Lockstep<T>>,
@@ -89,14 +91,14 @@ impl<T: Real> Session<T> {
         let count = threads.count();
         // Inference has nothing to sum, so its number of shards is free.
         let shards = if trains { SHARDS } else { SHARDS.max(count) };
-        let gradient_len = if trains { plan.parameter_len } else { 0 };
+        let [gradient_len, shard_len] = [plan.parameter_len, plan.shard_len()].map(|len| if trains { len } else { 0 });
         Ok(Self {
             level,
             poison: false,
             packed: plan.packed_len.map(Slab::new),
-            slabs: Slabs::new(count.min(shards), plan.bundle * plan.lane_len()),
+            slabs: Slabs::new(count.min(shards), (plan.bundle * plan.lane_len()).max(plan.large_weight_scratch)),
             loaded: Vec::new(),
-            shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; gradient_len] }).collect(),
+            shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; shard_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
             losses: Vec::new(),
             results: Vec::new(),
@@ -216,9 +218,15 @@ impl<T: Real> Session<T> {
                 Some(lockstep) => lockstep.run(&replay, shards, losses_mut, results),
                 None => replay.work(shards, 0, losses_mut, results),
             }
+            if plan.loss.is_none() {
+                return;
+            }
             // A shard without samples has written nothing.
             let used = |shard: usize| replay.first_sample(shard) < replay.first_sample(shard + 1);
-            reduce(parallelism, gradients, shards, &used, 0);
+            for (range, place) in &plan.summed {
+                reduce(parallelism, &mut gradients[range.clone()], shards, &used, *place);
+            }
+            LargeWeights { replay: &replay, results }.work(&plan.large_weights, gradients, 0);
         });
         for range in &self.plan.unreached {
             if let Some(gradients) = self.gradients.get_mut(range.clone()) {
@@ -269,7 +277,8 @@ impl<T: Real> Session<T> {
     }
 
     fn result_len(&self) -> usize {
-        self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten()).map(ExactSizeIterator::len).sum()
+        let copied = self.plan.outputs.iter().chain(self.plan.input_gradients.iter().flatten());
+        copied.map(ExactSizeIterator::len).sum::<usize>() + self.plan.kept_len
     }
 }
 
@@ -360,9 +369,9 @@ mod tests {
     fn large_weights<T: Real>() -> Result<(Graph<T>, Var, Var)> {
         let (length, channels) = (256, 3);
         let mut graph = Graph::<T>::new();
-        let (x, target) = (graph.input_with_gradient("x", &[length, channels])?, graph.input("target", &[1, 48])?);
+        let (x, target) = (graph.input_with_gradient("x", &[length, channels])?, graph.input("target", &[1, 384])?);
         let (weight, bias) = (graph.parameter("time", &[length, length])?, graph.parameter("bias", &[length])?);
-        let rows = graph.parameter("rows", &[48, length * channels])?;
+        let rows = graph.parameter("rows", &[384, length * channels])?;
         let mixed = graph.apply(Temporal, &[x, weight, bias])?;
         let dropped = graph.apply(Dropout { rate: 0.3 }, &[mixed])?;
         let mixed = graph.apply(Temporal, &[dropped, weight])?;
@@ -378,6 +387,8 @@ mod tests {
         let parameters = parameters(graph.parameter_count());
         let mut alone = Session::train(&graph, loss, &[output], Threads(1))?;
         assert!(alone.plan.bundle > 1, "these weights are not worth a bundle");
+        let weights = &alone.plan.large_weights;
+        assert!(weights.iter().any(|weight| weight.steps.len() > 1) && weights.iter().any(|weight| weight.piece < weight.rows));
         // A power of 2, by which a loss can be divided without rounding.
         let samples = SHARDS * BUNDLE;
         let mut session = Session::train(&graph, loss, &[output], Threads(2))?;

@@ -2,15 +2,19 @@
 //!   dx = Wᵀ·dy,  dW = Σ_samples dy·xᵀ,  db = Σ_samples Σ_channels dy
 //! x [inputs, channels], W [outputs, inputs], b [outputs] or absent, y [outputs, channels].
 //!
-//! The samples are laid side by side, `[.., samples·channels]`, so that each product is one. Beside a large W these copies are small.
+//! Samples are laid side by side, `[.., samples·channels]`, so that each product is one: a bundle of them for y and dx, and for dW as
+//! many as a kernel sums over at once. Beside a large W these copies are small.
 
 use crate::tape::Shape;
-use crate::tape::op::{BUNDLE, Backward, Bundled, Differentiable, Forward, LARGE_WEIGHT, WEIGHT};
+use crate::tape::op::{BUNDLE, Backward, Bundled, Differentiable, Forward, LARGE_WEIGHT, WEIGHT, WeightGradient};
 use phyture_kernels::level::Level;
 use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, rows, temporal};
 
 /// The operand after the weight.
 const BIAS: usize = WEIGHT + 1;
+
+/// Columns of samples that dW sums over at once, as the kernel does.
+const COLUMNS: usize = gemm::LONGEST_BLOCK;
 
 /// Sizes of the product.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,12 +34,22 @@ impl Sizes {
     pub fn bundle_scratch_len(self) -> usize {
         let Self { inputs, outputs, channels } = self;
         let columns = BUNDLE * channels;
-        let products = [(outputs, inputs, columns), (inputs, outputs, columns), (outputs, columns, inputs)];
-        let product = products.into_iter().map(|(m, k, n)| gemm::scratch_len(m, k, n)).max();
-        if self.are_large() { (inputs + outputs) * columns + product.unwrap_or(0) } else { 0 }
+        let product = gemm::scratch_len(outputs, inputs, columns).max(gemm::scratch_len(inputs, outputs, columns));
+        if self.are_large() { (inputs + outputs) * columns + product } else { 0 }
     }
 
-    /// The scratch of a bundle: for matrices of `[inputs, samples·channels]` and `[outputs, samples·channels]`, and for a product.
+    /// Samples that dW sums over at once.
+    fn together(self) -> usize {
+        (COLUMNS / self.channels).max(1)
+    }
+
+    /// Scratch for some rows of dW.
+    fn weight_scratch_len(self, rows: usize) -> usize {
+        let columns = self.together() * self.channels;
+        (self.inputs + rows) * columns + gemm::scratch_len(rows, columns, self.inputs)
+    }
+
+    /// Scratch for matrices of `[inputs, samples·channels]` and `[outputs, samples·channels]`, and for a product.
     fn divide<T>(self, samples: usize, scratch: &mut [T]) -> (RowsMut<'_, T>, RowsMut<'_, T>, &mut [T]) {
         let columns = samples * self.channels;
         let (low, rest) = scratch.split_at_mut(self.inputs * columns);
@@ -76,6 +90,16 @@ impl<T: Real, O: Product + Differentiable<T>> Bundled<T> for O {
             backward(bundle, sizes);
         }
     }
+
+    fn weight_gradient(&self, io: WeightGradient<'_, T>) {
+        if let Some(sizes) = self.sizes(io.shapes) {
+            weight_gradient(io, sizes);
+        }
+    }
+
+    fn weight_scratch(&self, operands: &[Shape], rows: usize) -> usize {
+        self.sizes(operands).map_or(0, |sizes| sizes.weight_scratch_len(rows))
+    }
 }
 
 /// Lays matrices side by side.
@@ -106,19 +130,14 @@ fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
     }
 }
 
-/// Gradients of x of every sample; those of W and b, of all together, where the first sample asks for them.
+/// Gradients of x of every sample; that of b, of all together, where the first sample asks for it.
 fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
     let (level, weight, scratch) = (first.level, first.x[WEIGHT], std::mem::take(&mut first.scratch));
-    let [dweight, dbias] = [WEIGHT, BIAS].map(|operand| first.dx[operand].take());
-    let (mut x, mut dy, scratch) = sizes.divide(count, scratch);
+    let dbias = first.dx[BIAS].take();
+    let (mut dx, mut dy, scratch) = sizes.divide(count, scratch);
     join(level, sizes, samples.iter().map(|io| io.dy), &mut dy);
-    if let Some(dweight) = dweight {
-        join(level, sizes, samples.iter().map(|io| io.x[0]), &mut x);
-        let values = RowsMut::packed(dweight.values, sizes.outputs, sizes.inputs);
-        gemm::abt(level, dy.view(), x.view(), values, dweight.write, scratch);
-    }
     if let Some(dbias) = dbias {
         temporal::backward_bias(level, dy.view(), dbias.values, dbias.write);
     }
@@ -126,13 +145,38 @@ fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
     if samples.iter().all(|io| io.dx[0].is_none()) {
         return;
     }
-    let mut dx = x;
     gemm::atb(level, sizes.weight(weight), dy.view(), dx.reborrow(), Write::Set, scratch);
     let all = dx.view();
     for (index, gradient) in samples.iter_mut().map(|io| io.dx[0].as_mut()).enumerate() {
         if let Some(gradient) = gradient {
             let dx = RowsMut::packed(&mut *gradient.values, sizes.inputs, sizes.channels);
             rows::copy(level, all.columns(index * sizes.channels, sizes.channels), dx, gradient.write);
+        }
+    }
+}
+
+/// Rows of the gradient of W.
+fn weight_gradient<T: Real>(io: WeightGradient<'_, T>, sizes: Sizes) {
+    let WeightGradient { x, dy, rows: asked, gradient, scratch, level, .. } = io;
+    let Sizes { inputs, channels, .. } = sizes;
+    let sizes = Sizes { outputs: asked.len(), ..sizes };
+    let dy = dy.columns(asked.start * channels, asked.len() * channels);
+    let mut values = RowsMut::packed(gradient.values, asked.len(), inputs);
+    if x.rows() == 0 && gradient.write == Write::Set {
+        rows::fill(values.reborrow(), T::ZERO);
+    }
+    for start in (0..x.rows()).step_by(sizes.together()) {
+        let end = x.rows().min(start + sizes.together());
+        let (x, dy) = (x.range(start, end), dy.range(start, end));
+        let write = if start == 0 { gradient.write } else { Write::Add };
+        if channels == 1 {
+            // One column a sample: the samples are the rows of the matrices to be multiplied.
+            gemm::atb(level, dy, x, values.reborrow(), write, scratch);
+        } else {
+            let (mut all_x, mut all_dy, scratch) = sizes.divide(end - start, scratch);
+            join(level, sizes, (0..end - start).map(|sample| x.row(sample)), &mut all_x);
+            join(level, sizes, (0..end - start).map(|sample| dy.row(sample)), &mut all_dy);
+            gemm::abt(level, all_dy.view(), all_x.view(), values.reborrow(), write, scratch);
         }
     }
 }

@@ -98,6 +98,7 @@ impl<T: Real> Replay<'_, T> {
             }
             for step in &self.plan.backward {
                 self.backward_step(step, lanes, gradients, (first, sets));
+                self.keep(step, lanes, results);
             }
         }
         for (lane, result) in lanes.iter().zip(results.chunks_exact_mut(self.result_len.max(1))) {
@@ -143,6 +144,17 @@ impl<T: Real> Replay<'_, T> {
                         op.backward(self.backward(step, lane, Some(&mut *gradients), (sample, sets && sample == first), None));
                     }
                 }
+            }
+        }
+    }
+
+    /// Copies what the gradient of a large weight will be made of, to the end of the sample's results. No step overwrites what it reads.
+    fn keep(&self, step: &Step<T>, lanes: &[&mut [T]], results: &mut [T]) {
+        let Some(kept) = &step.kept else { return };
+        for (lane, result) in lanes.iter().zip(results.chunks_exact_mut(self.result_len.max(1))) {
+            let record = &mut result[self.result_len - self.plan.kept_len..];
+            for (from, to) in kept.from.iter().zip(&kept.to) {
+                record[to.clone()].copy_from_slice(&lane[from.clone()]);
             }
         }
     }
