@@ -10,7 +10,7 @@ use phyture::nn::{Network, OutputScale, PhyTureConfig};
 use phyture::physics::{Model, calibrate};
 use phyture::sim::{INERTIA_KG_M2, Level, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::tape::{DropoutKey, Session, Threads};
-use phyture_kernels::adam::{self, Adam};
+use phyture_kernels::adam::Adam;
 use phyture_kernels::random::Stream;
 use std::time::Duration;
 
@@ -44,9 +44,7 @@ fn training(criterion: &mut Criterion) -> Result<()> {
                 let key = dropout.then_some(DropoutKey { seed: 0, step });
                 let loss = session.step(&parameters, BATCH, key, &fill);
                 step += 1;
-                let level = session.level();
-                adam::step(level, &Adam::default(), step, 1.0, session.gradients(), &mut parameters, &mut first, &mut second);
-                loss.is_ok()
+                loss.and_then(|_| session.adam(&Adam::default(), step, &mut parameters, &mut first, &mut second)).is_ok()
             });
         });
     }

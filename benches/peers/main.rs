@@ -7,7 +7,7 @@
 
 use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
-use phyture_kernels::adam::{self, Adam};
+use phyture_kernels::adam::Adam;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Level, peak};
 use std::time::Instant;
@@ -83,8 +83,7 @@ fn run() -> Result<String, String> {
                 let random = case != "nodropout" && config.is_random();
                 let key = random.then_some(DropoutKey { seed: 0, step });
                 session.step(&parameters, batch, key, &fill).map_err(text)?;
-                let gradients = session.gradients();
-                adam::step(level, &Adam::default(), step + 1, 1.0, gradients, &mut parameters, &mut first, &mut second);
+                session.adam(&Adam::default(), step + 1, &mut parameters, &mut first, &mut second).map_err(text)?;
                 seconds.push(start.elapsed().as_secs_f64());
             }
         }

@@ -18,16 +18,19 @@ use large_weights::LargeWeights;
 use lockstep::Lockstep;
 use packing::pack;
 use phyture_kernels::Real;
+use phyture_kernels::adam::Adam;
 use phyture_kernels::level::Level;
 use replay::Replay;
 pub use shards::SHARDS;
 use shards::{Shard, reduce};
+use update::Update;
 
 mod large_weights;
 mod lockstep;
 mod packing;
 mod replay;
 mod shards;
+mod update;
 
 /// Key of the random streams of one training step. With the same key the same dropout masks are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -244,6 +247,30 @@ impl<T: Real> Session<T> {
         }
     }
 
+    /// Step number `step` of Adam (1 is the first) on the parameters and both moments, with the gradient of the last step.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if one of the three is not as long as the gradient.
+    pub fn adam(
+        &self,
+        adam: &Adam,
+        step: u64,
+        parameters: &mut [T],
+        first_moment: &mut [T],
+        second_moment: &mut [T],
+    ) -> Result<()> {
+        let lengths = [parameters.len(), first_moment.len(), second_moment.len()];
+        if lengths.iter().any(|len| *len != self.gradients.len()) {
+            let message = format!("{lengths:?} parameters and moments; the gradient has {}", self.gradients.len());
+            return Err(Error::Shape { operation: "adam", message });
+        }
+        let (level, gradients) = (self.level, &self.gradients);
+        self.workers.run(|parallelism| {
+            Update { parallelism, level, adam, step }.work(gradients, [parameters, first_moment, second_moment]);
+        });
+        Ok(())
+    }
+
     /// Gradient of the mean loss of the last step, one number a parameter, in the layout of the flat slab. Empty in an
     /// inference session.
     pub fn gradients(&self) -> &[T] {
@@ -422,6 +449,24 @@ mod tests {
             }
             assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn adam_takes_the_same_step_in_blocks() -> Result<()> {
+        let (graph, loss, _) = large_weights::<f32>()?;
+        let start = parameters::<f32>(graph.parameter_count());
+        let mut session = Session::train(&graph, loss, &[], Threads(2))?;
+        session.step(&start, 3, None, &fill)?;
+        let (mut whole, mut blocks) = ([start.clone(), start.clone(), start.clone()], [start.clone(), start.clone(), start]);
+        let adam = Adam::default();
+        let [parameters, first, second] = whole.each_mut().map(|values| &mut values[..]);
+        phyture_kernels::adam::step(session.level(), &adam, 7, 1.0, session.gradients(), parameters, first, second);
+        let [parameters, first, second] = blocks.each_mut().map(|values| &mut values[..]);
+        session.adam(&adam, 7, parameters, first, second)?;
+        assert_eq!(whole.map(|values| bits(&values)), blocks.clone().map(|values| bits(&values)));
+        let [parameters, first, second] = blocks.each_mut().map(|values| &mut values[..]);
+        assert!(session.adam(&adam, 8, &mut parameters[1..], first, second).is_err());
         Ok(())
     }
 

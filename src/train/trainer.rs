@@ -7,7 +7,7 @@ use crate::flight::Window;
 use crate::hybrid::sequence::Sequence;
 use crate::nn::Network;
 use crate::tape::{DropoutKey, Session, Threads};
-use phyture_kernels::adam::{self, Adam};
+use phyture_kernels::adam::Adam;
 use phyture_kernels::random::permutation;
 use serde::{Deserialize, Serialize};
 
@@ -128,8 +128,7 @@ impl<'a> Trainer<'a> {
         };
         let dropout = self.config.network.is_random().then_some(DropoutKey { seed: self.config.seed, step: done });
         let loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
-        let gradients = self.session.gradients();
-        let gradient_norm = gradients.iter().map(|gradient| f64::from(*gradient).powi(2)).sum::<f64>().sqrt();
+        let gradient_norm = norm(self.session.gradients());
         if !(loss.is_finite() && gradient_norm.is_finite()) {
             return Err(Error::Undetermined(format!(
                 "training diverged at step {}: loss {loss}, gradient norm {gradient_norm}; lower `peak_rate` ({})",
@@ -140,9 +139,18 @@ impl<'a> Trainer<'a> {
         let rate = self.schedule.rate(done as usize);
         let State { parameters, first_moment, second_moment, .. } = &mut self.state;
         let adam = Adam { learning_rate: rate, ..Adam::default() };
-        adam::step(self.session.level(), &adam, done + 1, 1.0, gradients, parameters, first_moment, second_moment);
+        self.session.adam(&adam, done + 1, parameters, first_moment, second_moment)?;
         self.session.settle(parameters);
         self.state.step += 1;
         Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
     }
+}
+
+/// Euclidean length, in f64. Eight sums: in a single one each addition would wait for the last.
+fn norm(gradients: &[f32]) -> f64 {
+    let mut sums = [0.0_f64; 8];
+    for chunk in gradients.chunks(sums.len()) {
+        sums.iter_mut().zip(chunk).for_each(|(sum, gradient)| *sum += f64::from(*gradient).powi(2));
+    }
+    sums.iter().sum::<f64>().sqrt()
 }
