@@ -22,23 +22,14 @@ pub(crate) fn of_products<T: Real, I: Isa>(x: &[T], y: &[T], f: impl Fn(T) -> T,
     for ((lane, x), y) in lanes.iter_mut().zip(x_rest).zip(y_rest) {
         *lane = I::mul_add(f(*x), g(*y), *lane);
     }
-    // Log₂ steps, written out: a loop over widths that only it knows stays a loop, and goes through memory.
-    fold::<T, 32>(&mut lanes);
-    fold::<T, 16>(&mut lanes);
-    fold::<T, 8>(&mut lanes);
-    fold::<T, 4>(&mut lanes);
-    fold::<T, 2>(&mut lanes);
-    fold::<T, 1>(&mut lanes);
-    lanes[0]
-}
-
-/// The second `WIDTH` lanes onto the first.
-#[inline(always)]
-fn fold<T: Real, const WIDTH: usize>(lanes: &mut [T; LANES]) {
-    for i in 0..WIDTH {
-        let high = lanes[i + WIDTH];
-        lanes[i] += high;
+    // Halves onto halves: log₂ steps.
+    let mut width = LANES / 2;
+    while width > 0 {
+        let (low, high) = lanes.split_at_mut(width);
+        low.iter_mut().zip(high).for_each(|(low, high)| *low += *high);
+        width /= 2;
     }
+    lanes[0]
 }
 
 /// Σ x·y
