@@ -11,25 +11,61 @@ const LANES: usize = 64;
 /// Σ f(x)·g(y) over two rows of one length.
 #[inline(always)]
 pub(crate) fn of_products<T: Real, I: Isa>(x: &[T], y: &[T], f: impl Fn(T) -> T, g: impl Fn(T) -> T) -> T {
-    let mut lanes = [T::ZERO; LANES];
     let (x_blocks, x_rest) = x.as_chunks::<LANES>();
     let (y_blocks, y_rest) = y.as_chunks::<LANES>();
-    for (x, y) in x_blocks.iter().zip(y_blocks) {
-        for ((lane, x), y) in lanes.iter_mut().zip(x).zip(y) {
-            *lane = I::mul_add(f(*x), g(*y), *lane);
+    let mut sum = T::ZERO;
+    if !x_blocks.is_empty() {
+        let mut lanes = [T::ZERO; LANES];
+        for (x, y) in x_blocks.iter().zip(y_blocks) {
+            lanes = plus_products::<T, I>(lanes, x, y, &f, &g);
         }
+        sum = total(lanes);
     }
-    for ((lane, x), y) in lanes.iter_mut().zip(x_rest).zip(y_rest) {
+    if !x_rest.is_empty() {
+        // Lanes of their own: these are indexed by variables, and so in memory.
+        let mut lanes = [T::ZERO; LANES];
+        for ((lane, x), y) in lanes.iter_mut().zip(x_rest).zip(y_rest) {
+            *lane = f(*x) * g(*y);
+        }
+        sum += total(lanes);
+    }
+    sum
+}
+
+/// By value: nothing else can point to these numbers, which stay in registers.
+#[inline(always)]
+fn plus_products<T: Real, I: Isa>(
+    mut lanes: [T; LANES],
+    x: &[T; LANES],
+    y: &[T; LANES],
+    f: &impl Fn(T) -> T,
+    g: &impl Fn(T) -> T,
+) -> [T; LANES] {
+    for ((lane, x), y) in lanes.iter_mut().zip(x).zip(y) {
         *lane = I::mul_add(f(*x), g(*y), *lane);
     }
-    // Halves onto halves: log₂ steps.
-    let mut width = LANES / 2;
-    while width > 0 {
-        let (low, high) = lanes.split_at_mut(width);
-        low.iter_mut().zip(high).for_each(|(low, high)| *low += *high);
-        width /= 2;
+    lanes
+}
+
+/// Halves onto halves: log₂ steps.
+#[inline(always)]
+fn total<T: Real>(lanes: [T; LANES]) -> T {
+    let lanes: [T; 32] = halves(lanes);
+    let lanes: [T; 16] = halves(lanes);
+    let lanes: [T; 8] = halves(lanes);
+    let lanes: [T; 4] = halves(lanes);
+    let [a, b, c, d] = lanes;
+    (a + c) + (b + d)
+}
+
+/// The upper half onto the lower one.
+#[inline(always)]
+fn halves<T: Real, const N: usize, const HALF: usize>(lanes: [T; N]) -> [T; HALF] {
+    let mut sums = [T::ZERO; HALF];
+    for i in 0..HALF {
+        sums[i] = lanes[i] + lanes[i + HALF];
     }
-    lanes[0]
+    sums
 }
 
 /// Σ x·y
