@@ -85,6 +85,22 @@ pub enum Error {
         /// What is wrong and what to do.
         message: String,
     },
+    /// Something is there already and is not overwritten unasked.
+    #[error("{}: {what} is there already; give another name, or --force to overwrite it", path.display())]
+    Exists {
+        /// Where.
+        path: PathBuf,
+        /// What is there, with its article.
+        what: String,
+    },
+    /// Another program works on the same file or folder.
+    #[error("{}: {holder} works on it; wait for it to end, or give another name", path.display())]
+    Busy {
+        /// The file or folder.
+        path: PathBuf,
+        /// Process and host.
+        holder: String,
+    },
     /// The work was interrupted and its state saved.
     #[error("interrupted; {saved}")]
     Interrupted {
@@ -94,6 +110,23 @@ pub enum Error {
 }
 
 impl Error {
+    /// The kind of error in one word, for programs.
+    pub const fn kind(&self) -> &'static str {
+        match self {
+            Self::Io { .. } => "io",
+            Self::Cell { .. } => "cell",
+            Self::Log { .. } => "log",
+            Self::Config { .. } => "config",
+            Self::Formula { .. } => "formula",
+            Self::Shape { .. } => "shape",
+            Self::Undetermined(_) => "undetermined",
+            Self::File { .. } => "file",
+            Self::Exists { .. } => "exists",
+            Self::Busy { .. } => "busy",
+            Self::Interrupted { .. } => "interrupted",
+        }
+    }
+
     /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`.
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.into();

@@ -11,6 +11,7 @@
 
 pub mod blocks;
 pub mod critique;
+pub mod disk;
 pub mod error;
 pub mod flight;
 pub mod formula;

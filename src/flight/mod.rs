@@ -5,7 +5,6 @@
 
 #[cfg(feature = "files")]
 mod assemble;
-pub mod atomic;
 pub mod attitude;
 mod column;
 #[cfg(feature = "files")]

@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::atomic::write_atomically;
+use crate::disk::write_atomically;
 
 const SMOOTHER: &str = "smoother.txt";
 const CONTROLS: &str = "controls.txt";

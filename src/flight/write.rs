@@ -1,10 +1,10 @@
 //! Writing flights and tables of predictions as CSV or Parquet, in the layout that [`super::read`] reads.
 //!
 //! Numbers are printed in the shortest form that reads back to the same bits; each file appears in one step (see
-//! [`super::atomic`]). What stands in a prediction table is the caller's business.
+//! [`crate::disk`]). What stands in a prediction table is the caller's business.
 
-use super::atomic::write_atomically;
 use super::{Column, Flight, Targets};
+use crate::disk::write_atomically;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::io::{self, Write};

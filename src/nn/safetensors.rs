@@ -4,6 +4,7 @@
 //! A damaged or hostile file is an [`Error::File`], never a panic, and never makes this allocate more than the file is long.
 //! Training checkpoints are another format.
 
+use crate::disk::write_atomically;
 use crate::error::{Error, Result};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
@@ -86,16 +87,12 @@ impl SafeTensors {
         Self::parse(&bytes).map_err(|message| Error::File { path: path.into(), message })
     }
 
-    /// Writes a file, by way of a temporary file beside it, so that a reader never sees half of it.
+    /// Writes a file in one step: a reader sees the old one or the new one.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let mut name = path.file_name().unwrap_or_default().to_owned();
-        name.push(".part");
-        let part = path.with_file_name(name);
-        std::fs::write(&part, self.to_bytes()).map_err(Error::io(&part))?;
-        std::fs::rename(&part, path).map_err(Error::io(path))
+        write_atomically(path, |file| file.write_all(&self.to_bytes()))
     }
 
     /// The bytes of a file. Tensors lie in the order of their names, without gaps.

@@ -7,7 +7,7 @@ use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::model::{Entry, Model, ModelData};
 use super::toml_section::{Section, line_of, number};
 use crate::error::{Error, Result};
-use crate::flight::{Column, atomic};
+use crate::flight::Column;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -118,7 +118,7 @@ impl Model {
     /// [`Error::Io`]; as [`Model::to_toml`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         let text = self.to_toml()?;
-        atomic::write_atomically(path, |out| out.write_all(text.as_bytes()))
+        crate::disk::write_atomically(path, |out| out.write_all(text.as_bytes()))
     }
 
     /// The model as the text of a model file, every effect written out.

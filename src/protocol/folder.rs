@@ -3,20 +3,48 @@
 //! | file | content |
 //! | --- | --- |
 //! | `plan.json` | the plan |
-//! | `runs/KEY.json` | the outcome of the run of that key; written in one piece when the run is at its end |
+//! | `runs/KEY.json` | the outcome of the run of that key, sealed; written in one piece when the run is at its end |
 //! | `working/KEY/` | checkpoints of a run that is under way |
 //! | `tables/` | what `collect` made |
 //!
-//! Several processes may work in one folder: none touches another's files but to write the same bytes.
+//! Several processes may work in one folder: a run is made by the one that has claimed it.
 
 use super::outcome::Outcome;
 use super::plan::{Plan, Run};
+use crate::disk::{Lock, write_atomically};
 use crate::error::{Error, Result};
-use crate::flight::atomic::write_atomically;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How long another program may hold the plan.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// An outcome with what tells whether it is whole, and where its last digits come from.
+#[derive(Serialize, Deserialize)]
+struct Sealed {
+    /// SHA-256 of the outcome as compact JSON.
+    sha256: String,
+    /// Instruction set of the kernels: outcomes of another differ in the last digits.
+    instruction_set: String,
+    outcome: Outcome,
+}
+
+fn seal(path: &Path, outcome: &Outcome) -> Result<String> {
+    let text = serde_json::to_vec(outcome).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+    Ok(Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+/// The instruction set of this process's kernels by name.
+///
+/// # Errors
+/// [`Error::Config`] if the environment asks for one that this machine does not have.
+pub fn instruction_set() -> Result<&'static str> {
+    Ok(crate::tape::instruction_set()?.name())
+}
 
 /// The folder of a benchmark.
 #[derive(Clone, Debug)]
@@ -81,27 +109,56 @@ impl Folder {
         write(&self.plan_file(), plan)
     }
 
-    /// Whether a run is at its end.
-    pub fn is_done(&self, key: &str) -> bool {
-        self.outcome_file(key).exists()
-    }
-
-    /// The outcome of a run; `None` if it is not at its end.
+    /// Holds the plan against other programs that want to read and write it. They hold it for a moment, and it is waited for.
     ///
     /// # Errors
-    /// [`Error::File`] if the file does not read or is of another run.
-    pub fn outcome(&self, plan: &Plan, run: &Run) -> Result<Option<Outcome>> {
+    /// [`Error::Busy`] if another holds it for longer than ten seconds; [`Error::Io`].
+    pub fn hold_plan(&self) -> Result<Lock> {
+        let begun = Instant::now();
+        loop {
+            match Lock::of_file(&self.plan_file()) {
+                Err(Error::Busy { .. }) if begun.elapsed() < PATIENCE => std::thread::sleep(PATIENCE / 200),
+                held => return held,
+            }
+        }
+    }
+
+    /// Takes a run, so that no other program makes it at the same time.
+    ///
+    /// # Errors
+    /// [`Error::Busy`] if another program makes it; [`Error::Io`].
+    pub fn claim(&self, key: &str) -> Result<Lock> {
+        Lock::of_file(&self.working(key))
+    }
+
+    /// The outcome of a run and the instruction set that made it; `None` if the run is not at its end.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the file is empty, cut, edited, or of another run.
+    pub fn outcome(&self, plan: &Plan, run: &Run) -> Result<Option<(Outcome, String)>> {
+        Ok(self.sealed(plan, run)?.map(|sealed| (sealed.outcome, sealed.instruction_set)))
+    }
+
+    fn sealed(&self, plan: &Plan, run: &Run) -> Result<Option<Sealed>> {
         let key = plan.key(run)?;
         let path = self.outcome_file(&key);
         if !path.exists() {
             return Ok(None);
         }
-        let outcome: Outcome = read(&path)?;
-        // Rows that are one network share a file under the name of whichever came first.
-        if plan.key(&outcome.run)? == key {
-            return Ok(Some(outcome));
+        let fault = |message: String| Error::File {
+            path: path.clone(),
+            message: format!("{message}; remove the file, and `--resume` makes the run again"),
+        };
+        let text = fs::read(&path).map_err(Error::io(&path))?;
+        let sealed: Sealed = serde_json::from_slice(&text).map_err(|error| fault(format!("is no outcome of a run ({error})")))?;
+        if sealed.sha256 != seal(&path, &sealed.outcome)? {
+            return Err(fault("has been changed since it was written: its checksum does not fit".into()));
         }
-        Err(Error::File { path, message: format!("is of the run `{}`; remove it and run again", outcome.run) })
+        // Rows that are one network share a file under the name of whichever came first.
+        if plan.key(&sealed.outcome.run)? == key {
+            return Ok(Some(sealed));
+        }
+        Err(fault(format!("is of the run `{}`", sealed.outcome.run)))
     }
 
     /// Writes the outcome of a run and removes its checkpoints.
@@ -110,7 +167,9 @@ impl Folder {
     /// [`Error::Io`].
     pub fn finish(&self, plan: &Plan, outcome: &Outcome) -> Result<()> {
         let key = plan.key(&outcome.run)?;
-        write(&self.outcome_file(&key), outcome)?;
+        let path = self.outcome_file(&key);
+        let instruction_set = instruction_set()?.into();
+        write(&path, &Sealed { sha256: seal(&path, outcome)?, instruction_set, outcome: outcome.clone() })?;
         let working = self.working(&key);
         if working.exists() {
             fs::remove_dir_all(&working).map_err(Error::io(&working))?;
@@ -134,8 +193,8 @@ impl Folder {
         let mut taken = 0;
         for run in plan.runs()? {
             let key = plan.key(&run)?;
-            if let (false, Some(outcome)) = (self.is_done(&key), other.outcome(plan, &run)?) {
-                write(&self.outcome_file(&key), &outcome)?;
+            if let (None, Some(sealed)) = (self.sealed(plan, &run)?, other.sealed(plan, &run)?) {
+                write(&self.outcome_file(&key), &sealed)?;
                 taken += 1;
             }
         }

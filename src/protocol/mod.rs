@@ -16,7 +16,7 @@ pub mod slurm;
 pub mod table;
 pub mod text;
 
-pub use folder::Folder;
+pub use folder::{Folder, instruction_set};
 pub use method::{METHODS, Method, Predictor, method};
 pub use outcome::{Condition, Outcome, Segment, Trace};
 pub use perform::Experiment;

@@ -11,7 +11,7 @@ use super::plan::{
 use crate::critique::PerChannel;
 use crate::error::Result;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Mean over seeds and, with at least two, the standard deviation (divisor n − 1).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -92,6 +92,8 @@ pub struct Finished {
     outcomes: BTreeMap<String, Outcome>,
     /// Runs that are not.
     pub missing: Vec<Run>,
+    /// Instruction sets that made them.
+    pub instruction_sets: BTreeSet<String>,
 }
 
 /// One measure of the sums of errors.
@@ -105,16 +107,17 @@ impl Finished {
     /// What reading gives.
     pub fn read(folder: &Folder) -> Result<Self> {
         let plan = folder.plan()?;
-        let (mut outcomes, mut missing) = (BTreeMap::new(), Vec::new());
+        let (mut outcomes, mut missing, mut instruction_sets) = (BTreeMap::new(), Vec::new(), BTreeSet::new());
         for run in plan.runs()? {
             match folder.outcome(&plan, &run)? {
-                Some(outcome) => {
+                Some((outcome, instruction_set)) => {
+                    instruction_sets.insert(instruction_set);
                     outcomes.insert(plan.key(&run)?, outcome);
                 }
                 None => missing.push(run),
             }
         }
-        Ok(Self { plan, outcomes, missing })
+        Ok(Self { plan, outcomes, missing, instruction_sets })
     }
 
     /// The outcome of a run, if it is done.
@@ -367,7 +370,7 @@ mod tests {
                 None => missing.push(run),
             }
         }
-        Ok(Finished { plan, outcomes, missing })
+        Ok(Finished { plan, outcomes, missing, instruction_sets: BTreeSet::new() })
     }
 
     fn close(found: Option<Cell>, mean: f64, deviation: Option<f64>) -> bool {

@@ -20,6 +20,6 @@ mod threads;
 pub use graph::{Graph, MAX_INPUTS, Var};
 pub use parameter::{Parameter, Storage};
 pub use parts::Parts;
-pub use session::{DropoutKey, Fill, SHARDS, Session};
+pub use session::{DropoutKey, Fill, SHARDS, Session, instruction_set};
 pub use shape::{MAX_RANK, Shape};
 pub use threads::Threads;

@@ -44,6 +44,20 @@ pub struct DropoutKey {
 /// Fills the inputs of one sample, in the order in which the graph recorded them; called on worker threads.
 pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
 
+/// The instruction set of this process's kernels: the best of the processor, or the one that the environment asks for. Results of
+/// different ones differ in the last digits.
+///
+/// # Errors
+/// [`Error::Config`] if the environment asks for one that this processor does not have.
+pub fn instruction_set() -> Result<Level> {
+    Level::detect().map_err(|error| Error::Config {
+        place: "environment".into(),
+        field: phyture_kernels::level::ENVIRONMENT_VARIABLE.into(),
+        found: error.to_string(),
+        expected: "a level of this processor, or nothing".into(),
+    })
+}
+
 /// A plan with its memory, ready to be replayed.
 pub struct Session<T> {
     plan: Plan<T>,
@@ -84,12 +98,7 @@ impl<T: Real> Session<T> {
     }
 
     fn new(plan: Plan<T>, threads: Threads) -> Result<Self> {
-        let level = Level::detect().map_err(|error| Error::Config {
-            place: "environment".into(),
-            field: phyture_kernels::level::ENVIRONMENT_VARIABLE.into(),
-            found: error.to_string(),
-            expected: "a level of this processor, or nothing".into(),
-        })?;
+        let level = instruction_set()?;
         let trains = plan.loss.is_some();
         let count = threads.count();
         // Inference has nothing to sum, so its number of shards is free.

@@ -11,8 +11,8 @@
 //! | 4 | CRC-32 of the payload |
 //! | … | payload: bincode 1.3.3, fixed-width integers, no trailing bytes |
 
+use crate::disk::write_atomically;
 use crate::error::{Error, Result};
-use crate::flight::atomic::write_atomically;
 use bincode::Options;
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::Path;

@@ -11,8 +11,8 @@
 use super::config::TrainConfig;
 use super::container;
 use super::trainer::{State, StepReport, Trainer};
+use crate::disk::{Lock, write_atomically};
 use crate::error::{Error, Result};
-use crate::flight::atomic::write_atomically;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, OpenOptions};
 use std::io::{BufWriter, Write};
@@ -29,10 +29,11 @@ struct Checkpoint {
     state: State,
 }
 
-/// A run folder.
-#[derive(Clone, Debug)]
+/// A run folder, held against other programs.
+#[derive(Debug)]
 pub struct RunFolder {
     folder: PathBuf,
+    _lock: Lock,
 }
 
 /// How a run ended.
@@ -53,14 +54,29 @@ pub struct Report {
 }
 
 impl RunFolder {
-    /// The run folder at `folder`, made if it is not there.
+    /// The run folder at `folder`, made if it is not there. No other program works on it as long as this value lives.
     ///
     /// # Errors
-    /// [`Error::Io`] if it cannot be made.
+    /// [`Error::Io`] if it cannot be made; [`Error::Busy`] if another program trains in it.
     pub fn create(folder: impl Into<PathBuf>) -> Result<Self> {
         let folder = folder.into();
         std::fs::create_dir_all(&folder).map_err(Error::io(&folder))?;
-        Ok(Self { folder })
+        let lock = Lock::of_folder(&folder)?;
+        Ok(Self { folder, _lock: lock })
+    }
+
+    /// Whether a run was begun here.
+    pub fn is_begun(&self) -> bool {
+        self.checkpoint().exists() || self.network().exists()
+    }
+
+    /// Removes what an earlier run left: its network must not stand beside the checkpoints of another.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if a file cannot be removed.
+    pub fn clear(&self) -> Result<()> {
+        let mut left = [self.network(), self.checkpoint(), self.metrics()].into_iter().filter(|path| path.exists());
+        left.try_for_each(|path| std::fs::remove_file(&path).map_err(Error::io(path)))
     }
 
     /// The trained hybrid.

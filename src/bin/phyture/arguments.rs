@@ -30,6 +30,9 @@ pub struct Common {
     /// Threads to work on [default: all cores]
     #[arg(long, global = true)]
     pub threads: Option<usize>,
+    /// Overwrite what is there already
+    #[arg(long, global = true)]
+    pub force: bool,
 }
 
 /// Where the flights are and how to read them.

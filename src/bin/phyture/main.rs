@@ -4,22 +4,52 @@
 
 mod arguments;
 mod commands;
+mod folder;
 mod output;
 
 use clap::Parser;
 use std::process::ExitCode;
 
+/// Bad usage or bad input.
+const BAD_INPUT: u8 = 2;
+/// Ctrl-C; the state is saved.
+const INTERRUPTED: u8 = 130;
+
 fn main() -> ExitCode {
-    let arguments = arguments::Arguments::parse();
-    match commands::run(&arguments) {
-        Ok(code) => code,
-        Err(phyture::Error::Interrupted { saved }) => {
-            eprintln!("interrupted; {saved}");
-            ExitCode::from(130)
-        }
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(2)
-        }
+    let arguments = match arguments::Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => return usage(&error),
+    };
+    let error = match commands::run(&arguments) {
+        Ok(code) => return code,
+        Err(error) => error,
+    };
+    let code = if matches!(error, phyture::Error::Interrupted { .. }) {
+        eprintln!("{error}");
+        INTERRUPTED
+    } else {
+        eprintln!("error: {error}");
+        BAD_INPUT
+    };
+    output::failure(arguments.common.json.as_deref(), arguments.common.force, error.kind(), error.to_string(), code);
+    ExitCode::from(code)
+}
+
+/// What the parser has to say: help and version, or what is wrong with the command line. A program that asked for JSON gets it.
+fn usage(error: &clap::Error) -> ExitCode {
+    // A closed pipe (`phyture --help | head`) is no error.
+    let _ = error.print();
+    if error.exit_code() == 0 {
+        return ExitCode::SUCCESS;
     }
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let next = |at: usize| words.get(at + 1).cloned();
+    let file = words.iter().enumerate().find_map(|(at, word)| match word.strip_prefix("--json") {
+        Some("") => next(at),
+        Some(rest) => rest.strip_prefix('=').map(str::to_owned),
+        None => None,
+    });
+    let force = words.iter().any(|word| word == "--force");
+    output::failure(file.as_deref().map(std::path::Path::new), force, "usage", error.render().to_string(), BAD_INPUT);
+    ExitCode::from(BAD_INPUT)
 }

@@ -1,23 +1,53 @@
 //! How results reach people and programs: text on standard output, JSON where asked, progress on standard error.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use phyture::flight::atomic::write_atomically;
+use phyture::disk::write_atomically;
 use phyture::{Error, Result};
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+/// Of the form of all machine-readable results. It grows when a program that reads them would have to change.
+const SCHEMA: u32 = 1;
+
+/// A machine-readable result, which is an object.
+#[derive(Serialize)]
+struct Document<'a, T> {
+    schema: u32,
+    #[serde(flatten)]
+    content: &'a T,
+}
+
 /// Writes the machine-readable result, to standard output for `-`.
-pub fn json(target: Option<&Path>, value: &impl Serialize) -> Result<()> {
+pub fn json(target: Option<&Path>, content: &impl Serialize) -> Result<()> {
     let Some(path) = target else { return Ok(()) };
-    let mut text =
-        serde_json::to_string_pretty(value).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+    let mut text = serde_json::to_string_pretty(&Document { schema: SCHEMA, content })
+        .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
     text.push('\n');
     if path == Path::new("-") {
         return std::io::stdout().write_all(text.as_bytes()).map_err(Error::io(path));
     }
     write_atomically(path, |file| file.write_all(text.as_bytes()))
+}
+
+/// Writes the machine-readable form of a failure where a result was asked for. The file of an earlier result stays unless forced.
+pub fn failure(target: Option<&Path>, force: bool, kind: &str, message: String, code: u8) {
+    #[derive(Serialize)]
+    struct Failure<'a> {
+        error: Reason<'a>,
+        exit_code: u8,
+    }
+    #[derive(Serialize)]
+    struct Reason<'a> {
+        kind: &'a str,
+        message: String,
+    }
+    let stays = !force && target.is_some_and(|path| path != Path::new("-") && path.is_file());
+    if !stays {
+        // What is wrong has been said on standard error, and a second failure would only hide it.
+        let _ = json(target, &Failure { error: Reason { kind, message }, exit_code: code });
+    }
 }
 
 /// Text for a person: on standard output, unless that carries the JSON; then on standard error.

@@ -4,21 +4,25 @@ use super::compare::write_page;
 use super::{Context, data_sha256, interruption};
 use crate::arguments::{Data, Plans};
 use crate::output::Progress;
+use phyture::disk::{Existing, Target};
 use phyture::flight::DataSet;
 use phyture::flight::split::{Split, class_folds};
 use phyture::flight::windows::windows;
 use phyture::physics::Model;
-use phyture::protocol::{Division, Experiment, Finished, Folder, JobArray, Plan, Run, Settings, TableId, estimate, method, text};
+use phyture::protocol::{
+    Division, Experiment, Finished, Folder, JobArray, Plan, Run, Settings, TableId, estimate, instruction_set, method, text,
+};
 use phyture::report::benchmark_page;
 use phyture::train::TrainConfig;
 use phyture::{Error, Result};
 use serde::Serialize;
-use std::collections::BTreeMap;
+use serde_json::json;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// What was asked for.
 pub struct Wanted<'a> {
@@ -86,11 +90,23 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
         None => plan.runs()?,
         Some(shard) => plan.shard(shard.number, shard.count)?,
     };
-    let mut left = Vec::new();
+    let here = instruction_set()?;
+    let (mut left, mut made_elsewhere) = (Vec::new(), BTreeSet::new());
     for run in &runs {
-        if !folder.is_done(&plan.key(run)?) {
-            left.push(run.clone());
+        match folder.outcome(&plan, run)? {
+            None => left.push(run.clone()),
+            Some((_, instruction_set)) if instruction_set == here => {}
+            Some((_, other)) => {
+                made_elsewhere.insert(other);
+            }
         }
+    }
+    if !made_elsewhere.is_empty() {
+        let others: Vec<String> = made_elsewhere.into_iter().collect();
+        context.say(format!(
+            "note: runs in this folder were made at instruction set {}; this process works at {here}, and its last digits differ",
+            others.join(", ")
+        ));
     }
     let done_before = runs.len() - left.len();
     let experiment = Experiment::new(&plan, &set.flights, &model, context.threads());
@@ -146,6 +162,7 @@ fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &
 
 /// Puts the plan into the folder. One that holds another plan is refused, and one that holds this plan is gone on with only when asked.
 fn open(folder: &Folder, plan: &Plan, wanted: &Wanted) -> Result<()> {
+    let _held = folder.hold_plan()?;
     if !folder.plan_file().exists() {
         return folder.write_plan(plan);
     }
@@ -164,6 +181,9 @@ fn open(folder: &Folder, plan: &Plan, wanted: &Wanted) -> Result<()> {
     if there == joined { Ok(()) } else { folder.write_plan(&joined) }
 }
 
+/// Between two looks at a run that another program makes.
+const WAIT: Duration = Duration::from_millis(200);
+
 /// Runs that are to be made one after the other.
 struct Queue<'a> {
     context: &'a Context<'a>,
@@ -181,9 +201,29 @@ impl Queue<'_> {
         // In milliseconds of the estimate.
         let mut progress = Progress::new("benchmark", (1e3 * total) as u64, 0);
         let mut behind = 0.0;
-        for (index, (run, cost)) in self.left.iter().zip(&costs).enumerate() {
+        let mut queue: VecDeque<(usize, &Run, f64)> =
+            self.left.iter().zip(costs).enumerate().map(|(index, (run, cost))| (index, run, cost)).collect();
+        // Runs that other programs make, since the last one that could be made here.
+        let mut elsewhere = 0;
+        while let Some((index, run, cost)) = queue.pop_front() {
             let begun = Instant::now();
-            let working = self.folder.working(&plan.key(run)?);
+            let key = plan.key(run)?;
+            let claim = match self.folder.claim(&key) {
+                Err(Error::Busy { .. }) => {
+                    queue.push_back((index, run, cost));
+                    elsewhere += 1;
+                    self.wait(elsewhere, queue.len(), interrupted)?;
+                    continue;
+                }
+                claim => claim?,
+            };
+            elsewhere = 0;
+            // Another program may have made it meanwhile.
+            if self.folder.outcome(plan, run)?.is_some() {
+                behind += cost;
+                continue;
+            }
+            let working = self.folder.working(&key);
             let outcome = self.experiment.perform(run, &working, &mut |share| {
                 // What has no steps to count is taken to need its time.
                 let gone = (share * cost).max(begun.elapsed().as_secs_f64().min(0.95 * cost));
@@ -191,11 +231,27 @@ impl Queue<'_> {
                 !interrupted.load(Ordering::Relaxed)
             })?;
             self.folder.finish(plan, &outcome)?;
+            drop(claim);
             behind += cost;
             self.context.say(format!("{:>4}/{}  {run}: {}", index + 1, self.left.len(), duration(begun.elapsed().as_secs_f64())));
             if interrupted.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted { saved: "every finished run is in its file; go on with --resume".into() });
             }
+        }
+        Ok(())
+    }
+
+    /// Waits a little where all the runs that are left are made by other programs: should one of them end early, its run is made here.
+    fn wait(&self, elsewhere: usize, left: usize, interrupted: &AtomicBool) -> Result<()> {
+        if elsewhere < left {
+            return Ok(());
+        }
+        if elsewhere == left {
+            self.context.say(format!("{left} runs are being made by other programs; waiting for them"));
+        }
+        std::thread::sleep(WAIT);
+        if interrupted.load(Ordering::Relaxed) {
+            return Err(Error::Interrupted { saved: "what other programs make goes on".into() });
         }
         Ok(())
     }
@@ -296,12 +352,18 @@ pub fn collect(context: &Context, folder: &Path, from: &[PathBuf]) -> Result<Exi
         context.say(format!("{}: {taken} runs taken over", other.display()));
     }
     let finished = Finished::read(&folder)?;
+    if finished.instruction_sets.len() > 1 {
+        let sets: Vec<&str> = finished.instruction_sets.iter().map(String::as_str).collect();
+        context.say(format!("note: runs were made at different instruction sets ({}); their last digits differ", sets.join(", ")));
+    }
     text::write(&finished, &folder.tables())?;
-    write_page(&benchmark_page(&finished), &folder.tables())?;
+    // Tables are made anew from the runs whenever they are asked for.
+    let page = Target::file(&folder.tables().join("report.html"), Existing::Replace, &[])?;
+    write_page(&benchmark_page(&finished), &page)?;
     for table in finished.tables() {
         context.say(format!("\n{}", text::markdown(&finished, &table)));
     }
     context.say(format!("tables: {}", folder.tables().display()));
-    context.json(&finished.tables())?;
+    context.json(&json!({ "tables": finished.tables() }))?;
     Ok(ExitCode::SUCCESS)
 }

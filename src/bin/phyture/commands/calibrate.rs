@@ -21,6 +21,7 @@ struct Output {
 
 /// Calibrates `model` on the training part and writes it to `output`.
 pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, division: &Division) -> Result<ExitCode> {
+    let target = context.new_file(output, model.as_slice())?;
     let set = context.flights(data, 1)?;
     let model = context.model(model)?;
     let split = context.split(&set.flights, &model, division)?;
@@ -32,7 +33,7 @@ pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, 
     note("seed", context.seed().to_string());
     note("version", env!("CARGO_PKG_VERSION").into());
     note("calibrated_on", format!("{} of {} s", spans_s(&set, &split.training), set.duration_s().round()));
-    calibrated.write(output)?;
+    calibrated.write(context.ready(&target)?)?;
     context.say(format!("\nwritten to {}", output.display()));
     context.json(&Output { calibration, rmse })?;
     Ok(ExitCode::SUCCESS)

@@ -6,6 +6,7 @@ use crate::arguments::{Data, Division};
 use phyture::critique::shares::{self, shares};
 use phyture::critique::uncertainty::{Effort, uncertainty};
 use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
+use phyture::disk::{Target, write_atomically};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::{TEST_STRIDE, windows};
 use phyture::flight::{DataSet, Span, Window};
@@ -37,6 +38,7 @@ pub struct Wanted<'a> {
 
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
+    let page = wanted.report.map(|folder| context.new_page(folder, "comparison.html")).transpose()?;
     let networks = wanted.networks.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
     let models = wanted.models.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
@@ -74,14 +76,14 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     };
     let result = contest.run(context, &set, &split)?;
     context.say(format!("\n{}", result.comparison));
-    if let Some(folder) = wanted.report {
+    if let Some(target) = page {
         let provenance = [
             ("data".to_owned(), data.data.display().to_string()),
             ("SHA-256 of the data".to_owned(), data_sha256(data)?),
             ("seed".to_owned(), context.seed().to_string()),
         ];
-        let path = result.write_page(&set, folder, &provenance)?;
-        context.say(format!("report: {}", path.display()));
+        write_page(&result.page(&set, &provenance)?, &target)?;
+        context.say(format!("report: {}", target.path().display()));
     }
     context.json(&result.comparison)?;
     Ok(ExitCode::SUCCESS)
@@ -159,11 +161,6 @@ impl Contest<'_> {
 }
 
 impl Judged {
-    /// Writes `report.html` into `folder`.
-    pub fn write_page(&self, set: &DataSet, folder: &Path, provenance: &[(String, String)]) -> Result<PathBuf> {
-        write_page(&self.page(set, provenance)?, folder)
-    }
-
     /// The page, to be written or put into a larger one.
     pub fn page(&self, set: &DataSet, provenance: &[(String, String)]) -> Result<Page> {
         compare_page(&CompareReport {
@@ -178,11 +175,8 @@ impl Judged {
     }
 }
 
-/// Writes a page as `report.html` of a folder.
-pub fn write_page(content: &Page, folder: &Path) -> Result<PathBuf> {
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let path = folder.join("report.html");
+/// Writes a page.
+pub fn write_page(content: &Page, target: &Target) -> Result<()> {
     let html = page(content);
-    phyture::flight::atomic::write_atomically(&path, |file| file.write_all(html.as_bytes()))?;
-    Ok(path)
+    write_atomically(target.path(), |file| file.write_all(html.as_bytes()))
 }

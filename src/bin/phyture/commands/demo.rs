@@ -8,6 +8,7 @@ use super::compare::{Contest, write_page};
 use super::diagnose;
 use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
+use phyture::Result;
 use phyture::critique::Comparison;
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
@@ -17,8 +18,7 @@ use phyture::nn::PhyTureConfig;
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate};
-use phyture::train::TrainConfig;
-use phyture::{Error, Result};
+use phyture::train::{RunFolder, TrainConfig};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -63,7 +63,8 @@ impl Scale {
 pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let begun = Instant::now();
     let interrupted = interruption()?;
-    std::fs::create_dir_all(out).map_err(Error::io(out))?;
+    let folder = context.new_folder(out)?;
+    let page = context.new_page(out, "report.html")?;
     let Scale { minutes, config } = Scale::new(quick, context.seed());
 
     context.say("1. Flights of the built-in truth helicopter, with hidden effects");
@@ -102,16 +103,12 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let options = Options { seed: context.seed(), ..Options::default() };
     let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options };
     let ledger = out.join("amended.ledger.jsonl");
-    // A ledger is appended to; the demo tells its story from the beginning.
-    if ledger.exists() {
-        std::fs::remove_file(&ledger).map_err(Error::io(&ledger))?;
-    }
     let Amended { rounds, model: amended } = diagnose::amend(context, &search, &model, &ledger)?;
     amended.write(out.join("amended.toml"))?;
 
     context.say("\n5. The residual network, trained on the baseline and on the amended model");
     let train = |model: &Model, name: &str| {
-        let folder = out.join(name);
+        let folder = RunFolder::create(out.join(name))?;
         Task { set: &set, split: &split, model, config: &config, identity: name, folder: &folder }.hybrid(context, &interrupted)
     };
     let (on_baseline, on_amended) = (train(&model, "run")?, train(&amended, "run-amended")?);
@@ -150,9 +147,10 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let compared = judged.page(&set, &provenance)?;
     whole.summary.extend(compared.summary);
     whole.sections.extend(compared.sections);
-    let page = write_page(&whole, out)?;
-    let seconds = begun.elapsed().as_secs_f64();
-    context.say(format!("report: {}   ({seconds:.0} s)", page.display()));
-    context.json(&Output { rounds, comparison: judged.comparison, report: page, seconds })?;
+    write_page(&whole, &page)?;
+    folder.close()?;
+    let (report, seconds) = (page.path().to_path_buf(), begun.elapsed().as_secs_f64());
+    context.say(format!("report: {}   ({seconds:.0} s)", report.display()));
+    context.json(&Output { rounds, comparison: judged.comparison, report, seconds })?;
     Ok(ExitCode::SUCCESS)
 }

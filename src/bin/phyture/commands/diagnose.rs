@@ -6,6 +6,7 @@ use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
 use phyture::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, calibrated, searched};
+use phyture::disk::{Target, append_lines};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
@@ -13,7 +14,6 @@ use phyture::physics::{Entry, Model};
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::{Error, Result};
 use serde::Serialize;
-use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -52,12 +52,15 @@ fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
 /// A folder for a page and what stands in it besides the diagnosis.
 struct Paper<'a> {
     title: String,
-    folder: &'a Path,
+    target: &'a Target,
     provenance: Vec<(String, String)>,
 }
 
+/// The page of `diagnose` and of `loop`.
+const PAGE: &str = "diagnosis.html";
+
 impl<'a> Paper<'a> {
-    fn new(context: &Context, command: &str, data: &Data, model: &Model, folder: &'a Path) -> Self {
+    fn new(context: &Context, command: &str, data: &Data, model: &Model, target: &'a Target) -> Self {
         let provenance = [
             ("command", command.to_owned()),
             ("data", data.data.display().to_string()),
@@ -67,12 +70,12 @@ impl<'a> Paper<'a> {
         let name = data.data.file_name().unwrap_or(data.data.as_os_str()).to_string_lossy();
         Self {
             title: format!("Which physics is missing: {} on {name}", model.name),
-            folder,
+            target,
             provenance: provenance.map(|(what, value)| (what.to_owned(), value)).into(),
         }
     }
 
-    /// Writes `report.html`.
+    /// Writes the page.
     fn write(
         &self,
         context: &Context,
@@ -93,8 +96,8 @@ impl<'a> Paper<'a> {
             after,
             provenance: &self.provenance,
         };
-        let path = write_page(&diagnose_page(&report)?, self.folder)?;
-        context.say(format!("report: {}", path.display()));
+        write_page(&diagnose_page(&report)?, self.target)?;
+        context.say(format!("report: {}", self.target.path().display()));
         Ok(())
     }
 }
@@ -149,7 +152,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         (Some(hybrid), None) => hybrid.description().model.clone(),
         (_, model) => context.model(model)?,
     };
-    let paper = wanted.report.map(|folder| Paper::new(context, "diagnose", data, &model, folder));
+    let target = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    let paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
     let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
@@ -221,9 +225,9 @@ pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -
     })
 }
 
-/// Adds lines at the end of the ledger and never changes what is there.
+/// Adds lines at the end of the ledger and never changes what is there. A round that a killed run has written stands in it once.
 fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
-    let mut lines = String::new();
+    let mut lines = Vec::new();
     for (index, step) in diagnosis.steps.iter().enumerate() {
         let line = LedgerLine {
             round,
@@ -237,11 +241,9 @@ fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
             data_sha256: &diagnosis.data_sha256,
             version: &diagnosis.version,
         };
-        lines.push_str(&serde_json::to_string(&line).map_err(|error| Error::Undetermined(error.to_string()))?);
-        lines.push('\n');
+        lines.push(serde_json::to_string(&line).map_err(|error| Error::Undetermined(error.to_string()))?);
     }
-    let mut file = std::fs::OpenOptions::new().create(true).append(true).open(ledger).map_err(Error::io(ledger))?;
-    file.write_all(lines.as_bytes()).and_then(|()| file.sync_all()).map_err(Error::io(ledger))
+    append_lines(ledger, &lines)
 }
 
 /// `loop`.
@@ -253,8 +255,10 @@ pub fn run_loop(
     report: Option<&Path>,
     division: &Division,
 ) -> Result<ExitCode> {
+    let target = context.new_file(output, model.as_slice())?;
+    let page = report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
     let model = context.model(model)?;
-    let paper = report.map(|folder| Paper::new(context, "loop", data, &model, folder));
+    let paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
     let Some((set, split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
@@ -267,7 +271,7 @@ pub fn run_loop(
     model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
     model.provenance.insert("seed".into(), Entry::Text(context.seed().to_string()));
     model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
-    model.write(output)?;
+    model.write(context.ready(&target)?)?;
     context.say(format!("\nmodel written to {}, ledger {}", output.display(), ledger.display()));
     if let (Some(paper), Some(before)) = (paper, before) {
         let after = if rounds.iter().any(Diagnosis::is_confirmed) { &model } else { &before };

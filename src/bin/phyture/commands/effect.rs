@@ -177,6 +177,7 @@ fn described(definition: &Definition) -> Value {
 }
 
 fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<ExitCode> {
+    let target = context.new_file(output, &[path])?;
     let definition = find(id)?;
     let mut model = Model::read(path)?;
     let fault = |found: String, expected: &str| {
@@ -201,7 +202,7 @@ fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<Exi
             "the enabled effect and coefficient of that name, as the paper's baseline has it",
         );
     }
-    model.write(output)?;
+    model.write(context.ready(&target)?)?;
     context.say(format!("{id} added to {}; its coefficients are 0 until `phyture calibrate`", output.display()));
     context.json(&json!({ "effect": id, "model": output }))?;
     Ok(ExitCode::SUCCESS)

@@ -3,7 +3,7 @@
 use super::effect::find;
 use super::{Context, data_sha256};
 use crate::arguments::Data;
-use phyture::flight::atomic::write_atomically;
+use phyture::disk::write_atomically;
 use phyture::flight::{Column, DataSet, Span, write};
 use phyture::physics::{Effect, Model, calibrate, implant, spread_over_flights, typical};
 use phyture::suggest::did_you_mean;
@@ -48,7 +48,7 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
     };
     let effect = spread_over_flights(effect, &set.flights);
     let changed = implant(&set, &model, &effect)?;
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+    let new = context.new_folder(folder)?;
     write::data_set_csv(folder, &changed.flights)?;
     let rms = rms(&set, &changed);
     let truth = json!({
@@ -63,6 +63,7 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
     });
     let text = serde_json::to_string_pretty(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
     write_atomically(folder.join("truth.json"), |file| writeln!(file, "{text}"))?;
+    new.close()?;
     context.say(format!("\n{effect}\n"));
     for (channel, value) in rms.iter().filter(|(_, value)| value.as_f64() != Some(0.0)) {
         context.say(format!("{channel:<7} changed by {:.4} rms", value.as_f64().unwrap_or_default()));

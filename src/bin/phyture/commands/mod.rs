@@ -13,10 +13,12 @@ mod predict;
 mod simulate;
 mod train;
 
+use crate::folder::NewFolder;
 pub use benchmark::Shard;
 
 use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
 use crate::output;
+use phyture::disk::{Existing, Target};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::{BENCHMARK_SEED, Split};
 use phyture::flight::{DataSet, Flight};
@@ -34,7 +36,7 @@ const CHECK_FAILED: u8 = 3;
 
 /// Runs the command that was asked for.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let context = Context { common: &arguments.common };
+    let context = Context::new(&arguments.common)?;
     context.limit_threads();
     match &arguments.command {
         Command::Demo { out, quick } => demo::run(&context, out, *quick),
@@ -105,9 +107,48 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 /// The options of every command, and the ways of speaking that follow from them.
 pub struct Context<'a> {
     common: &'a Common,
+    /// Holds the file of the machine-readable result.
+    _json: Option<Target>,
 }
 
-impl Context<'_> {
+impl<'a> Context<'a> {
+    /// Looks at once whether the machine-readable result can be written.
+    fn new(common: &'a Common) -> Result<Self> {
+        let file = common.json.as_deref().filter(|path| *path != Path::new("-"));
+        let existing = if common.force { Existing::Replace } else { Existing::Keep };
+        Ok(Self { common, _json: file.map(|path| Target::file(path, existing, &[])).transpose()? })
+    }
+
+    /// What becomes of something that exists.
+    pub fn existing(&self) -> Existing {
+        if self.common.force { Existing::Replace } else { Existing::Keep }
+    }
+
+    /// A file that is going to be written, looked at before the work; `read` are the files that the work starts from.
+    pub fn new_file(&self, path: &Path, read: &[&Path]) -> Result<Target> {
+        Target::file(path, self.existing(), read)
+    }
+
+    /// A page that is going to be written into a folder, which is made if it is not there.
+    pub fn new_page(&self, folder: &Path, name: &str) -> Result<Target> {
+        std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
+        self.new_file(&folder.join(name), &[])
+    }
+
+    /// A folder that is going to be filled: new, or empty, or to be written over.
+    pub fn new_folder(&self, folder: &Path) -> Result<NewFolder> {
+        NewFolder::open(folder, self.existing())
+    }
+
+    /// The path of a file, to be written now. Where the file that was read has this name, it is kept beside with the date.
+    pub fn ready<'t>(&self, target: &'t Target) -> Result<&'t Path> {
+        let (path, kept) = target.ready()?;
+        if let Some(kept) = kept {
+            self.say(format!("the file that was there is kept as {}", kept.display()));
+        }
+        Ok(path)
+    }
+
     /// Text for a person.
     pub fn say(&self, text: impl std::fmt::Display) {
         output::say(self.common.json.as_deref(), text);

@@ -40,6 +40,7 @@ pub fn read_network(path: &Path) -> Result<Hybrid> {
 
 /// Predicts and writes one table: flight, manoeuvre, t, measured and predicted accelerations.
 pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
+    let target = context.new_file(wanted.output, &[])?;
     let hybrid = read_network(wanted.network)?;
     if let Some(path) = wanted.model {
         let model = Model::read(path)?;
@@ -78,8 +79,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
     let mut table = vec![("manoeuvre", Values::Text(&manoeuvres)), ("flight", Values::Text(&flights))];
     table.extend(columns.iter().map(|(name, values)| (name.as_str(), Values::Numbers(values))));
     match wanted.output.extension().and_then(|ending| ending.to_str()) {
-        Some("parquet") => write::table_parquet(wanted.output, &table)?,
-        _ => write::table_csv(wanted.output, &table)?,
+        Some("parquet") => write::table_parquet(context.ready(&target)?, &table)?,
+        _ => write::table_csv(context.ready(&target)?, &table)?,
     }
     context.say(format!("{} predictions written to {}", windows.len(), wanted.output.display()));
     context.json(&Output { predictions: wanted.output.into(), rows: windows.len(), flights: set.flights.len() })?;

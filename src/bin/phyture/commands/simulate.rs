@@ -1,7 +1,7 @@
 //! `simulate`: flights of the built-in truth helicopter, with the model file a user would start from.
 
 use super::Context;
-use phyture::flight::atomic::write_atomically;
+use phyture::disk::write_atomically;
 use phyture::flight::write;
 use phyture::physics::Model;
 use phyture::sim::{INERTIA_KG_M2, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
@@ -56,8 +56,8 @@ pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode
         })?;
         simulation = simulation.hide(id, scale)?;
     }
+    let new = context.new_folder(folder)?;
     let set = simulate(&simulation)?;
-    std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     match wanted.layout {
         "stanford" => write::stanford(folder, &set.flights)?,
         _ => write::data_set_csv(folder, &set.flights)?,
@@ -66,6 +66,7 @@ pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode
     let truth = simulation.truth();
     let text = serde_json::to_string_pretty(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
     write_atomically(folder.join("truth.json"), |file| writeln!(file, "{text}"))?;
+    new.close()?;
     context.say(format!(
         "{} flights of {} classes, {:.0} s, written to {} with model.toml (the paper's baseline, to be calibrated) and truth.json",
         set.flights.len(),

@@ -44,12 +44,17 @@ struct Output {
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
     let mut config = wanted.config.map_or_else(|| Ok(TrainConfig::default()), TrainConfig::read)?;
     config.seed = context.common.seed.unwrap_or(config.seed);
+    let folder = RunFolder::create(wanted.output)?;
+    if !wanted.resume && folder.is_begun() {
+        context.existing().refuse(wanted.output, "a training run (which --resume goes on with)")?;
+        folder.clear()?;
+    }
     let set = context.flights(data, config.network.history())?;
     let model = Model::read(wanted.model)?;
     let split = context.split(&set.flights, &model, division)?;
     let identity = format!("{}\n{}\n{split:?}", data_sha256(data)?, model.to_toml()?);
     let interrupted = interruption()?;
-    let task = Task { set: &set, split: &split, model: &model, config: &config, identity: &identity, folder: wanted.output };
+    let task = Task { set: &set, split: &split, model: &model, config: &config, identity: &identity, folder: &folder };
     let output = task.run(context, wanted.resume, &interrupted)?;
     context.json(&output)?;
     Ok(ExitCode::SUCCESS)
@@ -68,7 +73,7 @@ pub struct Task<'a> {
     /// Tells one set of training data from another when a run is resumed.
     pub identity: &'a str,
     /// Run folder.
-    pub folder: &'a Path,
+    pub folder: &'a RunFolder,
 }
 
 impl Task<'_> {
@@ -81,7 +86,6 @@ impl Task<'_> {
         let Task { set, split, model, config, identity, folder } = *self;
         let begun = Instant::now();
         let job = Job::new(&set.flights, split, model, config)?;
-        let folder = RunFolder::create(folder)?;
         let digest = Sha256::digest(identity.as_bytes());
         let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let state = resume.then(|| folder.resume(config, digest)).transpose()?;
