@@ -124,3 +124,52 @@ fn folders_of_other_plans_and_impossible_requests_are_refused() -> Result<()> {
     }
     Ok(())
 }
+
+#[test]
+fn several_programs_share_one_folder() -> Result<()> {
+    let place = place()?;
+    let at = place.path();
+    succeed(at, &planned("alone", &["--method", "ridge", "--method", "dlinear", "--method", "phyture", "--seeds", "2"]))?;
+    // The first makes the folder; all go on in it side by side.
+    let more = ["--method", "ridge", "--method", "dlinear", "--method", "phyture", "--seeds", "2", "--resume"];
+    let start = || command(at, &planned("shared", &more)).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let children: Vec<_> = (0..4).map(|_| start().map_err(Error::io("phyture"))).collect::<Result<_>>()?;
+    for child in children {
+        let output = child.wait_with_output().map_err(Error::io("phyture"))?;
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+    assert_eq!(files(&at.join("alone/runs"))?, files(&at.join("shared/runs"))?);
+    Ok(())
+}
+
+#[test]
+fn an_empty_an_edited_and_a_foreign_outcome_are_noticed() -> Result<()> {
+    let place = place()?;
+    let at = place.path();
+    let plan = planned("bench", &["--method", "ridge", "--method", "dlinear", "--seeds", "1", "--table", "1"]);
+    succeed(at, &plan)?;
+    let (name, content) = files(&at.join("bench/runs"))?.into_iter().next().ok_or(Error::Undetermined("no runs".into()))?;
+    let path = at.join("bench/runs").join(name);
+    let text = String::from_utf8_lossy(&content).into_owned();
+    let digit = text.find("\"squares\": [").and_then(|start| text[start..].find(|c: char| c.is_ascii_digit()).map(|at| start + at));
+    let digit = digit.ok_or(Error::Undetermined("no errors in an outcome".into()))?;
+    let changed = if &text[digit..=digit] == "9" { "8" } else { "9" };
+    let edited = format!("{}{changed}{}", &text[..digit], &text[digit + 1..]);
+    let resume = [&plan[..], &["--resume"]].concat();
+    for (content, part) in [("", "is no outcome of a run"), (&edited, "has been changed since it was written")] {
+        std::fs::write(&path, content).map_err(Error::io(&path))?;
+        for arguments in [&resume[..], &["benchmark", "collect", "bench"]] {
+            let output = phyture(at, arguments)?;
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.code() == Some(2) && said.contains(part) && said.contains("remove the file"), "{said}");
+        }
+    }
+    std::fs::remove_file(&path).map_err(Error::io(&path))?;
+    succeed(at, &resume)?;
+    assert_eq!(std::fs::read(&path).map_err(Error::io(&path))?, content, "made again as it was");
+
+    let other = text.replace("\"instruction_set\": \"", "\"instruction_set\": \"another-");
+    std::fs::write(&path, other).map_err(Error::io(&path))?;
+    assert!(succeed(at, &resume)?.contains("made at instruction set another-"));
+    Ok(())
+}

@@ -112,7 +112,8 @@ fn implanted_flights_are_read_like_any_and_carry_their_truth() -> Result<()> {
             "droop" => assert!(truth["coefficients"][0]["value"].as_f64() == Some(-0.2) && wx > 0.0, "{truth}"),
             _ => assert!((0.5..1.5).contains(&wx) && truth["effect"] == "implanted", "{truth}"),
         }
-        assert!(phyture(place.path(), &["calibrate", name, "-o", "model.toml"])?.status.success(), "{name}");
+        let model = format!("{name}.toml");
+        assert!(phyture(place.path(), &["calibrate", name, "-o", &model])?.status.success(), "{name}");
     }
     Ok(())
 }
@@ -154,7 +155,7 @@ fn a_comparison_with_a_network_says_who_explains_what() -> Result<()> {
         assert_eq!(found["uncertainty"][0]["coefficients"].as_array().map(Vec::len), Some(15));
         let text = String::from_utf8_lossy(&output.stderr);
         assert!(text.contains("Who explains what") && text.contains("side_force.coefficient"), "{text}");
-        let page = std::fs::read_to_string(place.path().join("report/report.html")).map_err(Error::io("report.html"))?;
+        let page = std::fs::read_to_string(place.path().join("report/comparison.html")).map_err(Error::io("comparison.html"))?;
         assert!(page.contains(">Who explains what</h2>") && page.contains(">What the uncertain coefficients do</h2>"));
     }
     Ok(())

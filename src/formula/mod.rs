@@ -31,6 +31,11 @@ use crate::suggest::did_you_mean;
 use operation::{History, Operation};
 use std::borrow::Cow;
 
+/// How each function of the grammar is called, and what it gives.
+pub fn functions() -> impl Iterator<Item = (&'static str, &'static str)> {
+    operation::FUNCTIONS.iter().map(|(_, function, ..)| operation::described(*function))
+}
+
 /// A parsed formula. Prints back with the fewest brackets, and is stored as that text.
 #[derive(Clone, Debug)]
 pub struct Formula {

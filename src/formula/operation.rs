@@ -45,7 +45,7 @@ pub(super) enum Function {
     History(History),
 }
 
-/// Every function: name, meaning, fewest and most arguments.
+/// Every function: name, operation, fewest and most arguments.
 #[rustfmt::skip]
 pub(super) const FUNCTIONS: [(&str, Function, usize, usize); 18] = [
     ("abs", Function::Plain(Operation::Abs), 1, 1),
@@ -67,6 +67,41 @@ pub(super) const FUNCTIONS: [(&str, Function, usize, usize); 18] = [
     ("rate", Function::History(History::Rate), 1, 1),
     ("slew", Function::History(History::Slew), 2, 2),
 ];
+
+/// How a function is called and what it gives, for a person.
+pub(super) const fn described(function: Function) -> (&'static str, &'static str) {
+    match function {
+        Function::Plain(operation) => match operation {
+            Operation::Abs => ("abs(x)", "size without sign"),
+            Operation::Sqrt => ("sqrt(x)", "square root"),
+            Operation::Exp => ("exp(x)", "e to the power x"),
+            Operation::Log => ("log(x)", "natural logarithm"),
+            Operation::Sin => ("sin(x)", "sine of an angle in rad"),
+            Operation::Cos => ("cos(x)", "cosine of an angle in rad"),
+            Operation::Tan => ("tan(x)", "tangent of an angle in rad"),
+            Operation::Atan2 => ("atan2(y, x)", "angle of the point (x, y), rad, -π to π"),
+            Operation::Tanh => ("tanh(x)", "hyperbolic tangent"),
+            Operation::Min => ("min(a, b, …)", "the least"),
+            Operation::Max => ("max(a, b, …)", "the greatest"),
+            Operation::Sign => ("sign(x)", "-1, 0 or 1"),
+            Operation::Hypot => ("hypot(a, b, …)", "root of the sum of squares"),
+            Operation::Clamp => ("clamp(x, low, high)", "x held between two bounds; where they cross, high wins"),
+            Operation::Negate
+            | Operation::Add
+            | Operation::Subtract
+            | Operation::Multiply
+            | Operation::Divide
+            | Operation::Power => ("a op b", "arithmetic"),
+            Operation::Less | Operation::LessOrEqual | Operation::Greater | Operation::GreaterOrEqual => ("a op b", "comparison"),
+        },
+        Function::History(history) => match history {
+            History::Lag => ("lag(x, tau_s)", "first-order lag, tau y' = x - y, tau in s"),
+            History::Delay => ("delay(x, s)", "x so many seconds ago, 0 to 60 s"),
+            History::Rate => ("rate(x)", "change over the last step, per second"),
+            History::Slew => ("slew(x, per_s)", "follows x, changing by at most so much per second"),
+        },
+    }
+}
 
 /// The name a function is printed with.
 pub(super) fn function_name(function: Function) -> &'static str {

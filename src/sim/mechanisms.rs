@@ -1,6 +1,7 @@
 //! The switches of the truth helicopter: which mechanisms it has beyond the paper's baseline, and how strong. No physics here.
 
 use crate::error::{Error, Result};
+use crate::suggest::did_you_mean;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 macro_rules! mechanisms {
@@ -83,7 +84,7 @@ impl Mechanism {
         Self::ALL.iter().copied().find(|mechanism| mechanism.id() == id).ok_or_else(|| Error::Config {
             place: "simulation".into(),
             field: "mechanism".into(),
-            found: format!("`{id}`"),
+            found: format!("`{id}`{}", did_you_mean(id, Self::ALL.iter().map(|mechanism| mechanism.id()))),
             expected: format!("one of {}", Self::ALL.iter().map(|mechanism| mechanism.id()).collect::<Vec<_>>().join(", ")),
         })
     }

@@ -318,6 +318,27 @@ pub enum Command {
         #[arg(long, default_value_t = 10, requires = "emit")]
         shards: usize,
     },
+    /// The language of formulas: its operators, functions and names; or what a formula of yours is read as
+    #[command(
+        after_help = crate::commands::grammar(),
+        long_about = None
+    )]
+    Formula {
+        /// Formula to read
+        formula: Option<String>,
+    },
+    /// Completions for a shell, to standard output
+    #[command(after_help = "Example:\n  phyture completions bash > ~/.local/share/bash-completion/completions/phyture")]
+    Completions {
+        /// Shell
+        shell: clap_complete::Shell,
+    },
+    /// Manual pages, one a command
+    #[command(after_help = "Example:\n  phyture man ~/.local/share/man/man1")]
+    Man {
+        /// Folder to write them to
+        dir: PathBuf,
+    },
     /// Forward, backward and an Adam step against the figures a file brings from PyTorch
     #[command(after_help = "Example:\n  phyture parity small_f32.safetensors --json -")]
     Parity {

@@ -7,7 +7,9 @@ mod compare;
 mod demo;
 mod diagnose;
 mod effect;
+mod formula;
 mod implant;
+mod manual;
 mod parity;
 mod predict;
 mod simulate;
@@ -15,6 +17,7 @@ mod train;
 
 use crate::folder::NewFolder;
 pub use benchmark::Shard;
+pub use formula::grammar;
 
 use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
 use crate::output;
@@ -100,6 +103,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 None => benchmark::run(&context, data, &wanted),
             }
         }
+        Command::Formula { formula } => formula::run(&context, formula.as_deref()),
+        Command::Completions { shell } => Ok(manual::completions(*shell)),
+        Command::Man { dir } => manual::pages(&context, dir),
         Command::Parity { file } => parity::run(&context, file),
     }
 }

@@ -1,0 +1,70 @@
+//! `formula`: the language of formulas, and what one formula is read as.
+
+use super::Context;
+use phyture::Result;
+use phyture::formula::{Formula, functions};
+use phyture::physics::standard_names;
+use serde_json::json;
+use std::fmt::Write;
+use std::process::ExitCode;
+
+/// The operators, loosest first. The functions are listed by the grammar itself.
+const OPERATORS: [(&str, &str); 5] = [
+    ("a < b, <=, >, >=", "1 where it holds, else 0; they do not chain: join with * (and) or max (or)"),
+    ("a + b, a - b", "sum and difference"),
+    ("a * b, a / b", "product and quotient"),
+    ("-a", "minus; -a^2 is -(a^2)"),
+    ("a^b", "power; a^b^c is a^(b^c)"),
+];
+
+/// The language as a text of at most 100 columns.
+pub fn grammar() -> String {
+    let mut text = String::from("Operators, loosest first:\n");
+    // Writing to a String does not fail.
+    let mut table = |rows: &mut dyn Iterator<Item = (&'static str, &'static str)>| {
+        rows.for_each(|(form, meaning)| writeln!(text, "  {form:<20} {meaning}").unwrap_or_default());
+        text.push('\n');
+    };
+    table(&mut OPERATORS.into_iter());
+    table(
+        &mut std::iter::once((
+            "Functions:",
+            "lag, delay, rate and slew remember; their second argument is a number or a parameter",
+        ))
+        .chain(functions()),
+    );
+    let mut line = String::from("Names:");
+    for name in standard_names() {
+        if line.len() + name.len() > 98 {
+            let _ = writeln!(text, "{line}");
+            line = " ".repeat(6);
+        }
+        let _ = write!(line, " {name}");
+    }
+    let _ = write!(text, "{line}\n       and the log's own columns, the effect's coefficients and parameters");
+    text.push_str("\n\nExamples:\n  phyture formula \"vy * hypot(vx, vy)\"\n  phyture formula \"lag(u1, 0.05) - u1\"");
+    text
+}
+
+/// Prints the language, or what `formula` is read as.
+pub fn run(context: &Context, formula: Option<&str>) -> Result<ExitCode> {
+    let Some(text) = formula else {
+        context.say(grammar());
+        context.json(&json!({ "functions": functions().map(|(form, meaning)| json!({ "form": form, "meaning": meaning })).collect::<Vec<_>>(), "names": standard_names() }))?;
+        return Ok(ExitCode::SUCCESS);
+    };
+    let formula = Formula::parse(text)?;
+    context.say(&formula);
+    let (known, own): (Vec<&str>, Vec<&str>) = formula.names().into_iter().partition(|name| standard_names().contains(name));
+    if !known.is_empty() {
+        context.say(format!("reads {}", known.join(", ")));
+    }
+    if !own.is_empty() {
+        context.say(format!("and {}: a column of the log or a parameter of the effect must have this name", own.join(", ")));
+    }
+    if formula.remembers() {
+        context.say("remembers earlier samples");
+    }
+    context.json(&json!({ "formula": formula.to_string(), "names": formula.names(), "remembers": formula.remembers() }))?;
+    Ok(ExitCode::SUCCESS)
+}
