@@ -6,9 +6,16 @@ use phyture::flight::split::Protocol;
 use phyture::protocol::TableId;
 use std::path::PathBuf;
 
+/// Where to begin, and what a script has to know.
+const HELP: &str = "\
+Start with: phyture demo
+
+Exit codes: 0 done; 2 bad usage or bad input; 3 a check failed (its report is written); 130 interrupted (state saved).
+With --json a failure is JSON too: { \"schema\": 1, \"error\": { \"kind\", \"message\" }, \"exit_code\" }.";
+
 /// Calibrate a first-principles model of an unmanned helicopter on recorded flights, see where it fails, and learn the rest.
 #[derive(Parser)]
-#[command(version, about, max_term_width = 110, after_help = "Start with: phyture demo")]
+#[command(version, about, max_term_width = 110, after_help = HELP)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]
@@ -24,7 +31,7 @@ pub struct Common {
     /// Write the machine-readable result to FILE, `-` for standard output
     #[arg(long, global = true, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Seed of everything random
+    /// Seed of everything random [default: 2030]
     #[arg(long, global = true)]
     pub seed: Option<u64>,
     /// Threads to work on [default: all cores]
@@ -320,8 +327,7 @@ pub enum Command {
     },
     /// The language of formulas: its operators, functions and names; or what a formula of yours is read as
     #[command(
-        after_help = crate::commands::grammar(),
-        long_about = None
+        after_help = crate::commands::grammar()
     )]
     Formula {
         /// Formula to read

@@ -20,19 +20,14 @@ const OPERATORS: [(&str, &str); 5] = [
 /// The language as a text of at most 100 columns.
 pub fn grammar() -> String {
     let mut text = String::from("Operators, loosest first:\n");
-    // Writing to a String does not fail.
-    let mut table = |rows: &mut dyn Iterator<Item = (&'static str, &'static str)>| {
-        rows.for_each(|(form, meaning)| writeln!(text, "  {form:<20} {meaning}").unwrap_or_default());
-        text.push('\n');
+    let row = |text: &mut String, (form, meaning): (&str, &str)| {
+        // Writing to a String does not fail.
+        let _ = writeln!(text, "  {form:<20} {meaning}");
     };
-    table(&mut OPERATORS.into_iter());
-    table(
-        &mut std::iter::once((
-            "Functions:",
-            "lag, delay, rate and slew remember; their second argument is a number or a parameter",
-        ))
-        .chain(functions()),
-    );
+    OPERATORS.into_iter().for_each(|operator| row(&mut text, operator));
+    text.push_str("\nFunctions (the last four remember; their second argument is a number or a parameter):\n");
+    functions().for_each(|function| row(&mut text, function));
+    text.push('\n');
     let mut line = String::from("Names:");
     for name in standard_names() {
         if line.len() + name.len() > 98 {

@@ -4,6 +4,7 @@ use super::Context;
 use crate::arguments::Arguments;
 use clap::CommandFactory;
 use phyture::{Error, Result};
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -11,7 +12,10 @@ const NAME: &str = "phyture";
 
 /// Prints the completions of a shell.
 pub fn completions(shell: clap_complete::Shell) -> ExitCode {
-    clap_complete::generate(shell, &mut Arguments::command(), NAME, &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), NAME, &mut script);
+    // A closed pipe (`phyture completions bash | head`) is no error.
+    let _ = std::io::stdout().write_all(&script);
     ExitCode::SUCCESS
 }
 
