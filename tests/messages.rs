@@ -43,7 +43,9 @@ fn every_mistake_of_the_page_is_answered_as_the_page_says() -> Result<()> {
         if expected {
             mistakes += 1;
             assert!(code.is_some_and(|code| code != 0), "{command}: no mistake\n{said}");
-            said.trim_end().lines().for_each(|line| writeln!(today, "{}", format!("{INDENT}{line}").trim_end()).unwrap_or_default());
+            said.trim_end()
+                .lines()
+                .for_each(|line| writeln!(today, "{}", format!("{INDENT}{line}").trim_end()).unwrap_or_default());
         } else {
             assert_eq!(code, Some(0), "{command}: {said}");
         }

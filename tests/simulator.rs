@@ -4,7 +4,10 @@
 use nalgebra::{DMatrix, DVector};
 use phyture::Result;
 use phyture::flight::{Column, DataSet, Flight, GRAVITY_M_S2};
-use phyture::sim::{CLASSES, COEFFICIENTS, INERTIA_KG_M2, LOG_STEP_S, Level, Like, Mechanism, Mechanisms, Simulation, simulate};
+use phyture::sim::{
+    CLASSES, COEFFICIENTS, INERTIA_KG_M2, LOG_STEP_S, Level, Like, Mechanism, Mechanisms, Simulation, simulate,
+    simulate_with_explainable,
+};
 use phyture_kernels::Tolerance;
 
 /// One sample of a flight: Euler angles, velocity, rates, controls, the six accelerations.
@@ -274,4 +277,34 @@ fn wrong_requests_are_refused_with_what_is_possible() {
     }
     let hidden = Simulation::baseline().hide("no_such_effect", 1.0).map(|_| ()).map_err(|error| error.to_string());
     assert!(matches!(hidden, Err(text) if text.contains("ground_effect")));
+}
+
+#[test]
+fn the_explainable_part_is_what_is_left_without_gusts_and_noise() -> Result<()> {
+    // Nothing is left out where nothing disturbs, with every mechanism that is no chance.
+    let without_chance = Mechanisms::all().with(Mechanism::Turbulence, 0.0).with(Mechanism::VortexRing, 0.0);
+    let quiet = Simulation { minutes: 2.0, seed: 7500, level: Level::QUIET, mechanisms: without_chance, ..Simulation::default() };
+    let (recorded, explainable) = simulate_with_explainable(&quiet)?;
+    for (log, floor) in recorded.flights.iter().zip(&explainable.flights) {
+        assert_eq!((&log.name, log.canonical()), (&floor.name, floor.canonical()));
+    }
+    // White gusts and noise of 0.3 m/s² and 0.3 rad/s²: at level zero they are the difference, and nothing else is.
+    let gusty = Simulation { level: Level { noise: 0.0, ..Level::ZERO }, mechanisms: Mechanisms::all(), ..quiet };
+    let gusty = Simulation {
+        mechanisms: gusty.mechanisms.clone().with(Mechanism::Turbulence, 0.0).with(Mechanism::ImuLever, 0.0),
+        ..gusty
+    };
+    let (recorded, explainable) = simulate_with_explainable(&gusty)?;
+    for column in Column::TARGETS {
+        let pairs = recorded.flights.iter().zip(&explainable.flights);
+        let left: Vec<f64> =
+            pairs.flat_map(|(log, floor)| log.column(column).iter().zip(floor.column(column)).map(|(a, b)| a - b)).collect();
+        let rms = (left.iter().map(|x| x * x).sum::<f64>() / left.len() as f64).sqrt();
+        // 12 000 samples of white noise; the roughness of the vortex ring adds a little along z.
+        assert!((0.29..0.34).contains(&rms), "{}: {rms}", column.name());
+    }
+    // The log is that of the session without it.
+    let alone = simulate(&gusty)?;
+    assert!(alone.flights.iter().zip(&recorded.flights).all(|(a, b)| a.canonical() == b.canonical()));
+    Ok(())
 }

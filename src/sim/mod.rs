@@ -28,7 +28,7 @@ use body::{Body, State};
 use pilot::Pilot;
 use random::Random;
 use sensors::Instant;
-use wind::Atmosphere;
+use wind::{Atmosphere, Disturbance};
 
 /// Logging step, s.
 pub const LOG_STEP_S: f64 = 0.01;
@@ -131,6 +131,16 @@ impl Simulation {
         Ok(self)
     }
 
+    /// Sets the mean wind of every flight, m/s; it comes from anywhere.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a wind that the mechanism does not reach.
+    pub fn with_wind(mut self, wind_m_s: f64) -> Result<Self> {
+        self.mechanisms = self.mechanisms.with(Mechanism::Wind, wind_m_s / wind::WIND_M_S);
+        self.mechanisms.check()?;
+        Ok(self)
+    }
+
     /// What these logs hide.
     pub fn truth(&self) -> Truth {
         Truth {
@@ -212,24 +222,36 @@ pub struct Truth {
 /// # Errors
 /// [`Error::Config`] for a scale, class or length out of range.
 pub fn simulate(simulation: &Simulation) -> Result<DataSet> {
+    Ok(simulate_with_explainable(simulation)?.0)
+}
+
+/// As [`simulate()`], and beside each flight its explainable part: the same instruments without noise on the same motion, the
+/// accelerations being those that the aircraft would have had at each moment without gusts, turbulence and roughness. A mean wind blows in
+/// both. What a model leaves of the recorded accelerations beyond their difference from these, it could have explained.
+///
+/// # Errors
+/// As [`simulate()`].
+pub fn simulate_with_explainable(simulation: &Simulation) -> Result<(DataSet, DataSet)> {
     let plan: Vec<_> = simulation.plan()?.into_iter().enumerate().collect();
     let body = Body::new(&simulation.mechanisms);
     let one = |&(number, (class, seconds)): &(usize, (&'static str, f64))| fly(simulation, &body, number, class, seconds);
     #[cfg(feature = "rayon")]
-    let flights: Result<Vec<Flight>> = {
+    let flights: Result<Vec<(Flight, Flight)>> = {
         use rayon::prelude::*;
         plan.par_iter().map(one).collect()
     };
     #[cfg(not(feature = "rayon"))]
-    let flights: Result<Vec<Flight>> = plan.iter().map(one).collect();
+    let flights: Result<Vec<(Flight, Flight)>> = plan.iter().map(one).collect();
     let mut flights = flights?;
-    flights.sort_by(|a, b| (&a.manoeuvre, &a.name).cmp(&(&b.manoeuvre, &b.name)));
+    flights.sort_by(|(a, _), (b, _)| (&a.manoeuvre, &a.name).cmp(&(&b.manoeuvre, &b.name)));
+    let (recorded, explainable) = flights.into_iter().unzip();
     let note = format!("simulated by phyture {}, seed {}", env!("CARGO_PKG_VERSION"), simulation.seed);
-    Ok(DataSet { flights, notes: vec![note] })
+    let set = |flights, note| DataSet { flights, notes: vec![note], ..DataSet::default() };
+    Ok((set(recorded, note.clone()), set(explainable, format!("{note}: explainable part"))))
 }
 
-/// One flight from its first trim to its log.
-fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds: f64) -> Result<Flight> {
+/// One flight from its first trim to its log, and the explainable part of that.
+fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds: f64) -> Result<(Flight, Flight)> {
     let random = |purpose| Random::new(simulation.seed, number as u64, purpose);
     let (level, mechanisms) = (&simulation.level, &simulation.mechanisms);
     let mut chance = random(0);
@@ -244,23 +266,31 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
     let mut actuators = Actuators::new(mechanisms, trim, LOG_STEP_S);
     let mut flat = state.flat();
     let mut motion = Vec::with_capacity(samples);
+    let mut calm = Vec::with_capacity(samples);
     for sample in 0..settling + samples {
         let burnt = sample.saturating_sub(settling) as f64 / samples as f64;
         let disturbance = air.next();
         let state = State::from_flat(&flat);
         let mut controls = actuators.output();
-        let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, &disturbance, burnt);
+        let accelerations = |disturbance| {
+            let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, disturbance, burnt);
+            ([ax, ay, az], [ap, aq, ar])
+        };
+        let (acceleration, angular) = accelerations(&disturbance);
+        let without = accelerations(&Disturbance::explainable(&air));
         actuators.push(pilot.fly(&state, sample >= settling));
         if sample >= settling {
-            motion.push(Instant {
+            let now = Instant {
                 position: state.position,
                 attitude: state.attitude,
                 velocity: state.velocity,
                 rate: state.rate,
                 controls: actuators.logged(),
-                acceleration: [ax, ay, az],
-                angular: [ap, aq, ar],
-            });
+                acceleration,
+                angular,
+            };
+            motion.push(now);
+            calm.push(Instant { acceleration: without.0, angular: without.1, ..now });
         }
         let part = 1.0 / SUBSTEPS as f64;
         for substep in 1..=SUBSTEPS {
@@ -271,5 +301,6 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
         }
     }
     let name = format!("{class}_{number:04}");
-    sensors::record(&name, class, LOG_STEP_S, &motion, level, mechanisms, random(3))
+    let record = |motion: &[Instant], level| sensors::record(&name, class, LOG_STEP_S, motion, level, mechanisms, random(3));
+    Ok((record(&motion, level)?, record(&calm, &Level { noise: 0.0, ..*level })?))
 }

@@ -7,7 +7,7 @@ use super::random::{GaussMarkov, Random};
 use std::f64::consts::TAU;
 
 /// Mean wind at scale 1, m/s.
-const WIND_M_S: f64 = 3.0;
+pub(super) const WIND_M_S: f64 = 3.0;
 /// Turbulence at scale 1, m/s rms, horizontal components; the vertical one is 60 % of it near the ground (MIL-F-8785C shape).
 const TURBULENCE_M_S: f64 = 0.7;
 /// Its correlation time, s: a scale length of 20 m passed at 8 m/s.
@@ -26,6 +26,13 @@ pub(super) struct Disturbance {
     pub(super) moment: [f64; 3],
     /// Unit-rms roughness of the vortex ring state.
     pub(super) roughness: f64,
+}
+
+impl Disturbance {
+    /// What is left of it for a model to explain: the mean wind. Gusts, turbulence and roughness are chance.
+    pub(super) fn explainable(air: &Atmosphere) -> Self {
+        Self { air: air.mean, ..Self::default() }
+    }
 }
 
 /// Its generator.

@@ -81,7 +81,7 @@ pub enum Command {
     },
     /// Flights of the built-in truth helicopter
     #[command(
-        after_help = "Examples:\n  phyture simulate flights --minutes 30 --seed 7\n  phyture simulate flights --baseline --hide ground_effect --hide cyclic_lag=0.5\n  phyture simulate flights --like stanford"
+        after_help = "Examples:\n  phyture simulate flights --minutes 30 --seed 7\n  phyture simulate flights --baseline --hide ground_effect --hide cyclic_lag=0.5\n  phyture simulate flights --like stanford\n  phyture simulate flights --level 2 --wind 5 --explainable floor"
     )]
     Simulate {
         /// Folder to write
@@ -101,6 +101,20 @@ pub enum Command {
         /// Layout of the files: canonical CSV or the Stanford set's own
         #[arg(long, default_value = "csv", value_parser = ["csv", "stanford"])]
         layout: String,
+        /// Disturbances, noise and smoothing: `quiet` has none; 0 white gusts and little noise; 1 gusts that last, and noise; 2 the same
+        /// smoothed [default: 2, with --baseline or --hide 0]
+        #[arg(long, value_name = "LEVEL", value_parser = ["quiet", "0", "1", "2"])]
+        level: Option<String>,
+        /// Scale of the instrument noise [default: the level's, 0.3 at level 0, else 1]
+        #[arg(long, value_name = "SCALE")]
+        noise: Option<f64>,
+        /// Mean wind of every flight from anywhere, m/s [default: 3, with --baseline or --hide 0]
+        #[arg(long, value_name = "M_S")]
+        wind: Option<f64>,
+        /// Folder for the explainable part of each flight, without gusts, turbulence and noise: `compare --explainable` then shows the
+        /// floor that no model can go below
+        #[arg(long, value_name = "DIR")]
+        explainable: Option<PathBuf>,
     },
     /// Conventions, timing and excitation of a data set; exit code 3 on a convention fault
     #[command(after_help = "Example:\n  phyture check flights --json check.json")]

@@ -43,8 +43,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     context.limit_threads();
     match &arguments.command {
         Command::Demo { out, quick } => demo::run(&context, out, *quick),
-        Command::Simulate { dir, minutes, hide, baseline, like, layout } => {
-            let wanted = simulate::Wanted { minutes: *minutes, hide, baseline: *baseline, like: like.as_deref(), layout };
+        Command::Simulate { dir, minutes, hide, baseline, like, layout, level, noise, wind, explainable } => {
+            let (like, level, explainable) = (like.as_deref(), level.as_deref(), explainable.as_deref());
+            let (minutes, baseline, noise, wind) = (*minutes, *baseline, *noise, *wind);
+            let wanted = simulate::Wanted { minutes, hide, baseline, like, layout, level, noise, wind, explainable };
             simulate::run(&context, dir, &wanted)
         }
         Command::Check { data, model } => check::run(&context, data, model.as_deref()),

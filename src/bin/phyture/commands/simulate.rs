@@ -2,9 +2,10 @@
 
 use super::Context;
 use phyture::disk::write_atomically;
+use phyture::flight::Flight;
 use phyture::flight::write;
 use phyture::physics::Model;
-use phyture::sim::{INERTIA_KG_M2, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
+use phyture::sim::{INERTIA_KG_M2, Level, Like, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate_with_explainable};
 use phyture::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -22,6 +23,14 @@ pub struct Wanted<'a> {
     pub like: Option<&'a str>,
     /// `csv` or `stanford`.
     pub layout: &'a str,
+    /// `quiet`, `0`, `1` or `2`.
+    pub level: Option<&'a str>,
+    /// Scale of the noise.
+    pub noise: Option<f64>,
+    /// Mean wind, m/s.
+    pub wind: Option<f64>,
+    /// Folder for the explainable part.
+    pub explainable: Option<&'a Path>,
 }
 
 /// What `--json` writes.
@@ -38,8 +47,8 @@ pub fn starting_model() -> Model {
     Model::paper("truth-helicopter", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M)
 }
 
-/// Simulates and writes the flights, `model.toml` and `truth.json`.
-pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode> {
+/// What was asked for, as a session.
+fn session(context: &Context, wanted: &Wanted) -> Result<Simulation> {
     let mut simulation = if wanted.baseline || !wanted.hide.is_empty() { Simulation::baseline() } else { Simulation::default() };
     simulation.minutes = wanted.minutes;
     simulation.seed = context.seed();
@@ -56,11 +65,52 @@ pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode
         })?;
         simulation = simulation.hide(id, scale)?;
     }
+    simulation.level = match wanted.level {
+        Some("quiet") => Level::QUIET,
+        Some("0") => Level::ZERO,
+        Some("1") => Level::ONE,
+        Some("2") => Level::TWO,
+        _ => simulation.level,
+    };
+    let sized = |field: &str, value: f64, largest: f64| {
+        if (0.0..=largest).contains(&value) {
+            return Ok(value);
+        }
+        let (place, expected) = ("command line".into(), format!("0 to {largest}"));
+        Err(Error::Config { place, field: field.into(), found: value.to_string(), expected })
+    };
+    if let Some(noise) = wanted.noise {
+        simulation.level.noise = sized("--noise", noise, LARGEST_NOISE)?;
+    }
+    if let Some(wind) = wanted.wind {
+        simulation = simulation.with_wind(sized("--wind", wind, LARGEST_WIND_M_S)?)?;
+    }
+    Ok(simulation)
+}
+
+/// Bounds of what can be asked for: beyond them nothing flies, or nothing can be read from the log.
+const LARGEST_NOISE: f64 = 100.0;
+const LARGEST_WIND_M_S: f64 = 9.0;
+
+/// Writes flights in the layout asked for.
+fn write_flights(folder: &Path, layout: &str, flights: &[Flight]) -> Result<()> {
+    match layout {
+        "stanford" => write::stanford(folder, flights),
+        _ => write::data_set_csv(folder, flights),
+    }
+}
+
+/// Simulates and writes the flights, `model.toml` and `truth.json`; and their explainable part elsewhere.
+pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode> {
+    let simulation = session(context, wanted)?;
+    wanted.explainable.map_or(Ok(()), |floor| outside(folder, floor))?;
     let new = context.new_folder(folder)?;
-    let set = simulate(&simulation)?;
-    match wanted.layout {
-        "stanford" => write::stanford(folder, &set.flights)?,
-        _ => write::data_set_csv(folder, &set.flights)?,
+    let floor = wanted.explainable.map(|floor| context.new_folder(floor)).transpose()?;
+    let (set, explainable) = simulate_with_explainable(&simulation)?;
+    write_flights(folder, wanted.layout, &set.flights)?;
+    if let (Some(floor), Some(path)) = (floor, wanted.explainable) {
+        write_flights(path, wanted.layout, &explainable.flights)?;
+        floor.close()?;
     }
     starting_model().write(folder.join("model.toml"))?;
     let truth = simulation.truth();
@@ -74,6 +124,20 @@ pub fn run(context: &Context, folder: &Path, wanted: &Wanted) -> Result<ExitCode
         set.duration_s(),
         folder.display()
     ));
+    if let Some(floor) = wanted.explainable {
+        context.say(format!("their explainable part, without gusts, turbulence and noise, is in {}", floor.display()));
+    }
     context.json(&Output { data: folder.into(), flights: set.flights.len(), seconds_of_flight: set.duration_s(), truth })?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The truth must not lie in the folder that a search reads.
+fn outside(flights: &Path, floor: &Path) -> Result<()> {
+    let absolute = |path: &Path| std::path::absolute(path).map_err(Error::io(path));
+    if !absolute(floor)?.starts_with(absolute(flights)?) {
+        return Ok(());
+    }
+    let (place, field) = ("command line".into(), "--explainable".into());
+    let found = format!("{}, inside the folder of the flights", floor.display());
+    Err(Error::Config { place, field, found, expected: "a folder elsewhere: what is searched must not hold the truth".into() })
 }
