@@ -1,0 +1,64 @@
+//! The commands of the README as they stand there, typed into a fresh folder, twice: the first time they work, the second time nothing
+//! that the first left is lost.
+#![cfg(all(feature = "cli", unix))]
+
+use phyture::{Error, Result};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// The commands of the first indented block after `heading`, without their comments.
+fn commands(heading: &str) -> Result<Vec<String>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md");
+    let text = fs::read_to_string(&path).map_err(Error::io(path))?;
+    let block = text.lines().skip_while(|line| !line.starts_with(heading)).skip_while(|line| !line.starts_with("    phyture"));
+    let lines = block.take_while(|line| line.starts_with("    "));
+    Ok(lines.map(|line| line.split(" #").next().unwrap_or(line).trim().to_owned()).collect())
+}
+
+fn run(folder: &Path, command: &str) -> Result<Output> {
+    let mut words = command.split_whitespace();
+    assert_eq!(words.next(), Some("phyture"), "{command}");
+    Command::new(env!("CARGO_BIN_EXE_phyture")).args(words).current_dir(folder).output().map_err(Error::io("phyture"))
+}
+
+fn contents(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
+    let (mut found, mut open) = (BTreeMap::new(), vec![folder.to_path_buf()]);
+    while let Some(inside) = open.pop() {
+        for entry in fs::read_dir(&inside).map_err(Error::io(&inside))? {
+            let path = entry.map_err(Error::io(&inside))?.path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                found.insert(path.clone(), fs::read(&path).map_err(Error::io(path))?);
+            }
+        }
+    }
+    Ok(found)
+}
+
+#[test]
+fn the_sequence_for_one_s_own_flights_works_and_loses_nothing_the_second_time() -> Result<()> {
+    let commands = commands("On your own flights")?;
+    assert!(commands.len() >= 7 && commands.iter().any(|command| command.contains(" train ")), "{commands:#?}");
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    // Ten minutes hold a flight of each class, the locked one among them.
+    let flights = run(place.path(), "phyture simulate flights --minutes 10 --baseline --hide weathercock=2 --seed 7600")?;
+    assert!(flights.status.success(), "{}", String::from_utf8_lossy(&flights.stderr));
+    for command in &commands {
+        let output = run(place.path(), command)?;
+        assert!(output.status.success(), "{command}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+    let before = contents(place.path())?;
+    for command in &commands {
+        let output = run(place.path(), command)?;
+        let text = String::from_utf8_lossy(&output.stderr);
+        let writes = command.contains(" -o ") || command.contains(" --report ");
+        let expected = if writes { Some(2) } else { Some(0) };
+        assert_eq!(output.status.code(), expected, "{command}: {text}");
+        assert!(!writes || text.contains("is there already"), "{command}: {text}");
+    }
+    assert_eq!(contents(place.path())?, before);
+    Ok(())
+}
