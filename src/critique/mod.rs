@@ -10,6 +10,7 @@ pub mod shares;
 pub mod table;
 pub mod uncertainty;
 pub mod unknown;
+pub mod wrap;
 pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};

@@ -47,9 +47,9 @@ const DEFINITIONS: [Definition; 9] = [
         kind: "linear_drag",
         meaning: "force against the velocity, in proportion to it: A v, A diagonal",
         coefficients: &[
-            coefficient("a_x", "1/s", "along the nose"),
-            coefficient("a_y", "1/s", "to starboard"),
-            coefficient("a_z", "1/s", "along body down (heave)"),
+            coefficient("a_x", "1/s", "along the nose").negative("drag that pushes"),
+            coefficient("a_y", "1/s", "to starboard").negative("drag that pushes"),
+            coefficient("a_z", "1/s", "along body down (heave)").negative("drag that pushes"),
         ],
         parameters: &[],
         terms: &[(0, Some("a_x"), "vx"), (1, Some("a_y"), "vy"), (2, Some("a_z"), "vz")],
@@ -77,7 +77,7 @@ const DEFINITIONS: [Definition; 9] = [
     Definition {
         kind: "rate_damping",
         meaning: "moment against the angular velocity, in proportion to it: B w, B diagonal",
-        coefficients: &[coefficient("b_x", "1/s", "roll"), coefficient("b_y", "1/s", "pitch"), coefficient("b_z", "1/s", "yaw")],
+        coefficients: &[coefficient("b_x", "1/s", "roll").negative("anti-damping"), coefficient("b_y", "1/s", "pitch").negative("anti-damping"), coefficient("b_z", "1/s", "yaw").negative("anti-damping")],
         parameters: &[],
         terms: &[(3, Some("b_x"), "wx"), (4, Some("b_y"), "wy"), (5, Some("b_z"), "wz")],
         swaps: &[],

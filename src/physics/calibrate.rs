@@ -8,6 +8,7 @@ use super::catalogue;
 use super::layout::Layout;
 use super::least_squares::{Cluster, solve};
 use super::model::Model;
+use super::sign::{SignDoubt, SignFinding};
 use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
 use std::collections::BTreeMap;
@@ -73,6 +74,9 @@ pub struct Calibration {
     pub rounds: usize,
     /// Largest relative change, in the last round, of a coefficient that formulas read.
     pub last_change: f64,
+    /// Coefficients whose sign physics fixes and this calibration does not show.
+    #[serde(default)]
+    pub signs: Vec<SignDoubt>,
 }
 
 impl std::fmt::Display for Calibration {
@@ -92,7 +96,13 @@ impl std::fmt::Display for Calibration {
             };
             write!(f, "{effect:<20} {name:<8} {value:>12.5}   {interval:<27} {unit}")?;
             match bounds {
-                Some([low, high]) if estimate.is_implausible() => writeln!(f, "   outside its physical bounds {low} to {high}")?,
+                Some([low, high]) if estimate.is_implausible() => write!(f, "   outside its physical bounds {low} to {high}")?,
+                _ => {}
+            }
+            let doubt = self.signs.iter().find(|doubt| doubt.effect == *effect && doubt.name == *name);
+            match doubt.map(|doubt| doubt.finding) {
+                Some(SignFinding::Wrong) => writeln!(f, "   WRONG SIGN")?,
+                Some(SignFinding::NotDetermined) => writeln!(f, "   sign not determined")?,
                 _ => writeln!(f)?,
             }
         }
@@ -104,7 +114,16 @@ impl std::fmt::Display for Calibration {
             f,
             "{} rows; condition number {:.1}; intervals from {} stretches of consecutive rows",
             self.rows, self.condition_number, self.clusters
-        )
+        )?;
+        let wrong: Vec<&SignDoubt> = self.signs.iter().filter(|doubt| doubt.finding == SignFinding::Wrong).collect();
+        wrong.iter().try_for_each(|doubt| write!(f, "\nCAUTION: {doubt}"))?;
+        if !wrong.is_empty() {
+            write!(
+                f,
+                "\n         Such a number stands in for physics that the model lacks, or a control acts otherwise than the log says."
+            )?;
+        }
+        Ok(())
     }
 }
 
@@ -243,8 +262,9 @@ fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Cali
         }
     }
     let coefficients = layout.all().into_iter().filter_map(|(effect, index)| estimate(&calibrated, effect, index)).collect();
+    let signs = calibrated.sign_doubts();
     let calibration =
-        Calibration { coefficients, condition_number, rows: total, clusters: clusters.len(), rounds: 1, last_change: 0.0 };
+        Calibration { coefficients, condition_number, rows: total, clusters: clusters.len(), rounds: 1, last_change: 0.0, signs };
     Ok((calibrated, calibration))
 }
 

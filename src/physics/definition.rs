@@ -2,6 +2,7 @@
 //! The baseline and the catalogue are lists of these; no evaluation and no search here.
 
 use super::effect::{Coefficient, Effect, Parameter, Swap, Term};
+use super::sign::Sign;
 use crate::flight::GRAVITY_M_S2;
 use crate::formula::Formula;
 
@@ -58,12 +59,15 @@ pub struct CoefficientDefinition {
     pub expected: Option<[f64; 2]>,
     /// For a property of each flight (wind, bias): its usual standard deviation from flight to flight. `None` is one number for all.
     pub by_flight: Option<f64>,
+    /// The sign that physics fixes, and what the other one would mean. Bounds may reach a little beyond zero, so that an estimate near
+    /// zero is not bent.
+    pub sign: Option<(Sign, &'static str)>,
 }
 
 impl CoefficientDefinition {
     /// One of the baseline: nothing is presumed about its value.
     const fn free(name: &'static str, unit: &'static str, meaning: &'static str) -> Self {
-        Self { name, unit, meaning, bounds: [f64::NEG_INFINITY, f64::INFINITY], expected: None, by_flight: None }
+        Self { name, unit, meaning, bounds: [f64::NEG_INFINITY, f64::INFINITY], expected: None, by_flight: None, sign: None }
     }
 
     /// The same, to lie within bounds.
@@ -78,6 +82,27 @@ impl CoefficientDefinition {
     pub const fn usually(mut self, low: f64, high: f64) -> Self {
         self.expected = Some([low, high]);
         self
+    }
+
+    /// The same, positive by physics; a negative one would be what `otherwise` says.
+    #[must_use]
+    pub const fn positive(mut self, otherwise: &'static str) -> Self {
+        self.sign = Some((Sign::Positive, otherwise));
+        self
+    }
+
+    /// The same, negative by physics; a positive one would be what `otherwise` says.
+    #[must_use]
+    pub const fn negative(mut self, otherwise: &'static str) -> Self {
+        self.sign = Some((Sign::Negative, otherwise));
+        self
+    }
+
+    /// The sign that physics fixes, stated or by bounds that end at zero, and what the other one would mean.
+    pub fn physical_sign(&self) -> Option<(Sign, &'static str)> {
+        let [low, high] = self.bounds;
+        let bounded = (low >= 0.0).then_some(Sign::Positive).or((high <= 0.0).then_some(Sign::Negative));
+        self.sign.or(bounded.map(|sign| (sign, "the opposite of its physics")))
     }
 
     /// The same as a property of each flight with this standard deviation.

@@ -17,8 +17,10 @@ mod least_squares;
 mod model;
 #[cfg(feature = "files")]
 mod model_file;
+mod sign;
 #[cfg(feature = "files")]
 mod toml_section;
+mod vehicle;
 
 pub use baseline::PAPER;
 pub use calibrate::{Calibration, Estimate, calibrate};
@@ -31,3 +33,5 @@ pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Paramet
 pub use evaluate::{StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
+pub use sign::{Sign, SignDoubt, SignFinding, doubt, physical_sign};
+pub use vehicle::{Assumed, MASS_KG, ROTOR_RADIUS_M};

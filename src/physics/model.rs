@@ -5,6 +5,7 @@ use super::baseline;
 use super::definition::Vehicle;
 use super::effect::Effect;
 use super::evaluate::{self, StreamingModel};
+use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
 use crate::flight::{Accelerations, Column, Flight};
@@ -54,6 +55,9 @@ pub struct Model {
     /// What kind of aircraft it is: which effects of the catalogue make sense.
     #[serde(default)]
     pub vehicle: Vehicle,
+    /// Which of these numbers nobody gave: they are then those of the paper's aircraft.
+    #[serde(default, skip_serializing_if = "Assumed::is_nothing")]
+    pub assumed: Assumed,
     /// Effects, in the order in which they are summed.
     pub effects: Vec<Effect>,
     /// What is known about the data.
@@ -77,6 +81,7 @@ impl Model {
             inertia,
             rotor_radius_m,
             vehicle: Vehicle::default(),
+            assumed: Assumed::default(),
             effects: baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
             data: ModelData::default(),
             provenance: BTreeMap::new(),
@@ -139,7 +144,7 @@ impl Model {
         Ok(squares.map(|sum| (sum / rows as f64).sqrt()))
     }
 
-    /// Checks that the model is whole: positive geometry, a delay that is not negative, effects with names of their own.
+    /// Checks that the model is whole: mass, inertia and rotor that an unmanned aircraft can have, a delay that is not negative, effects with names of their own.
     ///
     /// # Errors
     /// [`Error::Config`] or [`Error::Formula`] naming what is wrong.
@@ -152,11 +157,8 @@ impl Model {
         let fault = |field: &str, found: String, expected: &str| {
             Err(Error::Config { place: place.into(), field: field.into(), found, expected: expected.into() })
         };
-        let [ix, iy, iz] = self.inertia;
-        let lengths =
-            [("mass_kg", self.mass_kg), ("inertia", ix), ("inertia", iy), ("inertia", iz), ("rotor_radius_m", self.rotor_radius_m)];
-        if let Some((field, value)) = lengths.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-            return fault(field, value.to_string(), "a positive, finite number");
+        if let Some(vehicle::Fault { field, found, expected }) = vehicle::fault(self.mass_kg, self.inertia, self.rotor_radius_m) {
+            return fault(field, found, &expected);
         }
         let delay_s = self.data.control_delay_s;
         if !(0.0..=1.0).contains(&delay_s) {

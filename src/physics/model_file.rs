@@ -6,6 +6,7 @@ use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::model::{Entry, Model, ModelData};
 use super::toml_section::{Section, line_of, number};
+use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::Column;
 use crate::suggest::did_you_mean;
@@ -24,7 +25,7 @@ impl Model {
     /// Reads a model file.
     ///
     /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
-    /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m), the name to the file's, and without `baseline` the model holds
+    /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m) and are marked in [`Model::assumed`], the name to the file's, and without `baseline` the model holds
     /// the listed effects alone. An `[[effect]]` that `baseline` already holds sets that effect's numbers.
     ///
     /// # Errors
@@ -48,8 +49,13 @@ impl Model {
         file.allow(&["model", "data", "effect", "provenance"])?;
         let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
         model.allow(&["name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
-        let mass_kg = model.number("mass_kg")?.unwrap_or(NOMINAL_MASS_KG);
-        let rotor_radius_m = model.number("rotor_radius_m")?.unwrap_or(NOMINAL_ROTOR_RADIUS_M);
+        let (mass, inertia, radius) = (model.number("mass_kg")?, model.numbers("inertia")?, model.number("rotor_radius_m")?);
+        let assumed = Assumed { mass: mass.is_none(), inertia: inertia.is_none(), rotor_radius: radius.is_none() };
+        let (mass_kg, rotor_radius_m) = (mass.unwrap_or(NOMINAL_MASS_KG), radius.unwrap_or(NOMINAL_ROTOR_RADIUS_M));
+        let inertia = inertia.unwrap_or(NOMINAL_INERTIA);
+        if let Some(vehicle::Fault { field, found, expected }) = vehicle::fault(mass_kg, inertia, rotor_radius_m) {
+            return Err(model.fault(field, found, expected));
+        }
         let vehicle = match model.text("vehicle")? {
             None => Vehicle::default(),
             Some(name) => Vehicle::ALL.into_iter().find(|vehicle| vehicle.name() == name).ok_or_else(|| {
@@ -101,9 +107,10 @@ impl Model {
         let result = Self {
             name: model.text("name")?.map_or(stem, str::to_owned),
             mass_kg,
-            inertia: model.numbers("inertia")?.unwrap_or(NOMINAL_INERTIA),
+            inertia,
             rotor_radius_m,
             vehicle,
+            assumed,
             effects,
             data,
             provenance,
@@ -129,8 +136,17 @@ impl Model {
         let mut text = String::new();
         let [ix, iy, iz] = self.inertia;
         // Writing to a String does not fail.
-        let _ = writeln!(text, "[model]\nname = {}\nmass_kg = {:?}", quoted(&self.name), self.mass_kg);
-        let _ = writeln!(text, "inertia = [{ix:?}, {iy:?}, {iz:?}]\nrotor_radius_m = {:?}", self.rotor_radius_m);
+        let _ = writeln!(text, "[model]\nname = {}", quoted(&self.name));
+        // A number that nobody gave stays a comment, so that whoever reads the file asks for it, too.
+        let mut number = |assumed: bool, key: &str, value: String| {
+            let _ = match assumed {
+                false => writeln!(text, "{key} = {value}"),
+                true => writeln!(text, "# {key} = {value}    # assumed; put yours here"),
+            };
+        };
+        number(self.assumed.mass, "mass_kg", format!("{:?}", self.mass_kg));
+        number(self.assumed.inertia, "inertia", format!("[{ix:?}, {iy:?}, {iz:?}]"));
+        number(self.assumed.rotor_radius, "rotor_radius_m", format!("{:?}", self.rotor_radius_m));
         let _ = writeln!(text, "vehicle = {}", quoted(self.vehicle.name()));
         let locked: Vec<String> = self.data.locked.iter().map(|name| quoted(name)).collect();
         let _ = writeln!(text, "\n[data]\ncontrol_delay_s = {:?}\nlocked = [{}]", self.data.control_delay_s, locked.join(", "));

@@ -5,7 +5,7 @@ use super::{Diagnosis, Options, diagnose};
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::{Flight, Span};
-use crate::physics::{Effect, Model, calibrate};
+use crate::physics::{Effect, Model, calibrate, doubt};
 
 /// Rounds before the loop stops by itself.
 const MOST_ROUNDS: usize = 4;
@@ -37,6 +37,20 @@ pub fn calibrated(model: &Model, flights: &[Flight], split: &Split) -> Result<Mo
     }
 }
 
+/// Puts the numbers of the model that goes on into what is said of its effects: one coefficient, one value, and that of the model
+/// file. A property of each flight keeps its mean.
+fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
+    for step in &mut diagnosis.steps {
+        let Some(effect) = model.effect(&step.effect) else { continue };
+        for number in &mut step.coefficients {
+            let Some(coefficient) = effect.coefficient(&number.name) else { continue };
+            (number.value, number.ci95) = (coefficient.value, coefficient.ci95.or(number.ci95));
+            number.sign = doubt(effect, coefficient).map(|doubt| doubt.finding);
+        }
+        step.formula = effect.to_string();
+    }
+}
+
 /// Diagnoses, adds and calibrates until nothing is found that the confirming flights confirm. `told` hears of every round, from 1,
 /// and may add to its diagnosis. Effects that are switched off stay in the model, switched off, unless they were found.
 ///
@@ -55,16 +69,19 @@ pub fn amend(
     let mut rounds = Vec::new();
     for round in 1..=MOST_ROUNDS {
         let mut outcome = diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), options)?;
-        told(round, &mut outcome.diagnosis)?;
         let confirmed = outcome.diagnosis.is_confirmed();
+        if confirmed {
+            let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
+            let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
+            model = calibrated(&outcome.model, flights, split)?;
+            as_in_the_model(&mut outcome.diagnosis, &model);
+            model.effects.extend(off);
+        }
+        told(round, &mut outcome.diagnosis)?;
         rounds.push(outcome.diagnosis);
         if !confirmed {
             break;
         }
-        let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
-        let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
-        model = calibrated(&outcome.model, flights, split)?;
-        model.effects.extend(off);
     }
     Ok(Amended { rounds, model })
 }

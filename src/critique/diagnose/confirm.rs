@@ -4,7 +4,7 @@ use super::design::Design;
 use super::engine::{Engine, FOLDS, priors};
 use super::fit::{Reduced, Solution, components};
 use super::gram::{blocks, grams};
-use super::report::Locked;
+use super::report::{Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
 use crate::critique::compare::PerChannel;
 use crate::error::Result;
@@ -25,7 +25,7 @@ pub(super) fn confirm(
         return Ok(None);
     }
     let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
-    let engine = Engine { flights, blocks: cut, fold, correlation };
+    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
     let mut errors = Vec::new();
     for model in models {
         errors.push(errors_under(&engine, model)?);
@@ -54,6 +54,7 @@ pub(super) fn confirm(
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
     Ok(Some(Locked {
         part: part.into(),
+        kept: kept(flights, locked),
         duration_s: rows * step_s,
         rmse_before: rmse(first),
         rmse_after: rmse(last),
@@ -62,12 +63,24 @@ pub(super) fn confirm(
     }))
 }
 
+/// What spans are made of: whole flights, the last part of each, or pieces from anywhere.
+fn kept(flights: &[Flight], locked: &[Span]) -> Kept {
+    let length = |span: &Span| flights.get(span.flight).map_or(0, Flight::len);
+    let alone = |span: &Span| locked.iter().filter(|other| other.flight == span.flight).count() == 1;
+    let to_end = |span: &Span| alone(span) && span.end == length(span);
+    match () {
+        () if locked.iter().all(|span| to_end(span) && span.start == 0) => Kept::Flights,
+        () if locked.iter().all(to_end) => Kept::Ends,
+        () => Kept::Segments,
+    }
+}
+
 /// Squared error of each block of each channel under a model's own numbers; properties of a flight are found from its other blocks.
 pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
     let mut design = Design::default();
     let layout = design.add(&model.regressors(|_| true)?);
     let grams = grams(engine.flights, &engine.blocks, &design)?;
-    let priors = priors(model, &layout);
+    let priors = priors(model, &layout, &engine.held);
     let mut errors: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::new());
     for (channels, members) in components(&layout) {
         let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &grams)).collect();
@@ -103,7 +116,21 @@ mod tests {
     use super::super::gram::tests::{model, whole};
     use super::*;
     use crate::flight::Targets;
+    use crate::flight::split::{Protocol, Split};
     use crate::physics::catalogue;
+
+    #[test]
+    fn the_part_kept_is_called_what_it_is() -> Result<()> {
+        let columns = || std::array::from_fn(|_| vec![0.0; 6000]);
+        let flight = |name: &str| Flight::new(name, "rest", 0.0, 0.01, columns(), Targets::Recorded);
+        let flights = [flight("a")?, flight("b")?, flight("c")?];
+        let seed = 1;
+        let first = Split::new(&flights, &[], &Protocol::First(0.8), seed)?;
+        let segments = Split::new(&flights, &[], &Protocol::Segments, seed)?;
+        let locked = Split::new(&flights, &["b".to_owned()], &Protocol::Segments, seed)?;
+        assert_eq!([first, segments, locked].map(|split| kept(&flights, &split.test)), [Kept::Ends, Kept::Segments, Kept::Flights]);
+        Ok(())
+    }
 
     /// At rest, and measured so: channels without any error have no weight that a computer can hold.
     #[test]

@@ -3,7 +3,8 @@
 use super::candidate::Candidate;
 use super::engine::Trial;
 use super::gates::SMALLEST_FALL;
-use super::report::{CandidateReport, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
+use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
+use super::sentences;
 use super::score::Scored;
 use super::search::{Found, Search};
 use crate::flight::Column;
@@ -28,7 +29,10 @@ impl Search<'_> {
                 value: coefficient.value,
                 ci95: None,
                 unit: coefficient.unit.clone(),
-                expected: known.and_then(|known| known.expected),
+                // Usual values are those of one size of vehicle.
+                expected: known.and_then(|known| known.expected).filter(|_| refined.model.is_usual()),
+                sign: None,
+                held: false,
                 rms_over_flights: rms,
             }
         };
@@ -83,15 +87,8 @@ impl Search<'_> {
                         held_out_mse_fall: scored.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
                         p_value: Some(scored.p_value),
                         detection_limit_mse_fall: scored.detection.filter(|_| scored.excited),
-                        note: (status == Status::NotExcited)
-                            .then(|| {
-                                let wanted = notes.map(|notes| format!("; wanted: {}", notes.excitation)).unwrap_or_default();
-                                format!("{} blocks carry it{wanted}", scored.carrying)
-                            })
-                            .or_else(|| {
-                                let rival = scored.rival.as_ref().filter(|_| status == Status::SamePhysics)?;
-                                Some(format!("little beside what `{rival}` removed: it may only mend its form"))
-                            }),
+                        reason: scored.reason(self.largest_p, &self.engine.held),
+                        note: notes.filter(|_| status == Status::NotExcited).map(|notes| format!("wanted: {}", notes.excitation)),
                     }
                 }
                 None => CandidateReport {
@@ -100,9 +97,10 @@ impl Search<'_> {
                     held_out_mse_fall: BTreeMap::new(),
                     p_value: None,
                     detection_limit_mse_fall: None,
-                    note: candidate.inapplicable.clone().or_else(|| {
-                        Some("these flights do not tell its regressors from those of the model, or one part of them alone carries it".into())
+                    reason: candidate.inapplicable.clone().unwrap_or_else(|| {
+                        "these flights do not tell its regressors from those of the model, or one part of them alone carries it".into()
                     }),
+                    note: None,
                 },
             })
             .collect();
@@ -120,14 +118,15 @@ pub(super) fn accepted(step: &Step) -> CandidateReport {
         held_out_mse_fall: step.held_out_mse_fall.clone(),
         p_value: Some(step.p_value),
         detection_limit_mse_fall: None,
+        reason: "passes every gate".into(),
         note: None,
     }
 }
 
 /// What is said of an effect that only stands in for something else.
 pub(super) fn taken_back(found: &Found) -> CandidateReport {
-    let note = "stands in for a stronger dependence that is in no effect of the catalogue".into();
-    CandidateReport { status: Status::SamePhysics, note: Some(note), ..accepted(&found.step) }
+    let reason = "stands in for a stronger dependence that is in no effect of the catalogue".into();
+    CandidateReport { status: Status::SamePhysics, reason, ..accepted(&found.step) }
 }
 
 /// What is said of an effect that was accepted and is needless beside the later ones, with the shares that it still removes by channel.
@@ -137,10 +136,10 @@ pub(super) fn dropped(found: &Found, falls: &[f64; 6]) -> CandidateReport {
     CandidateReport {
         status: Status::Negligible,
         held_out_mse_fall: still.filter(|(name, _)| acts(name)).map(|(name, fall)| (name.to_owned(), fall)).collect(),
-        note: Some(format!(
+        reason: format!(
             "accepted at first and dropped: beside the effects accepted later it removes less than {:.0} % of any channel's error",
             100.0 * SMALLEST_FALL
-        )),
+        ),
         ..accepted(&found.step)
     }
 }
@@ -154,52 +153,18 @@ pub(super) fn stability(frequency: f64) -> &'static str {
     }
 }
 
+/// What was found in some sentences: effects or their absence, then where the model fails most.
 pub(super) fn summary(diagnosis: &Diagnosis) -> String {
-    let falls = |effect: &Step| {
-        let best = effect.held_out_mse_fall.iter().max_by(|left, right| left.1.total_cmp(right.1));
-        best.map(|(channel, fall)| format!("`{}` ({:.0} % of the error of {channel})", effect.effect, 100.0 * fall))
-            .unwrap_or_default()
-    };
-    match diagnosis.verdict {
+    let unknown = diagnosis.unknown.as_deref().unwrap_or_default();
+    let found = match diagnosis.verdict {
         Verdict::EffectsMissing => {
-            let names: Vec<String> = diagnosis.steps.iter().map(falls).collect();
-            format!("The model lacks {}.{}", names.join(", then "), confirmation(diagnosis))
+            let confirmation = diagnosis.confirmation.unwrap_or(Confirmation::NothingKept);
+            sentences::effects(&diagnosis.steps, diagnosis.locked.as_ref(), confirmation)
         }
-        Verdict::NotInCatalogue => {
-            let parts: Vec<String> = diagnosis
-                .unknown
-                .iter()
-                .flatten()
-                .map(|unknown| {
-                    let on = unknown.depends_on.first().map_or("?", |first| first.variable.as_str());
-                    format!("{} depends on {on} ({:.0} % of what is left)", unknown.channel, 100.0 * unknown.r2)
-                })
-                .collect();
-            format!("Something is missing that is not in the catalogue: {}.", parts.join("; "))
-        }
-        Verdict::Explained => {
-            "No effect of the catalogue is missing that these flights could show and that would be worth while.".into()
-        }
-        _ => String::new(),
-    }
-}
-
-/// What the flights that no search has seen say of the accepted effects, all together.
-fn confirmation(diagnosis: &Diagnosis) -> String {
-    let Some(locked) = &diagnosis.locked else { return String::new() };
-    let of_steps = |channel: &&String| diagnosis.steps.iter().any(|step| step.channels.contains(channel));
-    let channels: Vec<&String> = locked.mse_fall.keys().filter(of_steps).collect();
-    let (sure, unsure): (Vec<&String>, Vec<&String>) =
-        channels.into_iter().partition(|channel| locked.mse_fall.get(*channel).is_some_and(|[_, low, _]| *low > 0.0));
-    let falls = |channel: &&String| locked.mse_fall.get(*channel).map_or(0.0, |fall| 100.0 * fall[0]);
-    let mut text = String::new();
-    if !sure.is_empty() {
-        let parts: Vec<String> = sure.iter().map(|channel| format!("{channel} by {:.0} %", falls(channel))).collect();
-        text += &format!(" On flights that no search has seen the error falls: {}.", parts.join(", "));
-    }
-    if !unsure.is_empty() {
-        let parts: Vec<String> = unsure.iter().map(|channel| format!("{channel} ({:+.0} %)", -falls(channel))).collect();
-        text += &format!(" Those flights do not confirm a fall in {}.", parts.join(", "));
-    }
-    text
+        Verdict::NotInCatalogue => sentences::not_in_catalogue(unknown),
+        Verdict::Explained => sentences::explained(),
+        Verdict::TooLittleData | Verdict::ConventionFault => String::new(),
+    };
+    let failure = diagnosis.failure.as_ref().and_then(sentences::failure);
+    [Some(found), failure].into_iter().flatten().filter(|text| !text.is_empty()).collect::<Vec<_>>().join(" ")
 }

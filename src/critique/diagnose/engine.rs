@@ -18,6 +18,8 @@ pub(super) struct Engine<'a> {
     pub fold: Vec<usize>,
     /// Samples over which a residual is correlated.
     pub correlation: f64,
+    /// Coefficients held on the side of zero that physics gives them, by kind of effect and name: they were found on the other one.
+    pub held: Vec<(String, String)>,
 }
 
 /// A model on the blocks.
@@ -45,7 +47,7 @@ pub(super) struct Pass {
 }
 
 /// What is presumed about each free coefficient.
-pub(super) fn priors(model: &Model, layout: &Layout) -> Vec<Prior> {
+pub(super) fn priors(model: &Model, layout: &Layout, held: &[(String, String)]) -> Vec<Prior> {
     layout
         .free
         .iter()
@@ -54,7 +56,12 @@ pub(super) fn priors(model: &Model, layout: &Layout) -> Vec<Prior> {
             let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
             let known = effect.coefficients.get(free.coefficient).zip(definition);
             match known.and_then(|(coefficient, definition)| definition.coefficient(&coefficient.name)) {
-                Some(known) => Prior { bounds: known.bounds, by_flight: known.by_flight },
+                Some(known) => {
+                    let is_held = held.iter().any(|(kind, name)| *kind == effect.kind && name == known.name);
+                    let sign = known.physical_sign().filter(|_| is_held);
+                    let bounds = sign.map_or(known.bounds, |(sign, _)| sign.bounds(known.bounds));
+                    Prior { bounds, by_flight: known.by_flight }
+                }
                 None => Prior::FREE,
             }
         })
@@ -172,7 +179,7 @@ impl Engine<'_> {
             at_bound: false,
             values: layout.free.iter().map(|free| value(model, *free)).collect(),
         };
-        let priors = priors(model, layout);
+        let priors = priors(model, layout, &self.held);
         for (channels, members) in components(layout) {
             if !channels.iter().any(|&channel| differs[channel]) {
                 continue;

@@ -374,7 +374,7 @@ mod tests {
         }
         let cut = blocks(&flights, &whole(&flights), 2.0);
         let fold: Vec<usize> = (0..cut.len()).map(|block| block % 5).collect();
-        let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0 };
+        let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
         let found = engine.pass(&model, &[])?.base;
         if !shared {
             let (calibrated, _) = calibrate(&model, &flights, &whole(&flights))?;

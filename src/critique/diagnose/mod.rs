@@ -12,6 +12,7 @@ mod confirm;
 mod describe;
 mod design;
 mod engine;
+mod failure;
 mod fit;
 mod gates;
 mod gram;
@@ -21,13 +22,18 @@ mod resample;
 mod rest;
 mod score;
 mod search;
+pub mod sentences;
+mod signs;
 mod significance;
+mod suggest;
+mod text;
 mod textbook;
 mod verdict;
 
 pub use amend::{Amended, amend, calibrated, searched};
 pub use report::{
-    CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Verdict,
+    CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue, Status,
+    Step, TriedFormula, UnknownChannel, Verdict,
 };
 pub use textbook::{Named, textbook};
 pub use verdict::{Options, Outcome, diagnose};

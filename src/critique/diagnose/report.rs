@@ -1,9 +1,9 @@
-//! What a diagnosis says: the verdict in words, then its figures, and the same as JSON. No measuring here.
+//! What a diagnosis holds, as data and as JSON. Its sentences are in `sentences`, its layout for a terminal in `text`; no measuring here.
 
 use crate::critique::compare::PerChannel;
+use crate::physics::SignFinding;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt;
 
 /// Outcome of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,9 +52,15 @@ pub struct Number {
     pub ci95: Option<[f64; 2]>,
     /// Unit.
     pub unit: String,
-    /// Usual values for a 5 kg helicopter.
+    /// Usual values for a 5 kg helicopter, if the vehicle is about one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected: Option<[f64; 2]>,
+    /// Whether the estimate shows the sign that physics fixes, if it fixes one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sign: Option<SignFinding>,
+    /// Whether it was held on the side of zero that physics gives it, as only the other one would fit.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub held: bool,
     /// For a property of each flight: root mean square over the flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_over_flights: Option<f64>,
@@ -77,7 +83,7 @@ pub struct ParameterValue {
 }
 
 /// One effect that was found missing.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Step {
     /// Identifier.
     pub effect: String,
@@ -120,15 +126,59 @@ pub struct CandidateReport {
     pub p_value: Option<f64>,
     /// Share of the error that it would have to remove to be found in four of five data sets like this one.
     pub detection_limit_mse_fall: Option<f64>,
-    /// Why, in words, where there is more to say.
+    /// What decided its status, in words.
+    #[serde(default)]
+    pub reason: String,
+    /// Further words, where there is more to say.
     pub note: Option<String>,
 }
 
-/// The confirmation on flights that no search has seen.
+/// What was kept from a search to confirm on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kept {
+    /// Whole flights.
+    #[default]
+    Flights,
+    /// The last part of each flight.
+    Ends,
+    /// Pieces out of the middle of flights that were searched otherwise.
+    Segments,
+}
+
+impl Kept {
+    /// In words.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Flights => "flights",
+            Self::Ends => "ends of flights",
+            Self::Segments => "segments",
+        }
+    }
+}
+
+/// What the part that no search has seen says of the accepted effects.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Confirmation {
+    /// In a channel in which an effect is worth while the error falls, beyond its interval.
+    Confirmed,
+    /// It falls in none and grows in at least one, beyond its interval.
+    Contradicted,
+    /// Neither.
+    Open,
+    /// Nothing was kept to confirm on.
+    NothingKept,
+}
+
+/// The confirmation on the part that no search has seen.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Locked {
     /// `locked` flights, or `test` spans of flights.
     pub part: String,
+    /// What it is made of.
+    #[serde(default)]
+    pub kept: Kept,
     /// Length, s.
     pub duration_s: f64,
     /// Root mean square error before.
@@ -175,6 +225,12 @@ pub struct Diagnosis {
     pub steps: Vec<Step>,
     /// Every effect that was tried.
     pub candidates: Vec<CandidateReport>,
+    /// What the part that no search has seen says of the accepted effects; absent where none was accepted.
+    #[serde(default)]
+    pub confirmation: Option<Confirmation>,
+    /// Where the error lies that is left.
+    #[serde(default)]
+    pub failure: Option<Failure>,
     /// On what the rest of the error depends, if it depends on anything measured.
     pub unknown: Option<Vec<UnknownChannel>>,
     /// The confirmation.
@@ -204,10 +260,57 @@ pub struct UnknownChannel {
     pub depends_on: Vec<DependsOn>,
     /// The shape in words.
     pub shape: String,
-    /// A formula to paste into the model file.
+    /// A formula to paste into the model file; only one that held on the part that no search has seen, where something was kept.
     pub suggested_formula: Option<String>,
-    /// Its coefficient, to start from.
+    /// Its coefficient, calibrated on what was searched.
     pub suggested_coefficient: Option<f64>,
+    /// How the formula did that was suggested by the shape, whether it held or not.
+    #[serde(default)]
+    pub tried: Option<TriedFormula>,
+}
+
+/// A suggested formula, calibrated on what was searched and measured on what was not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TriedFormula {
+    /// The formula.
+    pub formula: String,
+    /// Its coefficient.
+    pub coefficient: f64,
+    /// Share of the channel's mean squared error that it removes on searched blocks that it was not fitted to.
+    pub held_out_mse_fall: f64,
+    /// Share that it removes on the part that no search has seen, with its 95 % interval; absent where nothing was kept.
+    pub locked_mse_fall: Option<[f64; 3]>,
+    /// Root mean square error of the channel there with the formula.
+    pub locked_rmse: Option<f64>,
+}
+
+impl TriedFormula {
+    /// Whether it stands: its interval is above zero, or nothing was kept to measure it on.
+    pub fn holds(&self) -> bool {
+        self.locked_mse_fall.is_none_or(|[_, low, _]| low > 0.0)
+    }
+}
+
+/// Where the error lies that is left: the fewest channels that hold most of it, each channel's error taken over its variance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Failure {
+    /// `locked`, `test` or `searched`: on which part.
+    pub on: String,
+    /// The channels, the worst first.
+    pub channels: Vec<FailureChannel>,
+}
+
+/// One channel of a [`Failure`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FailureChannel {
+    /// Channel.
+    pub channel: String,
+    /// Its share of the error of all channels, each over its variance.
+    pub share: f64,
+    /// Mean squared error over the channel's variance.
+    pub unexplained: f64,
+    /// Measured variables on which what is left depends.
+    pub depends_on: Vec<String>,
 }
 
 /// One variable of an unknown dependence.
@@ -228,6 +331,8 @@ impl Diagnosis {
             accepted: Vec::new(),
             steps: Vec::new(),
             candidates: Vec::new(),
+            confirmation: None,
+            failure: None,
             unknown: None,
             locked: None,
             method: None,
@@ -238,7 +343,23 @@ impl Diagnosis {
         }
     }
 
-    /// Whether the flights that no search has seen show a fall of the error, beyond its 95 % interval, in a channel in which an accepted
+    /// What the part that no search has seen says of the accepted effects: `None` where none was accepted.
+    pub(super) fn confirmed(&self) -> Option<Confirmation> {
+        if self.steps.is_empty() {
+            return None;
+        }
+        let Some(locked) = &self.locked else { return Some(Confirmation::NothingKept) };
+        let channels = self.steps.iter().flat_map(|step| &step.channels);
+        let grows = |[_, _, high]: &[f64; 3]| *high < 0.0;
+        let mut told = channels.filter_map(|channel| locked.mse_fall.get(channel));
+        Some(match self.is_confirmed() {
+            true => Confirmation::Confirmed,
+            false if told.any(grows) => Confirmation::Contradicted,
+            false => Confirmation::Open,
+        })
+    }
+
+    /// Whether the part that no search has seen shows a fall of the error, beyond its 95 % interval, in a channel in which an accepted
     /// effect is worth while. Without such flights nothing is confirmed.
     pub fn is_confirmed(&self) -> bool {
         let Some(locked) = &self.locked else { return false };
@@ -271,123 +392,5 @@ impl Status {
             Self::Implausible => "implausible",
             Self::SamePhysics => "same physics",
         }
-    }
-}
-
-fn percent(falls: &BTreeMap<String, f64>) -> String {
-    let parts: Vec<String> = falls.iter().map(|(channel, fall)| format!("{channel} {:.1} %", 100.0 * fall)).collect();
-    if parts.is_empty() { "-".into() } else { parts.join(", ") }
-}
-
-impl fmt::Display for Diagnosis {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "Verdict: {}. {}", self.verdict.words(), self.summary)?;
-        for (number, step) in self.steps.iter().enumerate() {
-            writeln!(f, "\n{}. {}: {}", number + 1, step.effect, step.meaning)?;
-            writeln!(f, "   held-out error falls: {}", percent(&step.held_out_mse_fall))?;
-            writeln!(
-                f,
-                "   p = {:.4}; wins in {:.0} % of resampled worlds ({})",
-                step.p_value,
-                100.0 * step.selection_frequency,
-                step.stability
-            )?;
-            for number in &step.coefficients {
-                let ci = number.ci95.map(|[low, high]| format!(" [{low:.4}, {high:.4}]")).unwrap_or_default();
-                let usual = number.expected.map(|[low, high]| format!("; usual {low} to {high}")).unwrap_or_default();
-                let spread = number.rms_over_flights.map(|rms| format!("; rms over flights {rms:.4}")).unwrap_or_default();
-                writeln!(f, "   {} = {:.4}{ci} {}{usual}{spread}", number.name, number.value, number.unit)?;
-            }
-            for parameter in &step.parameters {
-                let how = if parameter.fixed {
-                    "known".into()
-                } else {
-                    parameter.profile.map_or("fitted".into(), |[low, high]| format!("fitted, {low:.4} to {high:.4}"))
-                };
-                writeln!(f, "   {} = {:.4} {} ({how})", parameter.name, parameter.value, parameter.unit)?;
-            }
-            if step.indistinguishable.is_empty() {
-                writeln!(f, "   nothing else fits as well")?;
-            } else {
-                writeln!(
-                    f,
-                    "   these flights cannot tell it from {}; to tell: {}",
-                    step.indistinguishable.join(", "),
-                    step.would_tell_apart
-                )?;
-            }
-            if let Some(flight) = &step.rests_on_flight {
-                writeln!(f, "   CAUTION: rests on flight `{flight}` alone")?;
-            }
-        }
-        for unknown in self.unknown.iter().flatten() {
-            let on: Vec<String> =
-                unknown.depends_on.iter().take(3).map(|on| format!("{} ({:.0} %)", on.variable, 100.0 * on.share)).collect();
-            writeln!(f, "\nUnknown: {} depends on {} (R2 {:.2})", unknown.channel, on.join(", "), unknown.r2)?;
-            writeln!(f, "   {}", unknown.shape)?;
-            if let Some(formula) = &unknown.suggested_formula {
-                writeln!(
-                    f,
-                    "   to try, in the model file:\n     [[effect]]\n     kind = \"formula\"\n     name = \"suggested_{0}\"\n     \
-                     channel = \"{0}\"\n     formula = \"{formula}\"\n     coefficient = {1:.4}",
-                    unknown.channel,
-                    unknown.suggested_coefficient.unwrap_or_default()
-                )?;
-            }
-        }
-        if let Some(locked) = &self.locked {
-            writeln!(f, "\nOn {:.0} s that no search has seen ({}):", locked.duration_s, locked.part)?;
-            let row = |values: &PerChannel| {
-                values
-                    .channels()
-                    .iter()
-                    .map(|value| value.map_or_else(|| format!("{:>9}", "-"), |value| format!("{value:>9.4}")))
-                    .collect::<String>()
-            };
-            writeln!(
-                f,
-                "   {:<28}{}",
-                "RMSE",
-                crate::flight::Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat()
-            )?;
-            for (step, values) in locked.waterfall.iter().enumerate() {
-                let name = if step == 0 {
-                    "model".into()
-                } else {
-                    self.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}"))
-                };
-                writeln!(f, "   {name:<28}{}", row(values))?;
-            }
-            for (channel, [fall, low, high]) in &locked.mse_fall {
-                writeln!(f, "   {channel}: error removed {:.1} % [{:.1}, {:.1}]", 100.0 * fall, 100.0 * low, 100.0 * high)?;
-            }
-        }
-        writeln!(f, "\n{:<20}{:<17}{:>9}{:>12}  fall", "effect", "status", "p", "limit")?;
-        for candidate in &self.candidates {
-            let p = candidate.p_value.map_or("-".into(), |p| format!("{p:.4}"));
-            let limit = candidate.detection_limit_mse_fall.map_or("-".into(), |limit| format!("{:.1} %", 100.0 * limit));
-            let note = candidate.note.as_ref().map(|note| format!("  {note}")).unwrap_or_default();
-            writeln!(
-                f,
-                "{:<20}{:<17}{p:>9}{limit:>12}  {}{note}",
-                candidate.effect,
-                candidate.status.words(),
-                percent(&candidate.held_out_mse_fall)
-            )?;
-        }
-        if let Some(method) = &self.method {
-            writeln!(
-                f,
-                "\n{} blocks of {:.1} s, {:.0} s searched; accepted: p <= {:.4} ({} effects in play) and at least {:.1} % of a channel's held-out error",
-                method.blocks,
-                method.block_s,
-                method.searched_s,
-                method.largest_p_value,
-                method.effects_in_play,
-                100.0 * method.smallest_fall
-            )?;
-        }
-        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))?;
-        write!(f, "{:.1} s", self.seconds)
     }
 }

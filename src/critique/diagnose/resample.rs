@@ -29,7 +29,7 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
 pub(super) fn intervals(engine: &Engine<'_>, model: &Model, seed: u64) -> Result<BTreeMap<(usize, usize), [f64; 2]>> {
     let pass = engine.pass(model, &[])?;
     let layout = &pass.base.layout;
-    let (weights, priors) = (engine.weights(&pass.base), priors(model, layout));
+    let (weights, priors) = (engine.weights(&pass.base), priors(model, layout, &engine.held));
     let mut found = BTreeMap::new();
     for (channels, members) in components(layout) {
         let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(layout, channel, &pass.grams)).collect();
@@ -105,7 +105,7 @@ mod tests {
         let width = |block_s: f64| -> Result<f64> {
             let cut: Vec<Block> = blocks(&flights, &whole(&flights), block_s);
             let fold = (0..cut.len()).map(|block| block % 10).collect();
-            let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0 };
+            let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
             let found = intervals(&engine, &model(), 1)?;
             Ok(found.get(&(index(), 0)).map_or(f64::NAN, |[low, high]| high - low))
         };

@@ -3,7 +3,7 @@
 //! An effect outside the catalogue is mimicked in part by one inside. The sign of it: in the channel in which the named effect was
 //! worth while, the rest depends on a variable that the effect reads, and more of the error depends so than the effect removed.
 
-use super::report::{DependsOn, UnknownChannel};
+use super::report::{DependsOn, TriedFormula, UnknownChannel};
 use crate::critique::unknown::{ROWS_MAX, ResidualTable, Unknown, UnknownOptions, unknown};
 use crate::error::Result;
 use crate::flight::{Accelerations, Column, Flight, Span};
@@ -64,14 +64,18 @@ fn related(name: &str, variable: &str) -> bool {
 }
 
 /// For the report.
-pub(super) fn channel(unknown: &Unknown) -> UnknownChannel {
+///
+/// A formula that was tried and did not hold is not suggested.
+pub(super) fn channel(unknown: &Unknown, tried: Option<TriedFormula>) -> UnknownChannel {
+    let stands = tried.as_ref().filter(|tried| tried.holds());
     UnknownChannel {
         channel: unknown.channel.into(),
         r2: unknown.r2,
         null_r2_95: unknown.null_r2_95,
         depends_on: unknown.depends_on.iter().map(|on| DependsOn { variable: on.variable.clone(), share: on.share }).collect(),
         shape: unknown.skeleton.clone(),
-        suggested_formula: unknown.suggested_formula.as_ref().map(|suggested| suggested.formula.clone()),
-        suggested_coefficient: unknown.suggested_formula.as_ref().map(|suggested| suggested.coefficient),
+        suggested_formula: stands.map(|tried| tried.formula.clone()),
+        suggested_coefficient: stands.map(|tried| tried.coefficient),
+        tried,
     }
 }

@@ -5,8 +5,10 @@ use super::engine::{Pass, Trial};
 use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, LARGEST_GAIN, SMALLEST_FALL, SMALLEST_MOVEMENT};
 use super::report::Status;
 use super::search::Search;
+use super::sentences;
 use super::significance::{Raw, block_weights, raw_scores};
 use crate::error::Result;
+use crate::flight::Column;
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
@@ -52,10 +54,33 @@ impl Scored<'_> {
     pub(super) fn status(&self, largest_p: f64) -> Status {
         match () {
             () if !self.excited => Status::NotExcited,
-            () if self.p_value > largest_p || self.gain <= 0.0 => Status::NotSignificant,
+            () if self.p_value > largest_p => Status::NotSignificant,
             () if !self.plausible || !self.harms_nothing() => Status::Implausible,
             () if self.rival.is_some() && self.largest_fall() >= SMALLEST_FALL => Status::SamePhysics,
             () => Status::Negligible,
+        }
+    }
+
+    /// What decided that status, in words. `held` are coefficients held at the sign that physics gives them.
+    pub(super) fn reason(&self, largest_p: f64, held: &[(String, String)]) -> String {
+        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name());
+        match self.status(largest_p) {
+            Status::NotExcited => sentences::not_carried(self.carrying),
+            Status::NotSignificant => sentences::could_be_chance(self.p_value, largest_p),
+            Status::Implausible if !self.plausible => {
+                let own = held.iter().filter(|(kind, _)| *kind == self.candidate.effect.kind).map(|(_, name)| name.clone());
+                sentences::forbidden(&own.collect::<Vec<_>>())
+            }
+            Status::Implausible => {
+                let worst = self.falls.iter().min_by(|left, right| left.1.total_cmp(right.1));
+                worst.map_or_else(String::new, |(&channel, &fall)| sentences::makes_worse(name(channel), fall))
+            }
+            Status::SamePhysics => sentences::mends(self.rival.as_deref().unwrap_or("?")),
+            Status::Negligible if self.largest_fall() >= SMALLEST_FALL => sentences::few_blocks_gain(),
+            Status::Accepted | Status::Negligible => {
+                let best = self.falls.iter().max_by(|left, right| left.1.total_cmp(right.1));
+                best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(name(channel), fall))
+            }
         }
     }
 }

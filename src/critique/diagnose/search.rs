@@ -234,6 +234,8 @@ impl Search<'_> {
                     model.effects[index].coefficients.get(position).map_or(number.value, |coefficient| coefficient.value);
                 number.ci95 = intervals.get(&(index, position)).copied();
             }
+            // The formula with the numbers that are printed beside it.
+            found.step.formula = model.effects[index].to_string();
         }
         if let Some(last) = found.last_mut() {
             for (&(effect, coefficient), interval) in &intervals {
@@ -244,6 +246,8 @@ impl Search<'_> {
                 }
             }
         }
+        let judged = found.last().map_or(model, |last| last.model.clone());
+        self.judge_signs(&judged, found);
         Ok(())
     }
 

@@ -33,7 +33,7 @@ pub type Named = Vec<String>;
 pub fn textbook(flights: &[Flight], model: &Model, searched: &[Span], dynamic: bool) -> Result<(Named, Named)> {
     let cut = blocks(flights, searched, 10.0);
     let fold = (0..cut.len()).map(|block| block % HELD_OUT).collect();
-    let engine = Engine { flights, blocks: cut, fold, correlation: 1.0 };
+    let engine = Engine { flights, blocks: cut, fold, correlation: 1.0, held: Vec::new() };
     let base = engine.pass(model, &[])?.base.model;
     let tried: Vec<_> = candidates(&base, flights)
         .into_iter()

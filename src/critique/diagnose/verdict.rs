@@ -1,15 +1,17 @@
 //! From flights and a model to a diagnosis: blocks, search, what is left, confirmation, verdict.
 
-use super::candidate::candidates;
+use super::candidate::{Candidate, candidates};
 use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, FOLDS};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
-use super::report::{Diagnosis, Method, Verdict};
+use super::failure::{Measured, failure};
+use super::report::{CandidateReport, Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
 use super::significance::Flips;
+use super::{sentences, signs, suggest};
 use crate::critique::unknown::Unknown;
 use crate::error::Result;
 use crate::flight::{Flight, Span};
@@ -71,7 +73,7 @@ pub fn diagnose(
     let mut fold = vec![0; cut.len()];
     order.iter().enumerate().for_each(|(position, &block)| fold[block as usize] = position % FOLDS);
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
-    let engine = Engine { flights, blocks: cut, fold, correlation: 2.0 * CORRELATION_S / step_s };
+    let engine = Engine { flights, blocks: cut, fold, correlation: 2.0 * CORRELATION_S / step_s, held: Vec::new() };
     let mut candidates = candidates(model, flights);
     candidates.retain(|candidate| !options.without.contains(&candidate.id));
     let in_play = candidates.iter().filter(|candidate| candidate.inapplicable.is_none()).count().max(1);
@@ -88,17 +90,14 @@ pub fn diagnose(
         smallest_fall: SMALLEST_FALL,
     };
     if count < FEWEST_BLOCKS {
-        let summary = format!(
-            "{count} blocks of {block_s:.0} s are too few to tell a missing effect from chance; {FEWEST_BLOCKS} are needed, that is {:.0} s of flight.",
-            FEWEST_BLOCKS as f64 * SHORTEST_BLOCK_S
-        );
+        let summary = sentences::too_few_blocks(count, block_s, FEWEST_BLOCKS, SHORTEST_BLOCK_S);
         let seconds = begun.elapsed().as_secs_f64();
         let diagnosis = Diagnosis { method: Some(method), seconds, ..Diagnosis::nothing(Verdict::TooLittleData, summary) };
         return Ok(Outcome { diagnosis, model: base });
     }
-    let notes = model.effects.iter().filter_map(Effect::caution).collect();
+    let notes: Vec<String> = model.effects.iter().filter_map(Effect::caution).collect();
     let mut diagnosis = Diagnosis { method: Some(method), notes, ..Diagnosis::nothing(Verdict::Explained, String::new()) };
-    let search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
+    let mut search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
     let (before, held) = search.timing(&base)?;
     if let Some(delay_s) = held {
         diagnosis.notes.push(format!(
@@ -107,39 +106,96 @@ pub fn diagnose(
             1e3 * delay_s
         ));
     }
-    let (mut found, mut left) = search.forward(&before, &candidates)?;
-    let fitted = |found: &[Found]| found.last().map_or(&before, |last| &last.model).clone();
-    let unknown_of = |model: &Model| dependences(flights, model, searched, block_s, options.seed);
-    let mut unknown = unknown_of(&fitted(&found))?;
-    let stand_ins = search.stand_ins(&found, &before, &unknown)?;
-    if !stand_ins.is_empty() {
-        left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
-        search.without(&mut found, &stand_ins, &before)?;
-        unknown = unknown_of(&fitted(&found))?;
+    let ground = Ground { flights, searched, locked, part, block_s, before: &before };
+    let mut heard = search.hear(&ground, &candidates)?;
+    // What fits only with the wrong sign is tried once more with the right one.
+    while let wrong = signs::wrong(&heard.found)
+        && wrong.iter().any(|one| !search.engine.held.contains(one))
+    {
+        search.engine.held.extend(wrong);
+        heard = search.hear(&ground, &candidates)?;
     }
-    search.intervals(&mut found)?;
-    let mut models = vec![before.clone()];
-    models.extend(found.iter().map(|found| found.model.clone()));
-    let after = models.last().cloned().unwrap_or(before);
-
-    diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
-    // Two that were accepted beside each other have been told apart.
-    for found in &mut found {
-        found.step.indistinguishable.retain(|other| !diagnosis.accepted.contains(other));
-    }
-    diagnosis.steps = found.into_iter().map(|found| found.step).collect();
-    diagnosis.candidates = left;
-    diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
-    diagnosis.locked = confirm(flights, &models, locked, part, block_s, search.engine.correlation)?;
-    diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {
-        (false, _) => Verdict::EffectsMissing,
-        (true, false) => Verdict::NotInCatalogue,
-        (true, true) => Verdict::Explained,
-    };
-    diagnosis.unknown = (!unknown.is_empty()).then(|| unknown.iter().map(channel).collect());
-    diagnosis.summary = summary(&diagnosis);
     diagnosis.seconds = begun.elapsed().as_secs_f64();
-    Ok(Outcome { diagnosis, model: after })
+    search.conclude(&ground, heard, diagnosis)
+}
+
+/// What a search stands on.
+struct Ground<'a> {
+    flights: &'a [Flight],
+    searched: &'a [Span],
+    locked: &'a [Span],
+    part: &'a str,
+    block_s: f64,
+    /// The model as it was given, fitted.
+    before: &'a Model,
+}
+
+/// What a search came back with.
+struct Heard {
+    found: Vec<Found>,
+    left: Vec<CandidateReport>,
+    unknown: Vec<Unknown>,
+}
+
+impl Search<'_> {
+    /// The whole search: forward, what the rest depends on, stand-ins taken back, intervals.
+    fn hear(&self, ground: &Ground<'_>, candidates: &[Candidate]) -> Result<Heard> {
+        let before = ground.before;
+        let (mut found, mut left) = self.forward(before, candidates)?;
+        let fitted = |found: &[Found]| found.last().map_or(before, |last| &last.model).clone();
+        let unknown_of =
+            |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
+        let mut unknown = unknown_of(&fitted(&found))?;
+        let stand_ins = self.stand_ins(&found, before, &unknown)?;
+        if !stand_ins.is_empty() {
+            left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
+            self.without(&mut found, &stand_ins, before)?;
+            unknown = unknown_of(&fitted(&found))?;
+        }
+        self.intervals(&mut found)?;
+        Ok(Heard { found, left, unknown })
+    }
+
+    /// From what was found to the verdict: confirmation, suggestions tried, where the rest of the error lies, words.
+    fn conclude(&self, ground: &Ground<'_>, heard: Heard, mut diagnosis: Diagnosis) -> Result<Outcome> {
+        let begun = Instant::now();
+        let Heard { mut found, left, unknown } = heard;
+        let Ground { flights, locked, part, block_s, .. } = *ground;
+        let mut models = vec![ground.before.clone()];
+        models.extend(found.iter().map(|found| found.model.clone()));
+        let after = models.last().cloned().unwrap_or_else(|| ground.before.clone());
+        diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
+        // Two that were accepted beside each other have been told apart.
+        for found in &mut found {
+            found.step.indistinguishable.retain(|other| !diagnosis.accepted.contains(other));
+        }
+        diagnosis.steps = found.into_iter().map(|found| found.step).collect();
+        diagnosis.candidates = left;
+        diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
+        diagnosis.locked = confirm(flights, &models, locked, part, block_s, self.engine.correlation)?;
+        diagnosis.confirmation = diagnosis.confirmed();
+        diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {
+            (false, _) => Verdict::EffectsMissing,
+            (true, false) => Verdict::NotInCatalogue,
+            (true, true) => Verdict::Explained,
+        };
+        let unseen = suggest::Unseen { spans: locked, part, block_s };
+        let tried = |unknown: &Unknown| Ok(channel(unknown, suggest::tried(&self.engine, &after, unknown, &unseen)?));
+        let channels = unknown.iter().map(tried).collect::<Result<Vec<_>>>()?;
+        diagnosis.unknown = (!channels.is_empty()).then_some(channels);
+        diagnosis.failure = match &diagnosis.locked {
+            Some(confirmed) => failure(flights, &Measured::of_locked(confirmed, locked), &unknown),
+            None => {
+                let mse = self.engine.mse(&self.engine.pass(&after, &[])?.base);
+                failure(flights, &Measured { on: "searched", spans: ground.searched, mse }, &unknown)
+            }
+        };
+        diagnosis.notes.extend(self.sign_notes(&after)?);
+        diagnosis.notes.extend(after.assumptions());
+        diagnosis.summary = summary(&diagnosis);
+        diagnosis.seconds += begun.elapsed().as_secs_f64();
+        Ok(Outcome { diagnosis, model: after })
+    }
 }
 
 impl Search<'_> {
@@ -161,7 +217,7 @@ impl Search<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::gram::tests::{model, noise, whole};
-    use super::super::report::{CandidateReport, Status};
+    use super::super::report::Status;
     use super::*;
     use crate::flight::Column;
     use crate::physics::{calibrate, catalogue};

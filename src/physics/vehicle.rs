@@ -1,0 +1,204 @@
+//! Mass, inertia and rotor of a vehicle: what is possible, what was assumed for want of a number, and which effects such an
+//! assumption reaches. No file and no flight here.
+
+use super::definition::{Origin, Vehicle};
+use super::effect::Effect;
+use super::model::Model;
+use super::{baseline, catalogue};
+use serde::{Deserialize, Serialize};
+
+/// Masses of unmanned aircraft, kg: from 1 g to a tonne.
+pub const MASS_KG: [f64; 2] = [0.001, 1000.0];
+
+/// Rotor radii of unmanned aircraft, m: from 5 mm to 20 m.
+pub const ROTOR_RADIUS_M: [f64; 2] = [0.005, 20.0];
+
+/// Vehicle of the catalogue's usual sizes: a helicopter of 5 kg with a rotor radius of 0.8 m.
+const USUAL_MASS_KG: f64 = 5.0;
+const USUAL_RADIUS_M: f64 = 0.8;
+/// Factor by which mass and radius may differ for the usual sizes to be worth comparing with. Accelerations per unit of speed or rate go
+/// with area over mass, so three times the mass moves a usual range by about its own width.
+const USUAL_FACTOR: f64 = 3.0;
+
+/// Slack of the triangle inequality of moments of inertia, relative: a flat plate meets it with equality, up to rounding.
+const FLAT: f64 = 1e-9;
+
+/// Numbers of the vehicle that nobody gave and that are taken from the paper's aircraft.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Assumed {
+    /// The mass.
+    pub mass: bool,
+    /// The moments of inertia.
+    pub inertia: bool,
+    /// The rotor radius.
+    pub rotor_radius: bool,
+}
+
+impl Assumed {
+    /// Everything about the vehicle.
+    pub const ALL: Self = Self { mass: true, inertia: true, rotor_radius: true };
+
+    /// Whether everything was given.
+    pub fn is_nothing(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// A number of the vehicle that cannot be.
+pub(super) struct Fault {
+    /// Key of the model file.
+    pub field: &'static str,
+    /// What was found.
+    pub found: String,
+    /// What was expected, and a guess at the slip.
+    pub expected: String,
+}
+
+/// The first number of a vehicle that no unmanned aircraft has.
+pub(super) fn fault(mass_kg: f64, inertia: [f64; 3], rotor_radius_m: f64) -> Option<Fault> {
+    if let Some(value) = inertia.into_iter().find(|value| !(*value > 0.0 && value.is_finite())) {
+        return Some(Fault { field: "inertia", found: value.to_string(), expected: "positive, finite moments, kg m²".into() });
+    }
+    let bounded = [("mass_kg", mass_kg, MASS_KG, "kg", "grams"), ("rotor_radius_m", rotor_radius_m, ROTOR_RADIUS_M, "m", "millimetres")];
+    for (field, value, [low, high], unit, thousandth) in bounded {
+        if (low..=high).contains(&value) {
+            continue;
+        }
+        let small = value / 1000.0;
+        let slip = if (low..=high).contains(&small) && value > high {
+            format!("; {value} looks like {thousandth}: {small} {unit}?")
+        } else {
+            String::new()
+        };
+        let expected = format!("a positive number of {low} to {high} {unit}, as unmanned aircraft have{slip}");
+        return Some(Fault { field, found: value.to_string(), expected });
+    }
+    let [ix, iy, iz] = inertia;
+    let axes = [("x", ix, "y", iy, "z", iz), ("y", iy, "x", ix, "z", iz), ("z", iz, "x", ix, "y", iy)];
+    axes.into_iter().find(|(_, one, _, other, _, third)| *one > (other + third) * (1.0 + FLAT)).map(|(axis, one, b, other, c, third)| {
+        Fault {
+            field: "inertia",
+            found: format!("[{ix}, {iy}, {iz}]: the moment about {axis}, {one}, exceeds the sum of the others, {}", other + third),
+            expected: format!(
+                "moments that some body can have: about {axis} no more than about {b} and {c} together (a mix-up of units or axes?)"
+            ),
+        }
+    })
+}
+
+impl Model {
+    /// Whether the catalogue's usual sizes, which are those of a 5 kg helicopter with a rotor radius of 0.8 m, are worth a comparison.
+    pub fn is_usual(&self) -> bool {
+        let near = |value: f64, usual: f64| value <= usual * USUAL_FACTOR && usual <= value * USUAL_FACTOR;
+        self.vehicle == Vehicle::Helicopter && near(self.mass_kg, USUAL_MASS_KG) && near(self.rotor_radius_m, USUAL_RADIUS_M)
+    }
+
+    /// The vehicle in words: `helicopter, 4.58 kg, inertia 0.18 0.34 0.28 kg m², rotor radius 0.8 m`.
+    pub fn vehicle_text(&self) -> String {
+        let [ix, iy, iz] = self.inertia;
+        let kind = self.vehicle.name();
+        format!("{kind}, {} kg, inertia {ix} {iy} {iz} kg m², rotor radius {} m", self.mass_kg, self.rotor_radius_m)
+    }
+
+    /// For each enabled effect that reads a number which was only assumed: a sentence that says so and asks for it.
+    pub fn assumptions(&self) -> Vec<String> {
+        if self.assumed.is_nothing() {
+            return Vec::new();
+        }
+        let reading = |effect: &Effect| {
+            let read = reads(effect);
+            let [ix, iy, iz] = self.inertia;
+            let all = [
+                (self.assumed.mass && read.mass, format!("the mass ({} kg)", self.mass_kg), "mass_kg"),
+                (self.assumed.inertia && read.inertia, format!("the moments of inertia ({ix}, {iy}, {iz} kg m²)"), "inertia"),
+                (self.assumed.rotor_radius && read.rotor_radius, format!("the rotor radius ({} m)", self.rotor_radius_m), "rotor_radius_m"),
+            ];
+            let told: Vec<(String, &str)> = all.into_iter().filter(|entry| entry.0).map(|(_, words, key)| (words, key)).collect();
+            (!told.is_empty()).then(|| {
+                let (words, keys): (Vec<String>, Vec<&str>) = told.into_iter().unzip();
+                format!(
+                    "`{}` reads {}, assumed for want of yours: its numbers are only as good as that; give `{}` under [model]",
+                    effect.name,
+                    words.join(" and "),
+                    keys.join("`, `")
+                )
+            })
+        };
+        self.effects.iter().filter(|effect| effect.enabled).filter_map(reading).collect()
+    }
+}
+
+/// Which numbers of the vehicle the formulas and parameters of an effect are made of.
+fn reads(effect: &Effect) -> Assumed {
+    let mut read = Assumed::default();
+    for name in effect.terms.iter().flat_map(|term| term.regressor.names()) {
+        match name {
+            "mass_kg" => read.mass = true,
+            "ix" | "iy" | "iz" => read.inertia = true,
+            "rotor_radius_m" => read.rotor_radius = true,
+            _ => {}
+        }
+    }
+    let built_in = baseline::definitions().iter().chain(catalogue::definitions()).find(|definition| definition.kind == effect.kind);
+    for parameter in built_in.iter().flat_map(|definition| definition.parameters) {
+        match parameter.origin {
+            Origin::Number(_) => {}
+            Origin::RotorRadius => read.rotor_radius = true,
+            Origin::HoverInduced => (read.mass, read.rotor_radius) = (true, true),
+        }
+    }
+    read
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
+
+    #[test]
+    fn grams_and_millimetres_are_recognised_and_what_no_aircraft_has_is_refused() {
+        for (mass, inertia, radius, field, hint) in [
+            (4580.0, INERTIA, 0.8, "mass_kg", "grams: 4.58 kg?"),
+            (0.0, INERTIA, 0.8, "mass_kg", "positive"),
+            (f64::NAN, INERTIA, 0.8, "mass_kg", "0.001 to 1000 kg"),
+            (4.58, INERTIA, 800.0, "rotor_radius_m", "millimetres: 0.8 m?"),
+            (4.58, [0.18, 0.34, 0.6], 0.8, "inertia", "about z no more than"),
+            (4.58, [0.7, 0.34, 0.28], 0.8, "inertia", "about x no more than"),
+            (4.58, [0.18, -0.34, 0.28], 0.8, "inertia", "positive"),
+        ] {
+            let found = fault(mass, inertia, radius);
+            let says = found.as_ref().is_some_and(|fault| fault.field == field && fault.expected.contains(hint));
+            assert!(says, "{mass} {inertia:?} {radius}: {:?}", found.map(|fault| fault.expected));
+        }
+        // From a gram to a tonne, and a flat plate.
+        for (mass, inertia) in [(0.001, INERTIA), (1000.0, INERTIA), (0.045, [1.66e-5, 1.66e-5, 3.32e-5])] {
+            assert!(fault(mass, inertia, 0.0275).is_none(), "{mass}");
+        }
+    }
+
+    #[test]
+    fn an_assumption_is_said_of_the_effects_that_read_it() {
+        let mut model = Model::paper("n9", 4.58, INERTIA, 0.8);
+        assert!(model.assumptions().is_empty(), "everything was given");
+        model.assumed = Assumed::ALL;
+        let effects = ["ground_effect", "cg_offset", "quad_drag"].into_iter().filter_map(catalogue::definition);
+        model.effects.extend(effects.map(|definition| definition.effect(4.58, 0.8)));
+        let said = model.assumptions();
+        assert_eq!(said.len(), 3, "{said:?}");
+        assert!(said[0].contains("`gyroscopic` reads the moments of inertia (0.18, 0.34, 0.28 kg m²)"), "{said:?}");
+        assert!(said[1].contains("`ground_effect` reads the mass (4.58 kg) and the rotor radius (0.8 m)"), "{said:?}");
+        assert!(said[2].contains("`cg_offset`") && said[2].contains("give `mass_kg`, `inertia` under [model]"), "{said:?}");
+        model.assumed.mass = false;
+        model.assumed.rotor_radius = false;
+        assert_eq!(model.assumptions().len(), 2, "the ground effect's numbers were given now");
+    }
+
+    #[test]
+    fn usual_sizes_are_those_of_a_vehicle_of_that_size() {
+        let usual = |mass, radius| Model::paper("v", mass, INERTIA, radius).is_usual();
+        assert!(usual(4.58, 0.8) && usual(10.0, 1.0));
+        assert!(!usual(0.045, 0.0275) && !usual(90.0, 1.6) && !usual(5.0, 0.1));
+        assert!(!Model { vehicle: Vehicle::Multirotor, ..Model::paper("v", 5.0, INERTIA, 0.8) }.is_usual());
+    }
+}
