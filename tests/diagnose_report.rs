@@ -6,7 +6,8 @@
 
 use phyture::critique::PerChannel;
 use phyture::critique::diagnose::{
-    CandidateReport, DependsOn, Diagnosis, Locked, Method, Number, Status, Step, UnknownChannel, Verdict,
+    CandidateReport, Confirmation, DependsOn, Diagnosis, Kept, Locked, Method, Number, Status, Step, TriedFormula, UnknownChannel,
+    Verdict,
 };
 use phyture::flight::{Column, Flight, Span, Targets};
 use phyture::physics::{Model, catalogue};
@@ -54,6 +55,7 @@ fn candidate(effect: &str, status: Status, fall: f64) -> CandidateReport {
         held_out_mse_fall: [("vz_dot".to_owned(), fall)].into(),
         p_value: Some(0.0123),
         detection_limit_mse_fall: Some(0.0345),
+        reason: "said why".into(),
         note: None,
     }
 }
@@ -77,6 +79,8 @@ fn found() -> Diagnosis {
                 ci95: Some([0.8614, 0.9725]),
                 unit: "1".into(),
                 expected: Some([0.6, 1.3]),
+                sign: None,
+                held: false,
                 rms_over_flights: None,
             }],
             parameters: Vec::new(),
@@ -91,6 +95,7 @@ fn found() -> Diagnosis {
         ],
         locked: Some(Locked {
             part: "test".into(),
+            kept: Kept::Flights,
             duration_s: 40.0,
             rmse_before: rmse(0.4567),
             rmse_after: rmse(0.3456),
@@ -220,12 +225,47 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
         shape: "bends once".into(),
         suggested_formula: Some("height ^ 2".into()),
         suggested_coefficient: Some(0.25),
+        tried: Some(TriedFormula {
+            formula: "height ^ 2".into(),
+            coefficient: 0.25,
+            held_out_mse_fall: 0.5,
+            locked_mse_fall: Some([0.48, 0.41, 0.55]),
+            locked_rmse: Some(0.2163),
+        }),
     };
     let rounds =
         [found(), Diagnosis { unknown: Some(vec![unknown]), locked: found().locked, ..diagnosis(Verdict::NotInCatalogue) }];
     let own = html(&rounds, &[], [&before, &before], 20)?;
-    for text in ["Round 2: not in the catalogue", "formula = &quot;height ^ 2&quot;", "height (89 %)", "unknown modelled"] {
+    for text in ["Round 2: not in the catalogue", "formula = &quot;height ^ 2&quot;", "height (89 %)", "+ suggested formulas", "0.216", "falls by 48 % [41, 55]"] {
         assert!(own.contains(text), "the page lacks {text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn what_unseen_flights_deny_is_no_missing_effect_and_what_fails_there_is_not_suggested() -> Result<()> {
+    let [before, after] = models();
+    let mut denied = Diagnosis { confirmation: Some(Confirmation::Contradicted), ..found() };
+    if let Some(locked) = &mut denied.locked {
+        locked.mse_fall = [("vz_dot".to_owned(), [-0.083, -0.199, -0.044])].into();
+    }
+    let failed = TriedFormula { formula: "sin(8 * roll)".into(), locked_mse_fall: Some([0.02, -0.05, 0.09]), ..TriedFormula::default() };
+    denied.unknown = Some(vec![UnknownChannel {
+        channel: "wx_dot".into(),
+        r2: 0.4,
+        null_r2_95: 0.01,
+        depends_on: vec![DependsOn { variable: "roll".into(), share: 0.9 }],
+        shape: "periodic".into(),
+        suggested_formula: None,
+        suggested_coefficient: None,
+        tried: Some(failed),
+    }]);
+    let own = html(&[denied], &[], [&before, &after], 60)?;
+    for text in ["nothing to add", "vz_dot grows by 8.3 % [4.4, 20]", "does not hold on 40 s of flights", "said why"] {
+        assert!(own.contains(text), "the page lacks {text}");
+    }
+    for text in ["effects missing", "the interval holds zero", "To try, in the model file", "suggested_wx_dot"] {
+        assert!(!own.contains(text), "the page has {text}");
     }
     Ok(())
 }

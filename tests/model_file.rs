@@ -1,7 +1,7 @@
 //! The model file: what it means, that it reads back as written, and how it refuses.
 #![cfg(feature = "files")]
 
-use phyture::physics::{Effect, Entry, Model, Parameter};
+use phyture::physics::{Assumed, Effect, Entry, Model, Parameter};
 use phyture::{Error, Result};
 use proptest::prelude::*;
 use std::path::Path;
@@ -88,7 +88,11 @@ fn a_file_means_what_it_says() -> Result<()> {
 #[test]
 fn a_model_table_alone_is_complete() -> Result<()> {
     let model = parse("[model]\nbaseline = \"paper\"\n")?;
-    assert_eq!(model, Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8));
+    let paper = Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8);
+    assert_eq!(model, Model { assumed: Assumed::ALL, ..paper }, "the vehicle is assumed, and marked so");
+    let text = model.to_toml()?;
+    assert!(text.contains("# mass_kg = 4.58    # assumed"), "{text}");
+    assert_eq!(parse(&text)?, model, "what was assumed is not written as if it were known");
     assert!(parse("[model]\n")?.effects.is_empty());
     Ok(())
 }
@@ -102,6 +106,9 @@ fn faults_are_refused_with_line_found_and_expected() -> Result<()> {
         ("[model]\nbaseline = \"papers\"\n".into(), vec!["line 2", "did you mean `paper`?"]),
         ("[model]\nmass_kg = \"heavy\"\n".into(), vec!["`model.mass_kg` is the text \"heavy\", expected a finite number"]),
         ("[model]\nmass_kg = -1\n".into(), vec!["n9.toml", "mass_kg", "positive"]),
+        ("[model]\nname = \"heli\"\nmass_kg = 4580\n".into(), vec!["n9.toml, line 3", "0.001 to 1000 kg", "looks like grams: 4.58 kg?"]),
+        ("[model]\nrotor_radius_m = 800\n".into(), vec!["line 2", "looks like millimetres: 0.8 m?"]),
+        ("[model]\ninertia = [0.18, 0.34, 0.6]\n".into(), vec!["line 2", "about z no more than about x and y together"]),
         ("[model]\ninertia = [1, 2]\n".into(), vec!["`model.inertia`", "a list of 3 numbers"]),
         ("[model]\nmass_kg = = 2\n".into(), vec!["n9.toml", "line 2", "TOML"]),
         ("[data]\ncontrol_delay_s = 0.0\n".into(), vec!["a table `[model]`"]),
@@ -194,7 +201,7 @@ proptest! {
         locked in prop::collection::vec(".{0,6}", 0..3),
         mass_kg in 1e-3..1e3f64,
     ) {
-        let mut model = Model::paper(name.clone(), mass_kg, [0.1, 0.2, 1.0 / 3.0], 0.8);
+        let mut model = Model::paper(name.clone(), mass_kg, [0.1, 0.2, 0.8 / 3.0], 0.8);
         let mut own = Effect::formula(format!("own {name}"), 5, "lag(vx, tau_s)^2 - -3e-7 * vy", -0.1)?;
         own.parameters.push(Parameter { name: "tau_s".into(), value: half_width, unit: String::new(), fixed: true });
         own.added_by = Some(name);

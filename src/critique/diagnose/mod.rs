@@ -35,5 +35,6 @@ pub use report::{
     CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue, Status,
     Step, TriedFormula, UnknownChannel, Verdict,
 };
+pub use signs::number_remark;
 pub use textbook::{Named, textbook};
 pub use verdict::{Options, Outcome, diagnose};

@@ -41,8 +41,8 @@ impl Search<'_> {
     }
 }
 
-/// In words, behind a number.
-pub(super) fn words(number: &Number) -> &'static str {
+/// What there is to say of the sign of an accepted effect's number, to stand behind it; nothing where it is as physics has it.
+pub fn number_remark(number: &Number) -> &'static str {
     match (number.held, number.sign) {
         (true, _) => "; held at the sign that physics gives it, only the other one would fit",
         (false, Some(SignFinding::NotDetermined)) => "; sign not determined",

@@ -2,7 +2,8 @@
 //! at most 120 characters. No words of its own but labels; sentences are in `sentences`.
 
 use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel};
-use super::{sentences, signs};
+use super::sentences;
+use super::signs::number_remark;
 use crate::critique::compare::PerChannel;
 use crate::critique::wrap::{clipped, wrapped};
 use crate::flight::Column;
@@ -15,11 +16,11 @@ fn falls(falls: &BTreeMap<String, f64>) -> String {
 }
 
 /// A coefficient with interval, unit, usual values and what there is to say of its sign.
-pub(crate) fn number_text(number: &Number) -> String {
+fn number_text(number: &Number) -> String {
     let ci = number.ci95.map(|[low, high]| format!(" [{low:.4}, {high:.4}]")).unwrap_or_default();
     let usual = number.expected.map(|[low, high]| format!("; usual {low} to {high}")).unwrap_or_default();
     let spread = number.rms_over_flights.map(|rms| format!("; rms over flights {rms:.4}")).unwrap_or_default();
-    format!("{} = {:.4}{ci} {}{usual}{spread}{}", number.name, number.value, number.unit, signs::words(number))
+    format!("{} = {:.4}{ci} {}{usual}{spread}{}", number.name, number.value, number.unit, number_remark(number))
 }
 
 fn parameter_text(parameter: &ParameterValue) -> String {

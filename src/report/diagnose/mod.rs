@@ -7,6 +7,7 @@ mod tables;
 mod views;
 
 use super::page::{Page, Part, Section};
+use crate::critique::diagnose::sentences::{self, change, unseen};
 use crate::critique::diagnose::{Diagnosis, Verdict};
 use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
@@ -92,7 +93,7 @@ fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
     let mut out = Vec::new();
     for (round, diagnosis) in diagnoses.iter().enumerate() {
         let round = if diagnoses.len() > 1 { format!("Round {}: ", round + 1) } else { "Verdict: ".into() };
-        out.push(format!("{round}{}. {}", diagnosis.verdict.words(), diagnosis.summary));
+        out.push(format!("{round}{}. {}", sentences::headline(diagnosis), diagnosis.summary));
         for step in &diagnosis.steps {
             if !step.indistinguishable.is_empty() {
                 let others = step.indistinguishable.join(", ");
@@ -103,18 +104,9 @@ fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
             }
         }
     }
-    let locked: Vec<String> = diagnoses
-        .iter()
-        .filter_map(|diagnosis| diagnosis.locked.as_ref())
-        .flat_map(|locked| locked.mse_fall.iter().map(move |(channel, fall)| (channel, fall, locked.duration_s)))
-        .map(|(channel, fall, seconds)| {
-            let [fall, low, high] = fall.map(|share| 100.0 * share);
-            let doubt = if low > 0.0 { "" } else { " (not confirmed: the interval holds zero)" };
-            format!("{channel} {fall:.1} % [{low:.1}, {high:.1}] on {seconds:.0} s{doubt}")
-        })
-        .collect();
-    if !locked.is_empty() {
-        out.push(format!("Mean squared error removed on flights that no search has seen: {}.", locked.join("; ")));
+    for locked in diagnoses.iter().filter_map(|diagnosis| diagnosis.locked.as_ref()).filter(|locked| !locked.mse_fall.is_empty()) {
+        let changes: Vec<String> = locked.mse_fall.iter().map(|(channel, fall)| change(channel, *fall)).collect();
+        out.push(format!("Mean squared error on {}: {}.", unseen(locked.kept, locked.duration_s), changes.join("; ")));
     }
     out
 }

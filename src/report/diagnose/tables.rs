@@ -5,7 +5,8 @@ use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
 use super::super::page::{Cell, Part, Table};
 use super::{DiagnoseReport, notes};
-use crate::critique::diagnose::{CandidateReport, Diagnosis, Status, Step};
+use crate::critique::diagnose::sentences::tried;
+use crate::critique::diagnose::{CandidateReport, Diagnosis, Status, Step, number_remark};
 use crate::critique::table::{Kind, significant};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Span};
@@ -38,12 +39,13 @@ fn numbers(step: &Step) -> [String; 2] {
         let interval = number.ci95.map(|[low, high]| format!(" [{}, {}]", significant(low, 3), significant(high, 3)));
         let spread = number.rms_over_flights.map(|rms| format!(", rms over flights {}", significant(rms, 3)));
         found.push(format!(
-            "{} = {}{}{}{}",
+            "{} = {}{}{}{}{}",
             number.name,
             significant(number.value, 4),
             interval.unwrap_or_default(),
             with_unit(&number.unit),
-            spread.unwrap_or_default()
+            spread.unwrap_or_default(),
+            number_remark(number)
         ));
         if let Some([low, high]) = number.expected {
             let outside = number.value < low || number.value > high;
@@ -82,6 +84,7 @@ pub(super) fn ranking(report: &DiagnoseReport<'_>) -> Vec<Part> {
             ("held-out error removed", "share of the mean squared error"),
             ("p", "one effect"),
             ("the physics", ""),
+            ("why", ""),
             ("competes with", ""),
             ("needs", "to show at all"),
         ];
@@ -132,6 +135,7 @@ fn row(diagnosis: &Diagnosis, candidate: &CandidateReport) -> Vec<Cell> {
         falls(&candidate.held_out_mse_fall),
         candidate.p_value.map_or_else(dash, |p| format!("{p:.4}")),
         meaning.unwrap_or_else(|| "a formula of the model file".into()),
+        if candidate.reason.is_empty() { dash() } else { candidate.reason.clone() },
         competes,
         candidate.note.clone().or_else(needs).unwrap_or_else(dash),
     ];
@@ -154,6 +158,13 @@ pub(super) fn suggestions(report: &DiagnoseReport<'_>) -> Vec<Part> {
             100.0 * unknown.null_r2_95.max(0.0),
             unknown.shape
         )));
+        if let Some(formula) = &unknown.tried {
+            let locked = report.diagnoses.last().and_then(|diagnosis| diagnosis.locked.as_ref());
+            let (kept, duration_s) = locked.map_or_else(Default::default, |locked| (locked.kept, locked.duration_s));
+            let mut words = tried(&unknown.channel, formula, kept, duration_s);
+            words.replace_range(..1, &words[..1].to_uppercase());
+            parts.push(Part::Text(format!("{words}.")));
+        }
         if let Some(formula) = &unknown.suggested_formula {
             parts.push(Part::Text("To try, in the model file:".into()));
             parts.push(Part::Code(format!(
@@ -180,28 +191,31 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
             values.push(rmse.channels().into());
         }
     }
-    let Some(last) = values.last().cloned() else {
+    if values.is_empty() {
         return vec![Part::Text(
             "No flights were kept from the search, or nothing was searched: there is nothing to confirm on.".into(),
         )];
-    };
+    }
     let caption = if names.len() == 1 {
-        "Nothing was added. The bar is what is left of the error on flights that no search has seen."
+        "Nothing was added. The bar is what is left of the error on the part that no search has seen."
     } else {
         "Each bar adds one effect, in order of acceptance. Look for the step in the channels that an effect changes; a bar that does \
-         not fall here, on flights that no search has seen, speaks against it."
+         not fall here, on the part that no search has seen, speaks against it."
     };
     let mut words = Vec::new();
-    if let Some(unknown) = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref()) {
-        let rest = |channel: usize| {
-            let of = unknown.iter().find(|unknown| unknown.channel == Column::TARGETS[channel].name())?;
-            Some(last.get(channel).copied().flatten()? * (1.0 - of.r2).max(0.0).sqrt())
-        };
-        names.push("unknown modelled".into());
-        values.push((0..Column::TARGETS.len()).map(rest).collect());
+    let unknown = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref());
+    let measured = |channel: usize| {
+        let name = Column::TARGETS[channel].name();
+        let one = unknown?.iter().find(|unknown| unknown.channel == name && unknown.suggested_formula.is_some())?;
+        one.tried.as_ref()?.locked_rmse
+    };
+    let with: Vec<Option<f64>> = (0..Column::TARGETS.len()).map(measured).collect();
+    if with.iter().any(Option::is_some) {
+        names.push("+ suggested formulas".into());
+        values.push(with);
         words.push(Part::Text(
-            "The last bar is an estimate: what would be left if all that measured variables still predict were modelled, \
-             RMSE √(1 − R²) with the R² of the searched flights. Channels without it showed no such dependence."
+            "The last bar is measured: each suggested formula, calibrated by itself on what was searched. Channels without a bar have none \
+             that held."
                 .into(),
         ));
     }
@@ -210,7 +224,7 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
         [Cell::from(name.clone())].into_iter().chain(cells).collect()
     });
     let table = Table {
-        caption: "The same as numbers: RMSE on flights that no search has seen".into(),
+        caption: "The same as numbers: RMSE on the part that no search has seen".into(),
         columns: channel_columns("model", false, false),
         rows: rows.collect(),
     };

@@ -124,7 +124,7 @@ impl Seen<'_> {
             provenance: &[],
         };
         let mut parts = vec![text(
-            "Flights that no search has seen. Look for where the prediction leaves the measured line for longer than a gust lasts. \
+            "The part that no search has seen. Look for where the prediction leaves the measured line for longer than a gust lasts. \
              Drag to zoom: all panels follow; double-click to go back; click a name to hide or show its line.",
         )];
         match rows.first().map(|row| stretches(report.flights, &windows, row)).transpose()?.flatten() {
