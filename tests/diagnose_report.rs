@@ -236,7 +236,14 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
     let rounds =
         [found(), Diagnosis { unknown: Some(vec![unknown]), locked: found().locked, ..diagnosis(Verdict::NotInCatalogue) }];
     let own = html(&rounds, &[], [&before, &before], 20)?;
-    for text in ["Round 2: not in the catalogue", "formula = &quot;height ^ 2&quot;", "height (89 %)", "+ suggested formulas", "0.216", "falls by 48 % [41, 55]"] {
+    for text in [
+        "Round 2: not in the catalogue",
+        "formula = &quot;height ^ 2&quot;",
+        "height (89 %)",
+        "+ suggested formulas",
+        "0.216",
+        "falls by 48 % [41, 55]",
+    ] {
         assert!(own.contains(text), "the page lacks {text}");
     }
     Ok(())
@@ -249,7 +256,8 @@ fn what_unseen_flights_deny_is_no_missing_effect_and_what_fails_there_is_not_sug
     if let Some(locked) = &mut denied.locked {
         locked.mse_fall = [("vz_dot".to_owned(), [-0.083, -0.199, -0.044])].into();
     }
-    let failed = TriedFormula { formula: "sin(8 * roll)".into(), locked_mse_fall: Some([0.02, -0.05, 0.09]), ..TriedFormula::default() };
+    let failed =
+        TriedFormula { formula: "sin(8 * roll)".into(), locked_mse_fall: Some([0.02, -0.05, 0.09]), ..TriedFormula::default() };
     denied.unknown = Some(vec![UnknownChannel {
         channel: "wx_dot".into(),
         r2: 0.4,

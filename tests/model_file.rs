@@ -106,7 +106,10 @@ fn faults_are_refused_with_line_found_and_expected() -> Result<()> {
         ("[model]\nbaseline = \"papers\"\n".into(), vec!["line 2", "did you mean `paper`?"]),
         ("[model]\nmass_kg = \"heavy\"\n".into(), vec!["`model.mass_kg` is the text \"heavy\", expected a finite number"]),
         ("[model]\nmass_kg = -1\n".into(), vec!["n9.toml", "mass_kg", "positive"]),
-        ("[model]\nname = \"heli\"\nmass_kg = 4580\n".into(), vec!["n9.toml, line 3", "0.001 to 1000 kg", "looks like grams: 4.58 kg?"]),
+        (
+            "[model]\nname = \"heli\"\nmass_kg = 4580\n".into(),
+            vec!["n9.toml, line 3", "0.001 to 1000 kg", "looks like grams: 4.58 kg?"],
+        ),
         ("[model]\nrotor_radius_m = 800\n".into(), vec!["line 2", "looks like millimetres: 0.8 m?"]),
         ("[model]\ninertia = [0.18, 0.34, 0.6]\n".into(), vec!["line 2", "about z no more than about x and y together"]),
         ("[model]\ninertia = [1, 2]\n".into(), vec!["`model.inertia`", "a list of 3 numbers"]),

@@ -3,6 +3,7 @@
 //! Takes predictions as numbers, whoever made them; which windows and which channels are worth judging is the caller's
 //! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
 
+use super::contest::{self, Best, Difference, RowSums};
 use super::regime::Regime;
 use super::shares::Shares;
 use super::uncertainty::Uncertainty;
@@ -73,13 +74,22 @@ pub struct Intervals {
     pub wy_dot: Option<[f64; 2]>,
     /// d(wz)/dt, rad/s².
     pub wz_dot: Option<[f64; 2]>,
+    /// Of the mean of the six, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<[f64; 2]>,
 }
 
 impl Intervals {
-    fn new(values: [Option<[f64; 2]>; 6]) -> Self {
+    pub(super) fn new(values: [Option<[f64; 2]>; 6]) -> Self {
         let finite = |interval: &[f64; 2]| interval.iter().all(|bound| bound.is_finite());
         let [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot] = values.map(|value| value.filter(finite));
-        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot }
+        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot, mean: None }
+    }
+
+    /// The same with an interval of the mean.
+    pub(super) fn with_mean(mut self, mean: Option<[f64; 2]>) -> Self {
+        self.mean = mean.filter(|bounds| bounds.iter().all(|bound| bound.is_finite()));
+        self
     }
 
     /// The six intervals in the order of [`Column::TARGETS`].
@@ -91,7 +101,7 @@ impl Intervals {
 /// Error over a part of the windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartError {
-    /// Root mean square error; all `None` when the part is empty.
+    /// Root mean square error; all `None` when the part has fewer than two windows: one says nothing.
     pub rmse: PerChannel,
     /// 95 % interval of the RMSE.
     pub rmse_ci95: Intervals,
@@ -122,6 +132,9 @@ pub struct ModelError {
     /// Windows with a prediction that is not finite. They make the measures of their channel `None`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub not_finite: usize,
+    /// How far its RMSE is from that of the model with the smallest mean RMSE, paired; absent for that model itself.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub difference_to_best: Option<Difference>,
     /// Every manoeuvre class that has a window.
     pub by_manoeuvre: BTreeMap<String, PartError>,
     /// Every [`Regime`] by name, also those never flown (n = 0).
@@ -137,6 +150,21 @@ pub struct Comparison {
     pub target: Targets,
     /// Where the windows come from.
     pub split: Part,
+    /// Samples from one window to the next, the same for all models.
+    #[serde(default = "one")]
+    pub stride: usize,
+    /// Blocks of ten seconds that the windows lie in: what intervals rest on.
+    #[serde(default)]
+    pub blocks: usize,
+    /// Who is best in what, where that is more than chance.
+    #[serde(default)]
+    pub best: Best,
+    /// Index of the model with the smallest mean RMSE in a manoeuvre class, where that is more than chance.
+    #[serde(default)]
+    pub best_by_manoeuvre: BTreeMap<String, usize>,
+    /// The same by regime.
+    #[serde(default)]
+    pub best_by_regime: BTreeMap<String, usize>,
     /// Who explains what, one entry a trained network; added by whoever has the network (see [`mod@super::shares`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<Shares>,
@@ -153,18 +181,55 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
     let measured = measured(flights, windows)?;
     let groups = Groups::new(flights, windows);
     let derived = windows.iter().any(|window| flights[window.flight].targets == Targets::Derived);
-    let models = rows.iter().map(|row| {
-        check_row(row, windows)?;
-        Ok(model_error(row, &measured, &groups))
-    });
-    let models = models.collect::<Result<_>>()?;
+    rows.iter().try_for_each(|row| check_row(row, windows))?;
+    let errors: Vec<Vec<[f64; 6]>> = rows.iter().map(|row| errors(row, &measured)).collect();
+    let mut models: Vec<ModelError> =
+        rows.iter().zip(&errors).map(|(row, errors)| model_error(row, errors, &measured, &groups)).collect();
+    let whole = groups.rows_of(&errors, |_| true);
+    let variances = std::array::from_fn(|channel| Some(variation(&measured, channel)? / measured.len() as f64));
+    let smallest = models.iter().enumerate().filter_map(|(index, model)| Some((index, model.rmse.mean?)));
+    if let Some((best, _)) = smallest.min_by(|left, right| left.1.total_cmp(&right.1)) {
+        let to = models[best].name.clone();
+        for (index, model) in models.iter_mut().enumerate().filter(|(index, _)| *index != best) {
+            model.difference_to_best = Some(contest::difference(&whole.0, &whole.1[index], &whole.1[best], &to));
+        }
+    }
+    let winners = |names: &mut dyn Iterator<Item = &str>, part: &[usize]| {
+        let of = |(index, name): (usize, &str)| {
+            let (counts, sums) = groups.rows_of(&errors, |window| part[window] == index);
+            Some((name.to_owned(), contest::best_mean(&counts, &sums)?))
+        };
+        names.enumerate().filter_map(of).collect::<BTreeMap<_, _>>()
+    };
     Ok(Comparison {
+        best: contest::best(&whole.0, &whole.1, &variances),
+        best_by_manoeuvre: winners(&mut groups.manoeuvres.iter().map(String::as_str), &groups.manoeuvre),
+        best_by_regime: winners(&mut Regime::ALL.iter().map(|regime| regime.name()), &groups.regime),
         models,
         target: if derived { Targets::Derived } else { Targets::Recorded },
         split,
+        stride: 1,
+        blocks: groups.blocks.len(),
         shares: Vec::new(),
         uncertainty: Vec::new(),
     })
+}
+
+/// RMSE of one model less that of another on the same windows, with paired intervals.
+///
+/// # Errors
+/// As [`compare`].
+pub fn paired(flights: &[Flight], windows: &[Window], one: &Row, other: &Row) -> Result<Difference> {
+    let measured = measured(flights, windows)?;
+    [one, other].into_iter().try_for_each(|row| check_row(row, windows))?;
+    let errors = [one, other].map(|row| errors(row, &measured));
+    let (counts, sums) = Groups::new(flights, windows).rows_of(&errors, |_| true);
+    Ok(contest::difference(&counts, &sums[0], &sums[1], &other.name))
+}
+
+/// Measured minus predicted, one entry a window.
+fn errors(row: &Row, measured: &[[f64; 6]]) -> Vec<[f64; 6]> {
+    measured.iter().zip(&row.predicted).map(|(y, p)| std::array::from_fn(|channel| y[channel] - p[channel])).collect()
 }
 
 /// The measured accelerations at the last row of each window, in the order of [`Column::TARGETS`].
@@ -223,6 +288,23 @@ impl Groups {
         Self { blocks: Blocks::new(flights, windows), manoeuvres, manoeuvre, regime }
     }
 
+    /// Windows and sums of errors of each block, over the windows that are in, for each model.
+    fn rows_of(&self, errors: &[Vec<[f64; 6]>], is_in: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<RowSums>) {
+        let mut counts = vec![0.0; self.blocks.len()];
+        let blank = || vec![[0.0; 6]; self.blocks.len()];
+        let mut rows: Vec<RowSums> = errors.iter().map(|_| RowSums { squares: blank(), sizes: blank() }).collect();
+        for (window, &block) in self.blocks.of_window.iter().enumerate().filter(|(window, _)| is_in(*window)) {
+            counts[block] += 1.0;
+            for (sums, errors) in rows.iter_mut().zip(errors) {
+                for (channel, error) in errors[window].iter().enumerate() {
+                    sums.squares[block][channel] += error * error;
+                    sums.sizes[block][channel] += error.abs();
+                }
+            }
+        }
+        (counts, rows)
+    }
+
     /// Error over each of `count` parts, `part` naming the part of each window.
     fn parts(&self, squares: &[[f64; 6]], part: impl Fn(usize) -> usize, count: usize) -> Vec<PartError> {
         let blocks = self.blocks.len();
@@ -246,17 +328,17 @@ fn part_error(blocks: &[(usize, [f64; 6])]) -> PartError {
     let means: [Option<BlockMean>; 6] = std::array::from_fn(|channel| {
         BlockMean::new(blocks.iter().map(|(n, sum)| BlockSum { samples: *n as f64, sum: sum[channel] }))
     });
+    let n: usize = blocks.iter().map(|(n, _)| n).sum();
+    let means = if n > 1 { means } else { [None; 6] };
     PartError {
         rmse: PerChannel::new(means.map(|mean| Some(mean?.mean.sqrt()))),
         rmse_ci95: Intervals::new(means.map(|mean| mean?.root_interval())),
-        n: blocks.iter().map(|(n, _)| n).sum(),
+        n,
         blocks: blocks.iter().filter(|(n, _)| *n > 0).count(),
     }
 }
 
-fn model_error(row: &Row, measured: &[[f64; 6]], groups: &Groups) -> ModelError {
-    let errors: Vec<[f64; 6]> =
-        measured.iter().zip(&row.predicted).map(|(y, p)| std::array::from_fn(|channel| y[channel] - p[channel])).collect();
+fn model_error(row: &Row, errors: &[[f64; 6]], measured: &[[f64; 6]], groups: &Groups) -> ModelError {
     let squares: Vec<[f64; 6]> = errors.iter().map(|error| error.map(|value| value * value)).collect();
     let whole = groups.parts(&squares, |_| 0, 1).pop().unwrap_or_default();
     let count = errors.len() as f64;
@@ -280,6 +362,7 @@ fn model_error(row: &Row, measured: &[[f64; 6]], groups: &Groups) -> ModelError 
             Some(1.0 - residual / variation(measured, channel)?)
         })),
         not_finite: row.predicted.iter().filter(|values| values.iter().any(|value| !value.is_finite())).count(),
+        difference_to_best: None,
         by_manoeuvre: name((groups.manoeuvres.clone(), by_manoeuvre)),
         by_regime: name((Regime::ALL.map(|regime| regime.name().to_owned()).into(), by_regime)),
     }
@@ -292,6 +375,11 @@ pub(super) fn variation(measured: &[[f64; 6]], channel: usize) -> Option<f64> {
     let total: f64 = measured.iter().map(|y| (y[channel] - mean).powi(2)).sum();
     let rounding = count * (count * f64::EPSILON * mean.abs()).powi(2);
     (total > rounding).then_some(total)
+}
+
+/// Files of earlier versions state no stride.
+const fn one() -> usize {
+    1
 }
 
 fn is_zero(count: &usize) -> bool {

@@ -2,6 +2,7 @@
 
 pub mod check;
 pub mod compare;
+pub mod contest;
 pub mod diagnose;
 pub mod locate;
 pub mod regime;
@@ -13,7 +14,8 @@ pub mod unknown;
 pub mod wrap;
 pub mod yardstick;
 
-pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare};
+pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare, paired};
+pub use contest::{Best, Difference};
 pub use regime::Regime;
 pub use shares::{Shares, shares};
 pub use uncertainty::{Uncertainty, uncertainty};

@@ -2,10 +2,13 @@
 //!
 //! Only layout; every number comes from [`Comparison`].
 
-use super::compare::{Comparison, ModelError, PerChannel};
+use super::compare::{Comparison, ModelError, PartError, PerChannel};
 use super::regime::Regime;
+use super::wrap::{WIDTH, clipped, wrapped};
+use crate::blocks::FEW_BLOCKS;
 use crate::flight::split::Part;
 use crate::flight::{Column, Targets};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Significant digits of an error measure in tables.
@@ -70,7 +73,7 @@ pub const MEASURES: [Measure; 4] = [
 ];
 
 impl Comparison {
-    /// One sentence on what is compared: number of windows, part of the data, where the targets come from.
+    /// One sentence on what is compared: number of windows, part of the data, distance between windows, where the targets come from.
     pub fn basis(&self) -> String {
         let windows = self.models.first().map_or(0, |model| model.windows);
         let target = match self.target {
@@ -82,60 +85,178 @@ impl Comparison {
             Part::Test => "the test part",
             Part::All => "all flights, those used for fitting included",
         };
-        format!("{windows} windows of {part}, against {target}")
+        let every = match self.stride {
+            0 | 1 => "every sample".to_owned(),
+            stride => format!("every {stride}{} sample", ordinal(stride)),
+        };
+        format!("{windows} windows of {part}, {every}, against {target}")
+    }
+
+    /// What so few blocks of ten seconds can say, if they are few.
+    pub fn caution(&self) -> Option<String> {
+        match self.blocks {
+            0 => None,
+            1 => Some(
+                "All windows lie in one block of ten seconds: nothing can be said of chance, so there are no intervals and no best. Give \
+                 longer flights, or lock whole flights with --lock."
+                    .into(),
+            ),
+            blocks if blocks < FEW_BLOCKS => {
+                Some(format!("The windows lie in {blocks} blocks of ten seconds: the intervals are a rough guide."))
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether a model is the best in a measure and column (`vx_dot` … `mean`), beyond chance.
+    pub fn is_best(&self, measure: &str, column: &str, model: usize) -> bool {
+        self.best.get(measure).and_then(|columns| columns.get(column)).is_some_and(|best| *best == model)
+    }
+
+    fn measure_table(&self, f: &mut fmt::Formatter<'_>, (title, words, kind, measure): Measure) -> fmt::Result {
+        let mut columns: Vec<(String, String)> =
+            Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect();
+        if kind == Kind::Share {
+            columns.iter_mut().for_each(|(_, unit)| unit.clear());
+        }
+        columns.push(("mean".to_owned(), String::new()));
+        let mut rows = Vec::new();
+        for (index, model) in self.models.iter().enumerate() {
+            let found = measure(model);
+            let values = found.channels().into_iter().chain([found.mean]);
+            let cell = |(value, (name, _)): (Option<f64>, &(String, String))| {
+                (kind.text(value), key(title).is_some_and(|key| self.is_best(key, name, index)))
+            };
+            rows.push((clipped(&model.name, NAME), values.zip(&columns).map(cell).collect()));
+            if title == "RMSE" {
+                let intervals = model.rmse_ci95.channels().into_iter().chain([None]);
+                rows.push((String::new(), intervals.map(|interval| (interval_text(interval), false)).collect()));
+            }
+        }
+        writeln!(f)?;
+        grid(f, &format!("{title}, {words}"), &columns, &rows)
+    }
+
+    /// How far each RMSE is from that of the best, paired.
+    fn difference_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(to) = self.models.iter().find_map(|model| Some(&model.difference_to_best.as_ref()?.to)) else { return Ok(()) };
+        let mut columns: Vec<(String, String)> =
+            Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect();
+        columns.push(("mean".to_owned(), String::new()));
+        let mut rows = Vec::new();
+        for (model, apart) in self.models.iter().filter_map(|model| Some((model, model.difference_to_best.as_ref()?))) {
+            let signed = |value: Option<f64>| {
+                value.map_or_else(|| "–".to_owned(), |value| format!("{}{}", plus(value), significant(value, 2)))
+            };
+            let values = apart.rmse.channels().into_iter().chain([apart.rmse.mean]);
+            rows.push((clipped(&model.name, NAME), values.map(|value| (signed(value), false)).collect()));
+            let intervals = apart.ci95.channels().into_iter().chain([apart.ci95.mean]);
+            rows.push((String::new(), intervals.map(|interval| (interval_text(interval), false)).collect()));
+        }
+        writeln!(f)?;
+        let title = format!("RMSE less that of `{}`, paired over {} blocks of ten seconds", clipped(to, NAME), self.blocks);
+        grid(f, &title, &columns, &rows)
+    }
+
+    /// Mean RMSE by manoeuvre or regime; parts with one window have no figures.
+    fn part_table(&self, f: &mut fmt::Formatter<'_>, what: &str) -> fmt::Result {
+        let Some(first) = self.models.first() else { return Ok(()) };
+        let (parts, best): (fn(&ModelError) -> &BTreeMap<String, PartError>, _) = match what {
+            "regime" => (|model| &model.by_regime, &self.best_by_regime),
+            _ => (|model| &model.by_manoeuvre, &self.best_by_manoeuvre),
+        };
+        let names: Vec<String> = match what {
+            "regime" => Regime::ALL.map(|regime| regime.name().to_owned()).into(),
+            _ => parts(first).keys().cloned().collect(),
+        };
+        let heads: Vec<String> = self.models.iter().map(|model| clipped(&model.name, NAME)).collect();
+        let shown = names.iter().filter(|name| parts(first).get(*name).is_some_and(|part| part.n > 0));
+        let rows: Vec<(String, Vec<(String, bool)>)> = shown
+            .map(|name| {
+                let of = |model: &ModelError| parts(model).get(name).copied().unwrap_or_default();
+                let count = (of(first).n.to_string(), false);
+                let errors = self.models.iter().enumerate().map(|(index, model)| {
+                    (Kind::Error.text(of(model).rmse.mean), best.get(name).is_some_and(|best| *best == index))
+                });
+                (clipped(name, NAME), [count].into_iter().chain(errors).collect())
+            })
+            .collect();
+        // Long names of many models do not fit side by side; they get numbers then.
+        let first = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0).max(8);
+        let wide: usize = 2 + first + 10 + heads.iter().map(|head| head.chars().count().max(6) + 3).sum::<usize>();
+        let numbers: Vec<String> = (1..=heads.len()).map(|number| format!("({number})")).collect();
+        let narrow = wide > WIDTH;
+        let columns = if narrow { &numbers } else { &heads }.iter().map(|head| (head.clone(), String::new()));
+        let columns: Vec<(String, String)> = [("windows".to_owned(), String::new())].into_iter().chain(columns).collect();
+        writeln!(f)?;
+        grid(f, &format!("RMSE by {what}, mean of the six channels"), &columns, &rows)?;
+        if narrow {
+            let legend: Vec<String> = numbers.iter().zip(&heads).map(|(number, head)| format!("{number} {head}")).collect();
+            writeln!(f, "{}", wrapped("  ", &legend.join(", ")))?;
+        }
+        Ok(())
     }
 }
 
+/// Widest name of a model in a table.
+const NAME: usize = 26;
+
+/// The key of [`Comparison::best`] for a measure; the largest error has none, as one window decides it.
+fn key(title: &str) -> Option<&'static str> {
+    match title {
+        "RMSE" => Some("rmse"),
+        "MAE" => Some("mae"),
+        "R²" => Some("r2"),
+        _ => None,
+    }
+}
+
+/// `0.21…0.34`; empty where there is none.
+fn interval_text(interval: Option<[f64; 2]>) -> String {
+    interval.map_or_else(String::new, |[low, high]| format!("{}…{}", significant(low, 2), significant(high, 2)))
+}
+
+fn plus(value: f64) -> &'static str {
+    if value > 0.0 { "+" } else { "" }
+}
+
+/// `nd` of 2nd.
+pub fn ordinal(number: usize) -> &'static str {
+    match (number % 100, number % 10) {
+        (11..=13, _) => "th",
+        (_, 1) => "st",
+        (_, 2) => "nd",
+        (_, 3) => "rd",
+        _ => "th",
+    }
+}
+
+/// What the marks and the second lines of a table mean.
+pub const LEGEND: &str = "* best of the column (of the row, by manoeuvre and regime), where the paired 95 % interval of its difference to every \
+                          other model lies beyond zero; below each RMSE its own 95 % interval, from blocks of ten seconds.";
+
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", self.basis())?;
-        let names: Vec<String> = self.models.iter().map(|model| model.name.clone()).collect();
-        let channels: Vec<(String, String)> =
-            Column::TARGETS.iter().map(|column| (column.name().to_owned(), column.unit().to_owned())).collect();
-        for (title, words, kind, measure) in MEASURES {
-            let mut columns = channels.clone();
-            if kind == Kind::Share {
-                columns.iter_mut().for_each(|(_, unit)| unit.clear());
+        writeln!(f, "{}", wrapped("", &self.basis()))?;
+        if let Some(caution) = self.caution() {
+            writeln!(f, "{}", wrapped("", &caution))?;
+        }
+        for (index, measure) in MEASURES.into_iter().enumerate() {
+            self.measure_table(f, measure)?;
+            if index == 0 {
+                self.difference_table(f)?;
             }
-            columns.push(("mean".to_owned(), String::new()));
-            let values = self.models.iter().map(|model| {
-                let found = measure(model);
-                found.channels().into_iter().chain([found.mean]).collect()
-            });
-            writeln!(f)?;
-            grid(f, &format!("{title}, {words}"), &columns, &names, &values.collect::<Vec<_>>(), Some(kind))?;
         }
-        let columns: Vec<(String, String)> = [("windows".to_owned(), String::new())]
-            .into_iter()
-            .chain(names.iter().map(|name| (name.clone(), String::new())))
-            .collect();
-        let Some(first) = self.models.first() else { return Ok(()) };
-        let regimes = Regime::ALL.map(|regime| regime.name().to_owned());
-        let flown = |name: &&String| first.by_regime.get(*name).is_some_and(|part| part.n > 0);
-        let parts = [
-            ("manoeuvre", first.by_manoeuvre.keys().cloned().collect::<Vec<_>>()),
-            ("regime", regimes.iter().filter(flown).cloned().collect()),
-        ];
-        for (what, names) in parts {
-            let of = |model: &ModelError, name: &String| {
-                let parts = if what == "regime" { &model.by_regime } else { &model.by_manoeuvre };
-                parts.get(name).copied().unwrap_or_default()
-            };
-            let row = |name: &String| {
-                let errors = self.models.iter().map(|model| of(model, name).rmse.mean);
-                [Some(of(first, name).n as f64)].into_iter().chain(errors).collect::<Vec<_>>()
-            };
-            writeln!(f)?;
-            let values: Vec<_> = names.iter().map(row).collect();
-            grid(f, &format!("RMSE by {what}, mean of the six channels"), &columns, &names, &values, None)?;
+        if self.models.is_empty() {
+            return Ok(());
         }
+        self.part_table(f, "manoeuvre")?;
+        self.part_table(f, "regime")?;
         if let Some(model) = self.models.iter().find(|model| model.not_finite > 0) {
             let text = "predictions are not finite numbers; its measures are left open (–) in the channels they hit";
-            writeln!(f, "\n`{}`: {} {text}", model.name, model.not_finite)?;
+            writeln!(f, "\n{}", wrapped("", &format!("`{}`: {} {text}", model.name, model.not_finite)))?;
         }
-        if self.models.len() > 1 {
-            writeln!(f, "\n* best of the column (of the row, by manoeuvre and regime)")?;
-        }
+        writeln!(f, "\n{}", wrapped("", LEGEND))?;
         self.shares.iter().try_for_each(|shares| writeln!(f, "\n{shares}"))?;
         self.uncertainty.iter().try_for_each(|uncertainty| writeln!(f, "\n{uncertainty}"))?;
         Ok(())
@@ -163,44 +284,25 @@ pub(super) fn aligned(f: &mut fmt::Formatter<'_>, heads: &[(&str, &str)], rows: 
     rows.iter().try_for_each(|(name, cells)| line(name, &mut cells.iter().map(String::as_str)))
 }
 
-/// Writes one table. With a `kind`, the best of each column is marked; without, the first column is a count and the best
-/// (smallest) of the others is marked in each row.
+/// Writes one table: rows of texts, each marked or not, under headings with units.
 fn grid(
     f: &mut fmt::Formatter<'_>,
     title: &str,
     columns: &[(String, String)],
-    names: &[String],
-    values: &[Vec<Option<f64>>],
-    kind: Option<Kind>,
+    rows: &[(String, Vec<(String, bool)>)],
 ) -> fmt::Result {
-    let mut text: Vec<Vec<String>> =
-        values.iter().map(|row| row.iter().map(|value| kind.unwrap_or(Kind::Error).text(*value)).collect()).collect();
-    let mut marks: Vec<Vec<bool>> = values.iter().map(|row| vec![false; row.len()]).collect();
-    if let Some(kind) = kind {
-        (0..columns.len()).for_each(|column| {
-            let one: Vec<Option<f64>> = values.iter().map(|row| row.get(column).copied().flatten()).collect();
-            kind.best(&one).into_iter().for_each(|row| marks[row][column] = true);
-        });
-    } else {
-        for (row, of_row) in values.iter().enumerate() {
-            Kind::Error.best(of_row.get(1..).unwrap_or_default()).into_iter().for_each(|column| marks[row][column + 1] = true);
-            if let (Some(count), Some(Some(windows))) = (text[row].first_mut(), of_row.first()) {
-                *count = format!("{windows:.0}");
-            }
-        }
-    }
     let wide = |text: &str| text.chars().count();
-    let first = names.iter().map(|name| wide(name)).max().unwrap_or(0).max(8);
+    let first = rows.iter().map(|(name, _)| wide(name)).max().unwrap_or(0).max(8);
     let width = |column: usize| {
-        let cells = text.iter().filter_map(|row| row.get(column)).map(|cell| wide(cell));
+        let cells = rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|(cell, _)| wide(cell));
         cells.chain([wide(&columns[column].0), wide(&columns[column].1)]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns.len()).map(width).collect();
-    writeln!(f, "{title}")?;
+    writeln!(f, "{}", wrapped("", title))?;
     let header = |f: &mut fmt::Formatter<'_>, pick: fn(&(String, String)) -> &str| {
         let mut line = " ".repeat(first + 2);
         for (column, width) in columns.iter().zip(&widths) {
-            line.push_str(&format!("  {:>width$} ", pick(column)));
+            line.push_str(&format!(" {:>width$} ", pick(column)));
         }
         writeln!(f, "{}", line.trim_end())
     };
@@ -208,10 +310,10 @@ fn grid(
     if columns.iter().any(|column| !column.1.is_empty()) {
         header(f, |column| &column.1)?;
     }
-    for ((name, row), marks) in names.iter().zip(&text).zip(&marks) {
+    for (name, cells) in rows.iter().filter(|(_, cells)| cells.iter().any(|(cell, _)| !cell.is_empty())) {
         let mut line = format!("  {name:<first$}");
-        for ((cell, width), mark) in row.iter().zip(&widths).zip(marks) {
-            line.push_str(&format!("  {cell:>width$}{}", if *mark { "*" } else { " " }));
+        for ((cell, mark), width) in cells.iter().zip(&widths) {
+            line.push_str(&format!(" {cell:>width$}{}", if *mark { "*" } else { " " }));
         }
         writeln!(f, "{}", line.trim_end())?;
     }
@@ -240,12 +342,54 @@ mod tests {
         let windows = every_window(&flights);
         let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![[value; 6]; windows.len()] };
         let text = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Part::All)?.to_string();
-        assert!(text.starts_with("200 windows of all flights"), "{text}");
+        assert!(text.starts_with("200 windows of all flights, those used for fitting included, every sample"), "{text}");
         assert!(text.contains("rad/s²") && text.contains("RMSE by manoeuvre") && text.contains("forward"), "{text}");
-        let rmse: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("RMSE")).skip(3).take(2).collect();
+        let rmse: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("RMSE")).skip(3).take(4).collect();
         assert!(rmse.first().is_some_and(|line| line.matches('*').count() == 7), "{text}");
-        assert!(rmse.last().is_some_and(|line| line.contains("zero") && !line.contains('*')), "{text}");
-        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        assert!(rmse.get(1).is_some_and(|line| line.matches('…').count() == 6), "an interval below each RMSE: {text}");
+        assert!(rmse.get(2).is_some_and(|line| line.contains("zero") && !line.contains('*')), "{text}");
+        assert!(text.contains("RMSE less that of `mean of the data`, paired over 10 blocks"), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        Ok(())
+    }
+
+    #[test]
+    fn a_difference_within_chance_gets_no_star_and_one_window_no_figures() -> Result<()> {
+        // Which of the two is better changes from block to block (20 samples each).
+        let flights = flights(|flight, sample, _| if (sample / 20 + flight) % 2 == 0 { 1.0 } else { -1.0 })?;
+        let windows = every_window(&flights);
+        let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![[value; 6]; windows.len()] };
+        let rows = [row("up", 0.5), row("down", -0.52)];
+        let found = compare(&flights, &windows, &rows, Part::Test)?;
+        let text = found.to_string();
+        assert!(found.best.values().all(BTreeMap::is_empty) && found.best_by_regime.is_empty(), "{found:?}");
+        assert!(!text.lines().any(|line| line.contains("0.") && line.contains('*')), "{text}");
+        // One window of class b.
+        let few: Vec<_> = windows.iter().copied().filter(|window| window.flight == 0 || window.last == 7).collect();
+        let short = |row: &Row| Row { predicted: vec![row.predicted[0]; few.len()], ..row.clone() };
+        let found = compare(&flights, &few, &[short(&rows[0]), short(&rows[1])], Part::Test)?;
+        assert_eq!(found.models[0].by_manoeuvre["b"].rmse, PerChannel::default());
+        let text = found.to_string();
+        let line = text.lines().find(|line| line.trim_start().starts_with("b "));
+        assert!(line.is_some_and(|line| line.matches('–').count() == 2), "{text}");
+        Ok(())
+    }
+
+    #[test]
+    fn many_models_with_long_names_fit_the_terminal_and_one_block_says_so() -> Result<()> {
+        let flights = flights(|_, sample, _| (sample % 7) as f64)?;
+        let windows: Vec<_> = every_window(&flights).into_iter().take(12).collect();
+        let row = |number: usize| Row {
+            name: format!("a model with a very long name, number {number}"),
+            predicted: vec![[number as f64 * 1234.5; 6]; windows.len()],
+        };
+        let rows: Vec<Row> = (1..8).map(row).collect();
+        let mut found = compare(&flights, &windows, &rows, Part::All)?;
+        found.stride = 20;
+        let text = found.to_string();
+        assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+        assert!(text.contains("every 20th sample") && text.contains("(7) a model with"), "{text}");
+        assert!(text.contains("one block of ten seconds: nothing can be said of chance"), "{text}");
         Ok(())
     }
 

@@ -77,7 +77,11 @@ const DEFINITIONS: [Definition; 9] = [
     Definition {
         kind: "rate_damping",
         meaning: "moment against the angular velocity, in proportion to it: B w, B diagonal",
-        coefficients: &[coefficient("b_x", "1/s", "roll").negative("anti-damping"), coefficient("b_y", "1/s", "pitch").negative("anti-damping"), coefficient("b_z", "1/s", "yaw").negative("anti-damping")],
+        coefficients: &[
+            coefficient("b_x", "1/s", "roll").negative("anti-damping"),
+            coefficient("b_y", "1/s", "pitch").negative("anti-damping"),
+            coefficient("b_z", "1/s", "yaw").negative("anti-damping"),
+        ],
         parameters: &[],
         terms: &[(3, Some("b_x"), "wx"), (4, Some("b_y"), "wy"), (5, Some("b_z"), "wz")],
         swaps: &[],

@@ -59,7 +59,8 @@ pub(super) fn fault(mass_kg: f64, inertia: [f64; 3], rotor_radius_m: f64) -> Opt
     if let Some(value) = inertia.into_iter().find(|value| !(*value > 0.0 && value.is_finite())) {
         return Some(Fault { field: "inertia", found: value.to_string(), expected: "positive, finite moments, kg m²".into() });
     }
-    let bounded = [("mass_kg", mass_kg, MASS_KG, "kg", "grams"), ("rotor_radius_m", rotor_radius_m, ROTOR_RADIUS_M, "m", "millimetres")];
+    let bounded =
+        [("mass_kg", mass_kg, MASS_KG, "kg", "grams"), ("rotor_radius_m", rotor_radius_m, ROTOR_RADIUS_M, "m", "millimetres")];
     for (field, value, [low, high], unit, thousandth) in bounded {
         if (low..=high).contains(&value) {
             continue;
@@ -75,15 +76,15 @@ pub(super) fn fault(mass_kg: f64, inertia: [f64; 3], rotor_radius_m: f64) -> Opt
     }
     let [ix, iy, iz] = inertia;
     let axes = [("x", ix, "y", iy, "z", iz), ("y", iy, "x", ix, "z", iz), ("z", iz, "x", ix, "y", iy)];
-    axes.into_iter().find(|(_, one, _, other, _, third)| *one > (other + third) * (1.0 + FLAT)).map(|(axis, one, b, other, c, third)| {
-        Fault {
+    axes.into_iter().find(|(_, one, _, other, _, third)| *one > (other + third) * (1.0 + FLAT)).map(
+        |(axis, one, b, other, c, third)| Fault {
             field: "inertia",
             found: format!("[{ix}, {iy}, {iz}]: the moment about {axis}, {one}, exceeds the sum of the others, {}", other + third),
             expected: format!(
                 "moments that some body can have: about {axis} no more than about {b} and {c} together (a mix-up of units or axes?)"
             ),
-        }
-    })
+        },
+    )
 }
 
 impl Model {
@@ -111,7 +112,11 @@ impl Model {
             let all = [
                 (self.assumed.mass && read.mass, format!("the mass ({} kg)", self.mass_kg), "mass_kg"),
                 (self.assumed.inertia && read.inertia, format!("the moments of inertia ({ix}, {iy}, {iz} kg m²)"), "inertia"),
-                (self.assumed.rotor_radius && read.rotor_radius, format!("the rotor radius ({} m)", self.rotor_radius_m), "rotor_radius_m"),
+                (
+                    self.assumed.rotor_radius && read.rotor_radius,
+                    format!("the rotor radius ({} m)", self.rotor_radius_m),
+                    "rotor_radius_m",
+                ),
             ];
             let told: Vec<(String, &str)> = all.into_iter().filter(|entry| entry.0).map(|(_, words, key)| (words, key)).collect();
             (!told.is_empty()).then(|| {

@@ -113,6 +113,7 @@ fn segments_figure(finished: &Finished, part: impl Fn(&Segment) -> String) -> fi
         x: number.clone(),
         y: line(method.id),
         hidden: !SHOWN.contains(&method.id),
+        markers: false,
     };
     let lines: Vec<LineData> = order.into_iter().map(data).collect();
     let panels: Vec<(String, String)> = channels().collect();
@@ -126,12 +127,14 @@ fn traces(finished: &Finished) -> Option<Section> {
     let (_, first) = traces.first()?;
     let mut order: Vec<_> = traces.iter().collect();
     order.sort_by_key(|(method, _)| rank(method));
-    let measured = LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.to_vec(), hidden: false };
+    let measured =
+        LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.to_vec(), hidden: false, markers: false };
     let predicted = order.into_iter().map(|(method, trace)| LineData {
         name: method.name.into(),
         x: trace.time_s.clone(),
         y: trace.predicted.to_vec(),
         hidden: !SHOWN.contains(&method.id),
+        markers: false,
     });
     let lines: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
     let panels: Vec<(String, String)> = channels().collect();

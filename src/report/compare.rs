@@ -3,12 +3,12 @@
 //! Arranges the numbers of [`Comparison`] and of `critique::locate` on a [`Page`]; computes none of its own but percentages.
 
 use super::figures::{self, BinnedPanel, LineData, PANELS};
-use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
-use crate::critique::compare::deviation;
+use super::page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, data_notes};
+use crate::critique::compare::{Intervals, deviation};
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
 use crate::critique::shares::bars;
-use crate::critique::table::{Kind, MEASURES, significant};
-use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty};
+use crate::critique::table::{Kind, LEGEND, MEASURES, significant};
+use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty, paired};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};
 
@@ -64,12 +64,18 @@ pub fn compare_page(report: &CompareReport<'_>) -> Result<Page> {
     }
     sections.push(Section { title: "Measured and predicted".into(), parts: traces });
     sections.push(residuals(report, row)?);
-    sections.push(Section { title: "Where these numbers come from".into(), parts: vec![Part::Table(provenance(report))] });
-    Ok(Page { title: format!("Measured against predicted: {}", model.name), summary: summary(report, model, &deviation), sections })
+    let mut parts = vec![Part::Table(provenance(report))];
+    parts.extend(data_notes(report.provenance));
+    sections.push(Section { title: "Where these numbers come from".into(), parts });
+    Ok(Page {
+        title: format!("Measured against predicted: {}", model.name),
+        summary: summary(report, model, &deviation)?,
+        sections,
+    })
 }
 
 /// The verdict in words.
-fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChannel) -> Vec<String> {
+fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChannel) -> Result<Vec<String>> {
     let channels = model.rmse.channels();
     let relative: Vec<(usize, f64)> =
         (0..6).filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?))).collect();
@@ -98,21 +104,11 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
         && index != report.focus
     {
         let [error, own] = [error, own].map(|value| significant(value, 3));
-        out.push(format!("Of the models here, {} has the smallest mean RMSE ({error}; {} {own}).", best.name, model.name));
+        let apart = model.difference_to_best.as_ref().filter(|apart| apart.to == best.name).and_then(|apart| apart.ci95.mean);
+        let doubt = if apart.is_some_and(|[low, _]| low > 0.0) { "" } else { ", a difference within its interval" };
+        out.push(format!("Of the models here, {} has the smallest mean RMSE ({error}; {} {own}{doubt}).", best.name, model.name));
     }
-    if let Some(other) =
-        report.yardstick.filter(|index| *index != report.focus).and_then(|index| report.comparison.models.get(index))
-    {
-        let wins: Vec<&str> =
-            (0..6).filter(|c| other.rmse.channels()[*c] > channels[*c] && channels[*c].is_some()).map(name).collect();
-        out.push(match wins.len() {
-            0 => format!("{} beats the yardstick “{}” in no channel.", model.name, other.name),
-            6 => format!("{} beats the yardstick “{}” in all six channels.", model.name, other.name),
-            _ => {
-                format!("{} beats the yardstick “{}” in {} of 6 channels: {}.", model.name, other.name, wins.len(), wins.join(", "))
-            }
-        });
-    }
+    out.extend(against_yardstick(report, model)?);
     out.extend(report.comparison.shares.iter().find(|shares| shares.name == model.name).and_then(Shares::sentence));
     let worst_part = |parts: &std::collections::BTreeMap<String, PartError>| {
         let score = |part: &PartError| normalised(part, deviation).into_iter().flatten().reduce(f64::max);
@@ -132,7 +128,24 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
                 .into(),
         );
     }
-    out
+    Ok(out)
+}
+
+/// In which channels the model is better than the yardstick, beyond the paired interval.
+fn against_yardstick(report: &CompareReport<'_>, model: &ModelError) -> Result<Option<String>> {
+    let Some(yardstick) = report.yardstick.filter(|index| *index != report.focus) else { return Ok(None) };
+    let (Some(own), Some(other)) = (report.rows.get(report.focus), report.rows.get(yardstick)) else { return Ok(None) };
+    let apart = paired(report.flights, report.windows, other, own)?;
+    let wins: Vec<&str> = (0..6)
+        .filter(|channel| apart.ci95.channels()[*channel].is_some_and(|[low, _]| low > 0.0))
+        .map(|channel| Column::TARGETS[channel].name())
+        .collect();
+    let beats = format!("{} beats the yardstick “{}”", model.name, other.name);
+    Ok(Some(match wins.len() {
+        0 => format!("{beats} in no channel beyond chance."),
+        6 => format!("{beats} in all six channels."),
+        count => format!("{beats} beyond chance in {count} of 6 channels: {}.", wins.join(", ")),
+    }))
 }
 
 /// RMSE over the standard deviation of the channel.
@@ -148,24 +161,55 @@ pub(super) fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(Stri
 }
 
 pub(super) fn error_tables(comparison: &Comparison) -> Vec<Part> {
+    let between = |interval: Option<[f64; 2]>| {
+        interval.map(|[low, high]| format!(" [{}, {}]", significant(low, 2), significant(high, 2))).unwrap_or_default()
+    };
     let table = |(title, words, kind, measure): (&str, &str, Kind, fn(&ModelError) -> PerChannel)| {
-        let values: Vec<Vec<Option<f64>>> = comparison.models.iter().map(|model| with_mean(&measure(model))).collect();
-        let best: Vec<Vec<usize>> = (0..7)
-            .map(|column| kind.best(&values.iter().map(|row| row.get(column).copied().flatten()).collect::<Vec<_>>()))
-            .collect();
-        let rows = comparison.models.iter().zip(&values).enumerate().map(|(row, (model, values))| {
-            let cells = values.iter().zip(&best).map(|(value, best)| Cell { text: kind.text(*value), best: best.contains(&row) });
+        let key = match title {
+            "RMSE" => "rmse",
+            "MAE" => "mae",
+            "R²" => "r2",
+            _ => "",
+        };
+        let columns = channel_columns("model", kind == Kind::Share, true);
+        let rows = comparison.models.iter().enumerate().map(|(row, model)| {
+            let intervals = if title == "RMSE" { with_mean_of(&model.rmse_ci95) } else { vec![None; 7] };
+            let cells = with_mean(&measure(model)).into_iter().zip(intervals).zip(columns.iter().skip(1));
+            let cells = cells.map(|((value, interval), (name, _))| Cell {
+                text: format!("{}{}", kind.text(value), between(interval)),
+                best: comparison.is_best(key, name, row),
+            });
             [Cell::from(model.name.clone())].into_iter().chain(cells).collect()
         });
-        Part::Table(Table {
-            caption: format!("{title}, {words}"),
-            columns: channel_columns("model", kind == Kind::Share, true),
-            rows: rows.collect(),
-        })
+        Part::Table(Table { caption: format!("{title}, {words}"), rows: rows.collect(), columns: columns.clone() })
     };
     let note =
-        "* best of the column. The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.";
-    MEASURES.into_iter().map(table).chain([Part::Text(note.into())]).collect()
+        format!("{LEGEND} The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.");
+    let mut parts: Vec<Part> = comparison.caution().map(Part::Text).into_iter().collect();
+    parts.extend(MEASURES.into_iter().map(table));
+    parts.extend(differences(comparison));
+    parts.push(Part::Text(note));
+    parts
+}
+
+/// How far each model is from the one with the smallest mean RMSE.
+fn differences(comparison: &Comparison) -> Option<Part> {
+    let apart = || comparison.models.iter().filter_map(|model| Some((model, model.difference_to_best.as_ref()?)));
+    let (_, first) = apart().next()?;
+    let rows = apart().map(|(model, apart)| {
+        let cells = with_mean(&apart.rmse).into_iter().zip(with_mean_of(&apart.ci95)).map(|(value, interval)| {
+            let interval = interval.map(|[low, high]| format!(" [{}, {}]", significant(low, 2), significant(high, 2)));
+            let sign = if value.is_some_and(|value| value > 0.0) { "+" } else { "" };
+            Cell::from(format!("{sign}{}{}", Kind::Error.text(value), interval.unwrap_or_default()))
+        });
+        [Cell::from(model.name.clone())].into_iter().chain(cells).collect()
+    });
+    let caption = format!("RMSE less that of {}, paired over {} blocks of ten seconds", first.to, comparison.blocks);
+    Some(Part::Table(Table { caption, columns: channel_columns("model", false, true), rows: rows.collect() }))
+}
+
+fn with_mean_of(intervals: &Intervals) -> Vec<Option<[f64; 2]>> {
+    intervals.channels().into_iter().chain([intervals.mean]).collect()
 }
 
 /// A bar and a table with intervals for one network.
@@ -286,7 +330,7 @@ pub(super) fn maps(model: &ModelError, deviation: &PerChannel) -> Section {
         parts.push(Part::Text(format!("Not in these windows: {}.", missing.join(", "))));
     }
     parts.push(Part::Text(
-        "Worst part first, by its worst channel. n counts windows. Intervals rest on blocks of ten seconds, as neighbouring samples are not independent; without one there is a single block.".into(),
+        "Worst part first, by its worst channel. n counts windows; one window has no figures. Intervals rest on blocks of ten seconds, as neighbouring samples are not independent; without one there is a single block.".into(),
     ));
     Section { title: "Where the error lies".into(), parts }
 }
@@ -308,28 +352,46 @@ pub(super) fn trace_figure(title: &str, report: &CompareReport<'_>, stretch: &St
         .collect();
     at.sort_unstable();
     let time = |samples: &mut dyn Iterator<Item = usize>| samples.map(|sample| flight.time_s(sample)).collect::<Vec<_>>();
+    // Samples next to each other are joined; where windows are further apart, a line between them would show what nobody predicted.
+    let gaps: Vec<usize> = at.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
+    let sparse = 2 * gaps.iter().filter(|gap| **gap > 1).count() > gaps.len();
+    let mut points: Vec<(f64, Option<usize>)> = Vec::new();
+    for (place, (sample, index)) in at.iter().enumerate() {
+        if !sparse && place > 0 && sample - at[place - 1].0 > 1 {
+            points.push((flight.time_s(at[place - 1].0 + 1), None));
+        }
+        points.push((flight.time_s(*sample), Some(*index)));
+    }
     let measured = LineData {
         name: "measured".into(),
         x: time(&mut (span.start..span.end)),
         y: Column::TARGETS.iter().map(|column| flight.column(*column)[span.start..span.end].to_vec()).collect(),
         hidden: false,
+        markers: false,
     };
     // The model in focus first, so that it has the same look on every page.
     let others = (0..report.rows.len()).filter(|index| *index != report.focus);
     let order = [report.focus].into_iter().chain(others).filter_map(|index| Some((index, report.rows.get(index)?)));
     let predicted = order.map(|(index, row)| LineData {
         name: row.name.clone(),
-        x: time(&mut at.iter().map(|(sample, _)| *sample)),
-        y: (0..6).map(|channel| at.iter().map(|(_, index)| row.predicted[*index][channel]).collect()).collect(),
+        x: points.iter().map(|(time_s, _)| *time_s).collect(),
+        // No number breaks a line.
+        y: (0..6)
+            .map(|channel| {
+                points.iter().map(|(_, window)| window.map_or(f64::NAN, |window| row.predicted[window][channel])).collect()
+            })
+            .collect(),
         hidden: report.yardstick == Some(index) && index != report.focus,
+        markers: sparse,
     });
     let caption = format!(
-        "Flight {}, manoeuvre {}, {:.1} s to {:.1} s. Normalised error {:.2} (1 is as bad as predicting the mean).",
+        "Flight {}, manoeuvre {}, {:.1} s to {:.1} s. Normalised error {:.2} (1 is as bad as predicting the mean).{}",
         flight.name,
         flight.manoeuvre,
         flight.time_s(span.start),
         flight.time_s(span.end),
-        stretch.error
+        stretch.error,
+        if sparse { " Predictions are points: only these samples were predicted." } else { "" }
     );
     let data: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
     figures::lines(title, &caption, "time, s", &channel_panels(), &data)
@@ -397,12 +459,13 @@ fn provenance(report: &CompareReport<'_>) -> Table {
     let own = [
         ("split", report.comparison.split.name().to_owned()),
         ("targets", target.to_owned()),
-        ("windows", report.windows.len().to_string()),
+        ("windows", format!("{}, {} samples from one to the next", report.windows.len(), report.comparison.stride)),
         ("flights", report.flights.len().to_string()),
         ("phyture", env!("CARGO_PKG_VERSION").to_owned()),
     ];
     let own = own.into_iter().map(|(what, value)| (what.to_owned(), value));
-    let rows = own.chain(report.provenance.iter().cloned()).map(|(what, value)| vec![what.into(), value.into()]);
+    let given = report.provenance.iter().filter(|(what, _)| what != DATA_NOTE).cloned();
+    let rows = own.chain(given).map(|(what, value)| vec![what.into(), value.into()]);
     Table {
         caption: String::new(),
         columns: vec![("what".into(), String::new()), ("value".into(), String::new())],

@@ -112,6 +112,15 @@ pub fn escape(text: &str) -> String {
     out
 }
 
+/// What a line of provenance is called that is a note of the reader on the data; pages fold these into one part.
+pub const DATA_NOTE: &str = "note on the data";
+
+/// Every note on the data, folded until it is asked for; nothing where there is none.
+pub fn data_notes(provenance: &[(String, String)]) -> Option<Part> {
+    let notes: Vec<&str> = provenance.iter().filter(|(what, _)| what == DATA_NOTE).map(|(_, note)| note.as_str()).collect();
+    (!notes.is_empty()).then(|| Part::Details(format!("Notes on the data ({})", notes.len()), notes.join("\n")))
+}
+
 /// The page as HTML, ready to be written to a file.
 pub fn page(page: &Page) -> String {
     let mut body = String::new();

@@ -40,6 +40,12 @@ pub struct Common {
     /// Overwrite what is there already
     #[arg(long, global = true)]
     pub force: bool,
+    /// Say everything: each note on the data, each effect that was tried and why it was not named
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
+    /// Say nothing but warnings and errors, on standard error; results go to the files that were asked for
+    #[arg(short, long, global = true)]
+    pub quiet: bool,
 }
 
 /// Where the flights are and how to read them.
@@ -122,7 +128,7 @@ pub enum Command {
         /// Flights.
         #[command(flatten)]
         data: Data,
-        /// Model file
+        /// Model file [default: DATA/model.toml if there is one]
         #[arg(short, long)]
         model: Option<PathBuf>,
     },
@@ -132,7 +138,7 @@ pub enum Command {
         /// Flights.
         #[command(flatten)]
         data: Data,
-        /// Model file [default: the paper's baseline]
+        /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
         #[arg(short, long)]
         model: Option<PathBuf>,
         /// Calibrated model file to write
@@ -154,10 +160,10 @@ pub enum Command {
         /// Trained network: a run folder; repeatable
         #[arg(short, long)]
         network: Vec<PathBuf>,
-        /// Folder for the HTML page
+        /// Folder for the page comparison.html
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
-        /// Samples between evaluated windows [default: 100 with a network, 1 without]
+        /// Samples between evaluated windows [default: 1, or what lets the networks take about a minute]
         #[arg(long)]
         stride: Option<usize>,
         /// Evaluate every flight, also those that were trained on
@@ -179,13 +185,13 @@ pub enum Command {
         /// Flights.
         #[command(flatten)]
         data: Data,
-        /// Model file [default: the paper's baseline]; effects that are switched off in it are tried too
+        /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]; effects switched off in it are tried too
         #[arg(short, long)]
         model: Option<PathBuf>,
         /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
         #[arg(long, value_name = "RUN")]
         of_network: Option<PathBuf>,
-        /// Folder for the HTML page
+        /// Folder for the page diagnosis.html
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
         /// Most effects to name
@@ -201,13 +207,13 @@ pub enum Command {
         /// Flights.
         #[command(flatten)]
         data: Data,
-        /// Model file [default: the paper's baseline]
+        /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
         #[arg(short, long)]
         model: Option<PathBuf>,
         /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
         #[arg(short, long)]
         output: PathBuf,
-        /// Folder for the HTML page
+        /// Folder for the page diagnosis.html
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
         /// What is searched and what only confirms.
@@ -288,7 +294,7 @@ pub enum Command {
         /// A coefficient or parameter in place of the usual one; repeatable
         #[arg(long, value_name = "NAME=VALUE", conflicts_with = "formula")]
         size: Vec<String>,
-        /// Calibrated model file [default: the paper's baseline, calibrated on the flights]
+        /// Calibrated model file [default: DATA/model.toml or the paper's baseline, calibrated on the flights]
         #[arg(short, long)]
         model: Option<PathBuf>,
     },
@@ -305,7 +311,7 @@ pub enum Command {
         /// Flights.
         #[command(flatten)]
         data: Option<Data>,
-        /// Model file [default: the paper's baseline]
+        /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
         #[arg(short, long)]
         model: Option<PathBuf>,
         /// Folder of the benchmark

@@ -5,7 +5,9 @@
 mod arguments;
 mod commands;
 mod folder;
+mod notes;
 mod output;
+mod style;
 
 use clap::Parser;
 use std::process::ExitCode;
@@ -25,10 +27,10 @@ fn main() -> ExitCode {
         Err(error) => error,
     };
     let code = if matches!(error, phyture::Error::Interrupted { .. }) {
-        eprintln!("{error}");
+        eprintln!("{}", style::for_error(&error.to_string()));
         INTERRUPTED
     } else {
-        eprintln!("error: {error}");
+        eprintln!("{}", style::for_error(&format!("error: {error}")));
         BAD_INPUT
     };
     output::failure(arguments.common.json.as_deref(), arguments.common.force, error.kind(), error.to_string(), code);

@@ -1,11 +1,14 @@
 //! How results reach people and programs: text on standard output, JSON where asked, progress on standard error.
 
+use crate::style;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use phyture::critique::wrap::wrapped;
 use phyture::disk::write_atomically;
 use phyture::{Error, Result};
 use serde::Serialize;
 use std::io::{IsTerminal, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Of the form of all machine-readable results. It grows when a program that reads them would have to change.
@@ -52,18 +55,33 @@ pub fn failure(target: Option<&Path>, force: bool, kind: &str, message: String, 
 
 /// Text for a person: on standard output, unless that carries the JSON; then on standard error.
 pub fn say(json: Option<&Path>, text: impl std::fmt::Display) {
+    let text = text.to_string();
     if json == Some(Path::new("-")) {
-        eprintln!("{text}");
+        eprintln!("{}", style::for_error(&text));
     } else {
         // A closed pipe (`phyture … | head`) is no error of the work.
-        let _ = writeln!(std::io::stdout(), "{text}");
+        let _ = writeln!(std::io::stdout(), "{}", style::for_output(&text));
     }
+}
+
+/// A warning: on standard error, whatever becomes of the rest.
+pub fn warn(text: &str) {
+    eprintln!("{}", style::for_error(&wrapped("warning: ", text)));
+}
+
+/// Whether progress is shown; `--quiet` turns it off for the whole run.
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// No progress from here on.
+pub fn be_quiet() {
+    QUIET.store(true, Ordering::Relaxed);
 }
 
 /// Progress of long work: a bar with time left on a terminal, a plain line now and then otherwise.
 pub struct Progress {
     bar: ProgressBar,
     plain: bool,
+    quiet: bool,
     begun: Instant,
     told: Instant,
     what: String,
@@ -75,7 +93,8 @@ const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
 impl Progress {
     /// A bar of `steps` steps, `done` of which are behind already.
     pub fn new(what: &str, steps: u64, done: u64) -> Self {
-        let plain = !std::io::stderr().is_terminal();
+        let quiet = QUIET.load(Ordering::Relaxed);
+        let plain = quiet || !std::io::stderr().is_terminal();
         let bar = ProgressBar::with_draw_target(
             Some(steps),
             if plain { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() },
@@ -87,7 +106,7 @@ impl Progress {
         bar.set_position(done);
         bar.reset_eta();
         let now = Instant::now();
-        Self { bar, plain, begun: now, told: now, what: what.to_owned() }
+        Self { bar, plain, quiet, begun: now, told: now, what: what.to_owned() }
     }
 
     /// Moves to `position` with a short message (loss, rate).
@@ -95,7 +114,7 @@ impl Progress {
         if !self.plain {
             self.bar.set_message(message());
             self.bar.set_position(position);
-        } else if self.told.elapsed() >= PLAIN_INTERVAL {
+        } else if !self.quiet && self.told.elapsed() >= PLAIN_INTERVAL {
             self.told = Instant::now();
             self.bar.set_position(position);
             let (length, gone) = (self.bar.length().unwrap_or(position), self.begun.elapsed().as_secs_f64());

@@ -4,9 +4,9 @@ use super::candidate::Candidate;
 use super::engine::Trial;
 use super::gates::SMALLEST_FALL;
 use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
-use super::sentences;
 use super::score::Scored;
 use super::search::{Found, Search};
+use super::sentences;
 use crate::flight::Column;
 use crate::physics::{Coefficient, Parameter};
 use std::collections::BTreeMap;
@@ -98,7 +98,8 @@ impl Search<'_> {
                     p_value: None,
                     detection_limit_mse_fall: None,
                     reason: candidate.inapplicable.clone().unwrap_or_else(|| {
-                        "these flights do not tell its regressors from those of the model, or one part of them alone carries it".into()
+                        "these flights do not tell its regressors from those of the model, or one part of them alone carries it"
+                            .into()
                     }),
                     note: None,
                 },

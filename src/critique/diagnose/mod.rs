@@ -23,8 +23,8 @@ mod rest;
 mod score;
 mod search;
 pub mod sentences;
-mod signs;
 mod significance;
+mod signs;
 mod suggest;
 mod text;
 mod textbook;
@@ -32,8 +32,8 @@ mod verdict;
 
 pub use amend::{Amended, amend, calibrated, searched};
 pub use report::{
-    CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue, Status,
-    Step, TriedFormula, UnknownChannel, Verdict,
+    CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue,
+    Status, Step, TriedFormula, UnknownChannel, Verdict,
 };
 pub use signs::number_remark;
 pub use textbook::{Named, textbook};

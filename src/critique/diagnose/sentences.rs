@@ -292,7 +292,10 @@ mod tests {
             unexplained: 0.9 * share,
             depends_on: on.iter().map(|name| (*name).to_owned()).collect(),
         };
-        let both = Failure { on: "locked".into(), channels: vec![channel("wx_dot", 0.5, &["u1"]), channel("wy_dot", 0.42, &["u2", "u1"])] };
+        let both = Failure {
+            on: "locked".into(),
+            channels: vec![channel("wx_dot", 0.5, &["u1"]), channel("wy_dot", 0.42, &["u2", "u1"])],
+        };
         assert_eq!(
             failure(&both).unwrap_or_default(),
             "Nearly all the error is in wx_dot (error 45 % of the channel's variance) and wy_dot (error 38 % of the channel's variance); it \
@@ -300,7 +303,9 @@ mod tests {
         );
         let one = Failure { on: "searched".into(), channels: vec![channel("vz_dot", 0.4, &[])] };
         let said = failure(&one).unwrap_or_default();
-        assert!(said.starts_with("The largest part of the error is in vz_dot") && said.ends_with("no measured variable tells of it."));
+        assert!(
+            said.starts_with("The largest part of the error is in vz_dot") && said.ends_with("no measured variable tells of it.")
+        );
         assert_eq!(failure(&Failure { on: String::new(), channels: Vec::new() }), None);
     }
 
@@ -308,7 +313,10 @@ mod tests {
     fn a_suggestion_is_given_with_its_measure_or_as_failed() {
         let formula = |fall| TriedFormula { formula: "u1 * abs(u1)".into(), locked_mse_fall: fall, ..TriedFormula::default() };
         let said = |fall| tried("wx_dot", &formula(fall), Kept::Flights, 251.0);
-        assert_eq!(said(Some(FALLS)), "measured on 251 s of flights that no search has seen: the mean squared error of wx_dot falls by 36 % [24, 46]");
+        assert_eq!(
+            said(Some(FALLS)),
+            "measured on 251 s of flights that no search has seen: the mean squared error of wx_dot falls by 36 % [24, 46]"
+        );
         assert!(said(Some(OPEN)).contains("does not hold") && said(Some(GROWS)).contains("grows by 8.3 %"));
         assert!(said(None).contains("not measured"));
     }
@@ -321,6 +329,9 @@ mod tests {
         assert_eq!(makes_worse("vz_dot", -0.018), "makes vz_dot worse by 1.8 %");
         assert_eq!(forbidden(&["k_tail".into()]), "fits only with the wrong sign of k_tail");
         assert!(forbidden(&[]).contains("physics forbids"));
-        assert!(too_few_blocks(1, 5.0, 30, 5.0).contains("1 block of 5 s is too few") && too_few_blocks(11, 5.0, 30, 5.0).contains("150 s"));
+        assert!(
+            too_few_blocks(1, 5.0, 30, 5.0).contains("1 block of 5 s is too few")
+                && too_few_blocks(11, 5.0, 30, 5.0).contains("150 s")
+        );
     }
 }

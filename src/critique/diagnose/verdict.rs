@@ -4,9 +4,9 @@ use super::candidate::{Candidate, candidates};
 use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, FOLDS};
+use super::failure::{Measured, failure};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
-use super::failure::{Measured, failure};
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
@@ -143,8 +143,7 @@ impl Search<'_> {
         let before = ground.before;
         let (mut found, mut left) = self.forward(before, candidates)?;
         let fitted = |found: &[Found]| found.last().map_or(before, |last| &last.model).clone();
-        let unknown_of =
-            |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
+        let unknown_of = |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
         let mut unknown = unknown_of(&fitted(&found))?;
         let stand_ins = self.stand_ins(&found, before, &unknown)?;
         if !stand_ins.is_empty() {

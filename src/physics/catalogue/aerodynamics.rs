@@ -85,7 +85,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "the tail rotor that holds the nose also pushes the aircraft sideways",
         coefficients: &[
             coefficient("k_u", "m/s²", "to starboard at full tail").within(-20.0, 20.0).usually(-3.5, -1.5),
-            coefficient("k_r", "m/s", "to starboard by yaw rate").within(-2.0, 2.0).usually(0.05, 0.4).positive("a tail rotor that its own swing speeds up"),
+            coefficient("k_r", "m/s", "to starboard by yaw rate")
+                .within(-2.0, 2.0)
+                .usually(0.05, 0.4)
+                .positive("a tail rotor that its own swing speeds up"),
         ],
         parameters: &[],
         terms: &[(1, Some("k_u"), "u3"), (1, Some("k_r"), "wz")],
@@ -103,8 +106,14 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         kind: "weathercock",
         meaning: "fin and tail rotor turn the nose into the wind of its own motion",
         coefficients: &[
-            coefficient("k_fin", "rad/m²", "fin, with speed and sideslip").within(-0.05, 0.5).usually(0.007, 0.1).positive("a fin that turns the tail into the wind"),
-            coefficient("k_tail", "rad/(m s)", "tail rotor, with side speed").within(-2.0, 10.0).usually(0.1, 1.7).positive("a tail rotor that turns the tail into the wind"),
+            coefficient("k_fin", "rad/m²", "fin, with speed and sideslip")
+                .within(-0.05, 0.5)
+                .usually(0.007, 0.1)
+                .positive("a fin that turns the tail into the wind"),
+            coefficient("k_tail", "rad/(m s)", "tail rotor, with side speed")
+                .within(-2.0, 10.0)
+                .usually(0.1, 1.7)
+                .positive("a tail rotor that turns the tail into the wind"),
         ],
         parameters: &[],
         terms: &[(5, Some("k_fin"), "airspeed * vy"), (5, Some("k_tail"), "vy")],
@@ -123,7 +132,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "the rotor blows back: side speed rolls the aircraft away, forward speed pitches it up",
         coefficients: &[
             coefficient("l_v", "rad/(m s)", "roll by side speed (dihedral)").within(-30.0, 0.0).usually(-3.0, -0.05),
-            coefficient("m_u", "rad/(m s)", "pitch by forward speed").within(-30.0, 30.0).usually(0.05, 3.0).positive("a rotor that tilts into its own speed"),
+            coefficient("m_u", "rad/(m s)", "pitch by forward speed")
+                .within(-30.0, 30.0)
+                .usually(0.05, 3.0)
+                .positive("a rotor that tilts into its own speed"),
         ],
         parameters: &[],
         terms: &[(3, Some("l_v"), "vy"), (4, Some("m_u"), "vx")],
@@ -164,7 +176,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("k_speed", "rad/(m s)", "gain of the tail stick with horizontal speed")
                 .within(-10.0, 10.0)
                 .usually(0.3, 1.5),
-            coefficient("k_rate", "1/rad", "yaw damping in proportion to the rate").within(-5.0, 1.0).usually(-0.5, -0.1).negative("anti-damping at high rate"),
+            coefficient("k_rate", "1/rad", "yaw damping in proportion to the rate")
+                .within(-5.0, 1.0)
+                .usually(-0.5, -0.1)
+                .negative("anti-damping at high rate"),
         ],
         parameters: &[],
         terms: &[(5, Some("k_speed"), "u3 * hypot(vx, vy)"), (5, Some("k_rate"), "abs(wz) * wz")],

@@ -46,7 +46,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "in forward flight the rotor meets undisturbed air, the induced velocity falls and the same collective lifts more",
         coefficients: &[
             coefficient("k", "1/s", "thrust gained by induced velocity lost").within(0.0, 10.0).usually(1.5, 4.0),
-            coefficient("k_mu", "1", "thrust gained by the advancing blade").within(-0.05, 0.1).usually(0.0, 0.01).positive("an advancing blade that lifts less"),
+            coefficient("k_mu", "1", "thrust gained by the advancing blade")
+                .within(-0.05, 0.1)
+                .usually(0.0, 0.01)
+                .positive("an advancing blade that lifts less"),
         ],
         parameters: &[parameter("induced_m_s", "m/s", "induced velocity in hover")
             .known_by(Origin::HoverInduced)
@@ -85,7 +88,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         kind: "climb_inflow",
         meaning: "how strongly climb and descent change the thrust depends on speed and on the climb itself",
         coefficients: &[
-            coefficient("k_speed", "1/s", "heave damping gained at high speed").within(-10.0, 1.0).usually(-4.0, -1.0).negative("heave damping lost with speed"),
+            coefficient("k_speed", "1/s", "heave damping gained at high speed")
+                .within(-10.0, 1.0)
+                .usually(-4.0, -1.0)
+                .negative("heave damping lost with speed"),
             coefficient("k_climb", "1/m", "heave damping in proportion to the climb").within(-1.0, 1.0).usually(-0.2, 0.2),
         ],
         parameters: &[

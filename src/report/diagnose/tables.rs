@@ -3,7 +3,7 @@
 
 use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
-use super::super::page::{Cell, Part, Table};
+use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
 use crate::critique::diagnose::sentences::tried;
 use crate::critique::diagnose::{CandidateReport, Diagnosis, Status, Step, number_remark};
@@ -330,7 +330,7 @@ pub(super) fn provenance(report: &DiagnoseReport<'_>) -> Result<Vec<Part>> {
     }
     let time: f64 = report.diagnoses.iter().map(|diagnosis| diagnosis.seconds).sum();
     add("time of the search", format!("{time:.1} s"));
-    rows.extend(report.provenance.iter().cloned());
+    rows.extend(report.provenance.iter().filter(|(what, _)| what != DATA_NOTE).cloned());
     let rows = rows.into_iter().map(|(what, value)| vec![what.into(), value.into()]).collect();
     let mut parts = vec![Part::Table(Table { caption: String::new(), columns: columns(&[("what", ""), ("value", "")]), rows })];
     let mut said: Vec<&String> = Vec::new();
@@ -340,6 +340,7 @@ pub(super) fn provenance(report: &DiagnoseReport<'_>) -> Result<Vec<Part>> {
             parts.push(Part::Text(format!("Note: {note}")));
         }
     }
+    parts.extend(data_notes(report.provenance));
     let json = match report.diagnoses {
         [one] => serde_json::to_string_pretty(one),
         many => serde_json::to_string_pretty(many),

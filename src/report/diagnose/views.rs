@@ -420,13 +420,13 @@ impl Seen<'_> {
             let x = found.first().map(|one| one.lag_s.clone()).unwrap_or_default();
             lasts.push((side.name, found.iter().map(|one| one.lasts_s).collect::<Vec<_>>()));
             let y = found.into_iter().map(|one| one.correlation).collect();
-            lasting.push(LineData { name: side.name.into(), x, y, hidden: false });
+            lasting.push(LineData { name: side.name.into(), x, y, hidden: false, markers: false });
             let found = spectrum(table)?;
             // A log axis has no place for frequency 0 and for zero density.
             let kept = |values: &[f64]| values.iter().copied().skip(1).collect::<Vec<_>>();
             let x = found.first().map(|one| kept(&one.frequency_hz)).unwrap_or_default();
             let y = found.iter().map(|one| kept(&one.density)).collect();
-            spectra.push(LineData { name: side.name.into(), x, y, hidden: false });
+            spectra.push(LineData { name: side.name.into(), x, y, hidden: false, markers: false });
         }
         let panels = channel_panels();
         let plain: Vec<(String, String)> = panels.iter().map(|(name, _)| (name.clone(), "correlation".into())).collect();

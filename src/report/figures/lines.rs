@@ -4,7 +4,7 @@ use super::grid::{Grid, axis_name, set_x, set_y};
 use super::{Figure, figure, rounded, thin};
 use crate::report::colour;
 use crate::report::page::escape;
-use plotly::common::{DashType, Line, Mode, Visible};
+use plotly::common::{DashType, Line, Marker, MarkerSymbol, Mode, Visible};
 use plotly::layout::{AxisType, HoverMode, SpikeMode, SpikeSnap, TraceOrder};
 use plotly::{Scatter, Traces};
 
@@ -19,12 +19,28 @@ pub struct LineData {
     pub y: Vec<Vec<f64>>,
     /// Whether the line is drawn only once its name in the legend is clicked.
     pub hidden: bool,
+    /// Whether points are drawn without lines between them: samples that are further apart than a line would make them look.
+    pub markers: bool,
 }
 
 /// Lines in panels with linked horizontal axes and one legend: measured against predicted. The first line is what was measured,
 /// thin and black on top of all; the second, wide, the model in focus. `panels` are (title, unit of the vertical axis).
 pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
     lines_on(AxisType::Linear, title, caption, x_title, panels, data)
+}
+
+/// Marker of the n-th line: shapes differ, not colours alone.
+fn symbol(number: usize) -> MarkerSymbol {
+    match number % 4 {
+        1 => MarkerSymbol::Circle,
+        2 => MarkerSymbol::Cross,
+        3 => MarkerSymbol::DiamondOpen,
+        _ => MarkerSymbol::SquareOpen,
+    }
+}
+
+fn colour_of(number: usize) -> &'static str {
+    if number == 0 { colour::MEASURED } else { colour::line(number - 1) }
 }
 
 /// As [`lines`], on logarithmic vertical axes.
@@ -53,7 +69,8 @@ fn lines_on(
             };
             let shown = if line.hidden { Visible::LegendOnly } else { Visible::True };
             let trace = Scatter::new(rounded(&x), rounded(&y))
-                .mode(Mode::Lines)
+                .mode(if line.markers { Mode::Markers } else { Mode::Lines })
+                .marker(Marker::new().size(if number == 1 { 6 } else { 4 }).symbol(symbol(number)).color(colour_of(number)))
                 .name(escape(&line.name))
                 .legend_group(number.to_string())
                 .show_legend(panel == 0)
@@ -110,6 +127,7 @@ mod tests {
             x: x.clone(),
             y: vec![x.clone(); 6],
             hidden: name != "measured",
+            markers: name != "measured",
         });
         let found = json(&lines("t", "c", "time, s", &panels(6), &data));
         assert_eq!(found["data"].as_array().map(Vec::len), Some(12));
@@ -118,6 +136,7 @@ mod tests {
         assert_eq!((&found["data"][5]["xaxis"], &found["data"][5]["yaxis"]), (&"x2".into(), &"y6".into()));
         assert!(found["layout"]["yaxis6"]["title"]["text"] == "m/s²" && found["layout"]["xaxis"]["title"]["text"] == "time, s");
         assert_eq!((&found["data"][0]["visible"], &found["data"][6]["visible"]), (&"legendonly".into(), &true.into()));
+        assert_eq!((&found["data"][0]["mode"], &found["data"][6]["mode"]), (&"markers".into(), &"lines".into()));
         assert_ne!(found["data"][0]["line"]["width"], found["data"][6]["line"]["width"], "lines differ by more than colour");
     }
 

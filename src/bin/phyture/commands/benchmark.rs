@@ -80,7 +80,7 @@ struct Output<'a> {
 /// Makes the runs that are not done yet.
 pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
     let begun = Instant::now();
-    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model)?);
+    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model, data)?);
     let set = context.flights(data, settings.phyture()?.history)?;
     let plan = plan(&set, data, settings, &model, wanted)?;
     let folder = Folder::create(wanted.output)?;
@@ -335,7 +335,7 @@ pub fn emit(context: &Context, output: &Path, shards: usize) -> Result<ExitCode>
     let cpus = cpus.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
     let program = program.to_string_lossy().into_owned();
     let array = JobArray { program, arguments, shards, cpus, output: output.into(), time_limit: None };
-    context.say(array.script()?.trim_end());
+    context.print(array.script()?.trim_end());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -2,6 +2,7 @@
 
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
+use phyture::critique::wrap::wrapped;
 use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet};
 use phyture::physics::{Calibration, Effect, Entry, Model, calibrate};
@@ -23,7 +24,7 @@ struct Output {
 pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, division: &Division) -> Result<ExitCode> {
     let target = context.new_file(output, model.as_slice())?;
     let set = context.flights(data, 1)?;
-    let model = context.model(model)?;
+    let model = context.model(model, data)?;
     let split = context.split(&set.flights, &model, division)?;
     let (mut calibrated, calibration, rmse) = fit(context, &set, &model, &split)?;
     calibrated.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
@@ -48,7 +49,8 @@ pub fn fit(context: &Context, set: &DataSet, model: &Model, split: &Split) -> Re
     let (calibrated, calibration) = calibrate(model, &set.flights, &split.training)?;
     context.say(format!("\n{calibration}"));
     let cautions = calibrated.effects.iter().filter(|effect| effect.enabled).filter_map(Effect::caution);
-    cautions.for_each(|caution| context.say(format!("note: {caution}")));
+    cautions.for_each(|caution| context.say(wrapped("note: ", &caution)));
+    calibrated.assumptions().iter().for_each(|text| context.say(wrapped("note: ", text)));
     let parts = [
         ("train", &split.training),
         ("validation", &split.validation),

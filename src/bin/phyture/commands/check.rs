@@ -4,14 +4,13 @@ use super::{CHECK_FAILED, Context};
 use crate::arguments::Data;
 use phyture::Result;
 use phyture::critique::check::check;
-use phyture::physics::Model;
 use std::path::Path;
 use std::process::ExitCode;
 
 /// Checks and prints; exit code 3 on a convention fault, after the report is written.
 pub fn run(context: &Context, data: &Data, model: Option<&Path>) -> Result<ExitCode> {
     let set = context.flights(data, 1)?;
-    let model = model.map(Model::read).transpose()?;
+    let model = context.model_if_any(model, data)?;
     let report = check(&set, model.as_ref());
     context.say(format!("\n{report}"));
     context.json(&report)?;

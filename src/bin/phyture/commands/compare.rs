@@ -4,19 +4,23 @@ use super::predict::read_network;
 use super::{Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::shares::{self, shares};
+use phyture::critique::table::ordinal;
 use phyture::critique::uncertainty::{Effort, uncertainty};
+use phyture::critique::wrap::wrapped;
 use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
 use phyture::disk::{Target, write_atomically};
 use phyture::flight::split::{Part, Split};
-use phyture::flight::windows::{TEST_STRIDE, windows};
+use phyture::flight::windows::windows;
 use phyture::flight::{DataSet, Span, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
+pub use phyture::report::DATA_NOTE;
 use phyture::report::{CompareReport, Page, compare_page, page};
 use phyture::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 /// What was asked for.
 pub struct Wanted<'a> {
@@ -64,8 +68,19 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
         });
     }
     let split = split?;
-    let stride = wanted.stride.unwrap_or(if networks.is_empty() { 1 } else { TEST_STRIDE });
     let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
+    let stride = match wanted.stride {
+        Some(0) => {
+            return Err(Error::Config {
+                place: "command line".into(),
+                field: "--stride".into(),
+                found: "0".into(),
+                expected: "1 (every sample) or more".into(),
+            });
+        }
+        Some(stride) => stride,
+        None => affordable(context, &set, &windows(&split.test, rows_needed, 1), &networks)?,
+    };
     let contest = Contest {
         models: &models,
         networks: &networks,
@@ -77,16 +92,75 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let result = contest.run(context, &set, &split)?;
     context.say(format!("\n{}", result.comparison));
     if let Some(target) = page {
-        let provenance = [
+        let own = [
             ("data".to_owned(), data.data.display().to_string()),
             ("SHA-256 of the data".to_owned(), data_sha256(data)?),
             ("seed".to_owned(), context.seed().to_string()),
         ];
+        let notes = set.notes.iter().map(|note| (DATA_NOTE.to_owned(), note.clone()));
+        let provenance: Vec<(String, String)> = own.into_iter().chain(notes).collect();
         write_page(&result.page(&set, &provenance)?, &target)?;
         context.say(format!("report: {}", target.path().display()));
     }
     context.json(&result.comparison)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Time that the networks together may take by default, s.
+const BUDGET_S: f64 = 60.0;
+/// A measurement of their speed takes about this long, s.
+const MEASURED_S: f64 = 0.3;
+/// Windows of the first measurement.
+const FIRST_WINDOWS: usize = 16;
+
+/// Samples from one window to the next with which all networks take at most about a minute: 1 where they can do every window.
+///
+/// Measured on a few windows, more of them until it takes long enough to be a measure; then rounded up to 1, 2 or 5 times a power of ten,
+/// so that the next run on this machine most likely has the same.
+fn affordable(context: &Context, set: &DataSet, every: &[Window], networks: &[(String, Hybrid)]) -> Result<usize> {
+    let mut seconds = 0.0;
+    for (_, hybrid) in networks {
+        let mut count = FIRST_WINDOWS;
+        loop {
+            let some = every.get(..count).unwrap_or(every);
+            let begun = Instant::now();
+            hybrid.stages(&set.flights, some, context.threads())?;
+            let gone = begun.elapsed().as_secs_f64();
+            if gone >= MEASURED_S || some.len() == every.len() {
+                seconds += gone / some.len().max(1) as f64;
+                break;
+            }
+            count *= 4;
+        }
+    }
+    let stride = round_stride(seconds * every.len() as f64 / BUDGET_S);
+    if stride > 1 {
+        let all = seconds * every.len() as f64;
+        context.say(wrapped(
+            "",
+            &format!(
+                "every {stride}{} sample is judged, the same for all rows: every sample would take the networks about {:.0} min \
+                 (`--stride 1`)",
+                ordinal(stride),
+                all / 60.0
+            ),
+        ));
+    }
+    Ok(stride)
+}
+
+/// The smallest of 1, 2, 5, 10, 20, 50 … that is no less than `wanted`.
+fn round_stride(wanted: f64) -> usize {
+    let mut power = 1;
+    loop {
+        for factor in [1, 2, 5] {
+            let stride = factor * power;
+            if stride as f64 >= wanted || stride >= 1_000_000 {
+                return stride;
+            }
+        }
+        power *= 10;
+    }
 }
 
 fn name(path: &Path) -> String {
@@ -151,6 +225,7 @@ impl Contest<'_> {
             rows.push(Row { name: name.clone(), predicted: stages.hybrid });
         }
         let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        comparison.stride = self.stride;
         comparison.shares = judged;
         for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
             let effort = Effort::for_history(hybrid.description().config.history(), context.seed());
@@ -179,4 +254,18 @@ impl Judged {
 pub fn write_page(content: &Page, target: &Target) -> Result<()> {
     let html = page(content);
     write_atomically(target.path(), |file| file.write_all(html.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::round_stride;
+
+    #[test]
+    fn strides_are_one_two_or_five_times_a_power_of_ten_and_never_too_small() {
+        for (wanted, stride) in
+            [(0.0, 1), (1.0, 1), (1.01, 2), (2.5, 5), (5.1, 10), (73.0, 100), (101.0, 200), (f64::INFINITY, 1_000_000)]
+        {
+            assert_eq!(round_stride(wanted), stride, "{wanted}");
+        }
+    }
 }

@@ -1,14 +1,16 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
-use super::compare::write_page;
+use super::compare::{DATA_NOTE, write_page};
 use super::predict::read_network;
 use super::{CHECK_FAILED, Context, data_sha256};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
-use phyture::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, calibrated, searched};
+use phyture::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, calibrated, searched, sentences};
+use phyture::critique::table::significant;
+use phyture::critique::wrap::wrapped;
 use phyture::disk::{Target, append_lines};
 use phyture::flight::split::{Part, Split};
-use phyture::flight::{DataSet, Flight, Span};
+use phyture::flight::{Column, DataSet, Flight, Span};
 use phyture::hybrid::network_target;
 use phyture::physics::{Entry, Model};
 use phyture::report::{DiagnoseReport, diagnose_page};
@@ -75,6 +77,11 @@ impl<'a> Paper<'a> {
         }
     }
 
+    /// Notes of the reader, each a line of provenance.
+    fn note(&mut self, notes: &[String]) {
+        self.provenance.extend(notes.iter().map(|note| (DATA_NOTE.to_owned(), note.clone())));
+    }
+
     /// Writes the page.
     fn write(
         &self,
@@ -108,9 +115,10 @@ fn prepare(
     data: &Data,
     model: &Model,
     division: &Division,
-    paper: Option<&Paper<'_>>,
+    paper: &mut Option<Paper<'_>>,
 ) -> Result<Option<(DataSet, Split, String)>> {
     let set = context.flights(data, 1)?;
+    paper.iter_mut().for_each(|paper| paper.note(&set.notes));
     let sha = data_sha256(data)?;
     let report = check::check(&set, Some(model));
     if report.fault {
@@ -121,7 +129,7 @@ fn prepare(
             None => finding.message.clone(),
         });
         let diagnosis = Diagnosis { notes: notes.collect(), ..convention_fault(report.summary.clone(), sha) };
-        if let Some(paper) = paper {
+        if let Some(paper) = &paper {
             let split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
             paper.write(context, std::slice::from_ref(&diagnosis), &set.flights, &split, [model, model])?;
         }
@@ -150,11 +158,11 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     let hybrid = wanted.of_network.map(read_network).transpose()?;
     let model = match (&hybrid, wanted.model) {
         (Some(hybrid), None) => hybrid.description().model.clone(),
-        (_, model) => context.model(model)?,
+        (_, model) => context.model(model, data)?,
     };
     let target = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    let paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
-    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
+    let mut paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
+    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     if let Some(hybrid) = hybrid {
@@ -179,7 +187,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
     let task = Task { set: &set, split: &split, data_sha256, options };
     let outcome = task.diagnose(&model)?;
-    context.say(format!("\n{}", outcome.diagnosis));
+    context.say(format!("\n{}", told(context, &outcome.diagnosis)));
     if let Some(paper) = paper {
         let before = calibrated(&model, &set.flights, &split)?;
         let after = if outcome.diagnosis.accepted.is_empty() { &before } else { &outcome.model };
@@ -187,6 +195,32 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
     }
     context.json(&outcome.diagnosis)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// A diagnosis as text: in short, or with every effect that was tried.
+fn told(context: &Context, diagnosis: &Diagnosis) -> String {
+    if context.is_verbose() { format!("{diagnosis:#}") } else { diagnosis.to_string() }
+}
+
+/// What the loop did to the errors that no search has seen, by channel.
+fn before_and_after(before: [f64; 6], after: [f64; 6], on: &str, added: &[&str]) -> String {
+    let row = |name: &str, cells: [String; 6]| format!("  {name:<18}{}", cells.map(|cell| format!("{cell:>10}")).concat());
+    let numbers = |values: [f64; 6]| values.map(|value| significant(value, 4));
+    let change: [String; 6] = std::array::from_fn(|channel| {
+        let percent = 100.0 * (after[channel] / before[channel] - 1.0);
+        // What rounds to nothing has no sign.
+        if percent.abs() < 0.05 { "0.0 %".into() } else { format!("{percent:+.1} %") }
+    });
+    let what = if added.is_empty() { "nothing was added".to_owned() } else { format!("added: {}", added.join(", ")) };
+    [
+        wrapped("", &format!("RMSE on {on}; {what}")),
+        row("", Column::TARGETS.map(|column| column.name().to_owned())),
+        row("", Column::TARGETS.map(|column| column.unit().to_owned())),
+        row("before", numbers(before)),
+        row("after", numbers(after)),
+        row("change", change),
+    ]
+    .join("\n")
 }
 
 /// One line of the ledger.
@@ -215,11 +249,9 @@ struct LoopOutput {
 pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
     diagnose::amend(&task.set.flights, model, task.split, &task.options, &mut |round, diagnosis| {
         diagnosis.data_sha256.clone_from(&task.data_sha256);
-        context.say(format!("\nRound {round}\n{diagnosis}"));
+        context.say(format!("\nRound {round}\n{}", told(context, diagnosis)));
         if diagnosis.is_confirmed() {
             append(ledger, round, diagnosis)?;
-        } else if !diagnosis.accepted.is_empty() {
-            context.say("\nNothing is added: flights that no search has seen do not confirm it.");
         }
         Ok(())
     })
@@ -257,26 +289,51 @@ pub fn run_loop(
 ) -> Result<ExitCode> {
     let target = context.new_file(output, model.as_slice())?;
     let page = report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    let model = context.model(model)?;
-    let paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
-    let Some((set, split, data_sha256)) = prepare(context, data, &model, division, paper.as_ref())? else {
+    let model = context.model(model, data)?;
+    let mut paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
+    let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
     let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options };
     let ledger = output.with_extension("ledger.jsonl");
-    let before = paper.as_ref().map(|_| calibrated(&model, &set.flights, &split)).transpose()?;
+    let before = calibrated(&model, &set.flights, &split)?;
     let Amended { rounds, mut model } = amend(context, &task, &model, &ledger)?;
     model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
     model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
     model.provenance.insert("seed".into(), Entry::Text(context.seed().to_string()));
     model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
     model.write(context.ready(&target)?)?;
-    context.say(format!("\nmodel written to {}, ledger {}", output.display(), ledger.display()));
-    if let (Some(paper), Some(before)) = (paper, before) {
+    let added: Vec<&str> =
+        rounds.iter().filter(|round| round.is_confirmed()).flat_map(|round| &round.accepted).map(String::as_str).collect();
+    if let Some(locked) = rounds.iter().find_map(|round| round.locked.as_ref()) {
+        let errors = |model: &Model| model.rmse(&set.flights, &split.test);
+        let on = sentences::unseen(locked.kept, locked.duration_s);
+        context.say(format!("\n{}", before_and_after(errors(&before)?, errors(&model)?, &on, &added)));
+    }
+    // There is a ledger once something was added to the model.
+    let beside = if ledger.exists() { format!(", ledger {}", ledger.display()) } else { String::new() };
+    context.say(format!("\nmodel written to {}{beside}", output.display()));
+    if let Some(paper) = paper {
         let after = if rounds.iter().any(Diagnosis::is_confirmed) { &model } else { &before };
         paper.write(context, &rounds, &set.flights, &split, [&before, after])?;
     }
     context.json(&LoopOutput { rounds, model: output.into() })?;
     Ok(ExitCode::SUCCESS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_loop_ends_with_what_it_changed() {
+        let before = [0.30, 0.30, 0.40, 1.74, 1.55, 0.68];
+        let after = [0.30, 0.30, 0.36, 0.33, 0.33, 0.70];
+        let text = before_and_after(before, after, "120 s of flights that no search has seen", &["cyclic_lag", "weathercock"]);
+        assert!(text.starts_with("RMSE on 120 s of flights that no search has seen; added: cyclic_lag, weathercock"), "{text}");
+        assert!(text.contains("-81.0 %") && text.contains("+2.9 %") && text.contains("     0.0 %"), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+        assert!(before_and_after(before, before, "x", &[]).contains("nothing was added"));
+    }
 }

@@ -59,20 +59,20 @@ fn channels(definition: &Definition) -> Vec<&'static str> {
 
 fn list(context: &Context) -> Result<ExitCode> {
     let width = definitions().map(|definition| definition.kind.len()).max().unwrap_or_default();
-    context.say(format!("{:<width$}  {:<42}  what it is", "effect", "changes"));
+    context.print(format!("{:<width$}  {:<42}  what it is", "effect", "changes"));
     for definition in definitions() {
         let aside = if definition.notes.is_some_and(|notes| !notes.searched) { " (listed only)" } else { "" };
         let channels = channels(definition).join(" ");
-        context.say(format!("{:<width$}  {channels:<42}  {}{aside}", definition.kind, definition.meaning));
+        context.print(format!("{:<width$}  {channels:<42}  {}{aside}", definition.kind, definition.meaning));
     }
-    context.say("\n`phyture effect show EFFECT` prints formulas, sizes and what it is mistaken for");
+    context.print("\n`phyture effect show EFFECT` prints formulas, sizes and what it is mistaken for");
     context.json(&json!({ "effects": definitions().map(described).collect::<Vec<_>>() }))?;
     Ok(ExitCode::SUCCESS)
 }
 
 fn show(context: &Context, id: &str) -> Result<ExitCode> {
     let definition = find(id)?;
-    context.say(text(definition));
+    context.print(text(definition));
     context.json(&described(definition))?;
     Ok(ExitCode::SUCCESS)
 }

@@ -37,8 +37,9 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
         None => {
             let whole = |(flight, log): (usize, &phyture::flight::Flight)| Span { flight, start: 0, end: log.len() };
             let spans: Vec<Span> = set.flights.iter().enumerate().map(whole).collect();
-            context.say("no model given: the paper's baseline is calibrated on these flights first");
-            calibrate(&context.model(None)?, &set.flights, &spans)?.0
+            let model = context.model(None, data)?;
+            context.say("no model given with -m: calibrated on these flights first");
+            calibrate(&model, &set.flights, &spans)?.0
         }
     };
     let effect = match (wanted.effect, wanted.formula) {

@@ -20,7 +20,8 @@ pub use benchmark::Shard;
 pub use formula::grammar;
 
 use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
-use crate::output;
+use crate::{notes, output};
+use phyture::critique::wrap::wrapped;
 use phyture::disk::{Existing, Target};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::{BENCHMARK_SEED, Split};
@@ -34,6 +35,9 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Name of the model file that lies beside flights.
+const MODEL_FILE: &str = "model.toml";
+
 /// Exit code of a check that failed.
 const CHECK_FAILED: u8 = 3;
 
@@ -41,6 +45,9 @@ const CHECK_FAILED: u8 = 3;
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let context = Context::new(&arguments.common)?;
     context.limit_threads();
+    if context.common.quiet {
+        output::be_quiet();
+    }
     match &arguments.command {
         Command::Demo { out, quick } => demo::run(&context, out, *quick),
         Command::Simulate { dir, minutes, hide, baseline, like, layout, level, noise, wind, explainable } => {
@@ -157,9 +164,26 @@ impl<'a> Context<'a> {
         Ok(path)
     }
 
-    /// Text for a person.
+    /// Text for a person; nothing with `--quiet`.
     pub fn say(&self, text: impl std::fmt::Display) {
+        if !self.common.quiet {
+            output::say(self.common.json.as_deref(), text);
+        }
+    }
+
+    /// What was asked for as text (a script, a list), also with `--quiet`.
+    pub fn print(&self, text: impl std::fmt::Display) {
         output::say(self.common.json.as_deref(), text);
+    }
+
+    /// What must not be missed, on standard error.
+    pub fn warn(&self, text: &str) {
+        output::warn(text);
+    }
+
+    /// Whether everything is to be said.
+    pub fn is_verbose(&self) -> bool {
+        self.common.verbose
     }
 
     /// The machine-readable result.
@@ -196,15 +220,57 @@ impl<'a> Context<'a> {
             set.duration_s(),
             1.0 / set.flights.first().map_or(f64::NAN, |flight| flight.step_s)
         ));
-        set.notes.iter().for_each(|note| self.say(format!("  note: {note}")));
+        let notes = if self.is_verbose() { set.notes.clone() } else { notes::folded(&set.notes) };
+        notes.iter().for_each(|note| self.say(wrapped("  note: ", note)));
         Ok(set)
     }
 
-    /// The model of a file; without one, the paper's baseline for the vehicle of the paper.
-    pub fn model(&self, path: Option<&Path>) -> Result<Model> {
-        match path {
-            Some(path) => Model::read(path),
-            None => Model::from_toml("[model]\nbaseline = \"paper\"\n", Path::new("paper")),
+    /// The model of a file; without one that of a `model.toml` beside the flights, which is said; without that the paper's baseline
+    /// for the vehicle of the paper, which is a warning, as the vehicle is a guess.
+    pub fn model(&self, path: Option<&Path>, data: &Data) -> Result<Model> {
+        if let Some(model) = self.model_if_any(path, data)? {
+            return Ok(model);
+        }
+        let model = Model::from_toml("[model]\nbaseline = \"paper\"\n", Path::new("paper"))?;
+        self.warn(&format!(
+            "no model was given and {} has no {MODEL_FILE}: the paper's baseline and vehicle are assumed ({}). For another vehicle write its \
+             mass_kg, inertia and rotor_radius_m, vehicle and baseline = \"paper\" under [model] into a file and give it with -m FILE",
+            data.data.display(),
+            model.vehicle_text()
+        ));
+        Ok(model)
+    }
+
+    /// As [`Context::model`], but nothing is assumed where there is no file.
+    pub fn model_if_any(&self, path: Option<&Path>, data: &Data) -> Result<Option<Model>> {
+        if let Some(path) = path {
+            let model = Model::read(path)?;
+            self.tell_assumed(&model, path);
+            return Ok(Some(model));
+        }
+        // Beside a single log, or in the folder itself; a folder above may hold the model of something else.
+        let folder = if data.data.is_dir() { Some(data.data.as_path()) } else { data.data.parent() };
+        let Some(found) = folder.map(|folder| folder.join(MODEL_FILE)).filter(|found| found.is_file()) else { return Ok(None) };
+        let model = Model::read(&found)?;
+        self.say(wrapped("model: ", &format!("{} (`{}`, {})", found.display(), model.name, model.vehicle_text())));
+        self.tell_assumed(&model, &found);
+        Ok(Some(model))
+    }
+
+    fn tell_assumed(&self, model: &Model, path: &Path) {
+        if !model.assumed.is_nothing() {
+            let keys = [
+                ("mass_kg", model.assumed.mass),
+                ("inertia", model.assumed.inertia),
+                ("rotor_radius_m", model.assumed.rotor_radius),
+            ];
+            let missing: Vec<&str> = keys.into_iter().filter(|entry| entry.1).map(|entry| entry.0).collect();
+            self.warn(&format!(
+                "{} does not give {}: the paper's vehicle is assumed there ({})",
+                path.display(),
+                missing.join(", "),
+                model.vehicle_text()
+            ));
         }
     }
 
