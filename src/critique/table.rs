@@ -133,6 +133,10 @@ impl Comparison {
                 rows.push((String::new(), intervals.map(|interval| (interval_text(interval), false)).collect()));
             }
         }
+        if wide(&columns, &rows) > WIDTH {
+            // Very small numbers; the intervals are in the JSON and on the page.
+            rows.retain(|(name, _)| !name.is_empty());
+        }
         writeln!(f)?;
         grid(f, &format!("{title}, {words}"), &columns, &rows)
     }
@@ -150,11 +154,19 @@ impl Comparison {
             };
             let values = apart.rmse.channels().into_iter().chain([apart.rmse.mean]);
             rows.push((clipped(&model.name, NAME), values.map(|value| (signed(value), false)).collect()));
+            // The interval is symmetric.
             let intervals = apart.ci95.channels().into_iter().chain([apart.ci95.mean]);
-            rows.push((String::new(), intervals.map(|interval| (interval_text(interval), false)).collect()));
+            let half = |interval: Option<[f64; 2]>| {
+                interval.map_or_else(String::new, |[low, high]| format!("±{}", significant(0.5 * (high - low), 2)))
+            };
+            rows.push((String::new(), intervals.map(|interval| (half(interval), false)).collect()));
         }
         writeln!(f)?;
-        let title = format!("RMSE less that of `{}`, paired over {} blocks of ten seconds", clipped(to, NAME), self.blocks);
+        let title = format!(
+            "RMSE less that of `{}`, with half of the 95 % interval, paired over {} blocks of ten seconds",
+            clipped(to, NAME),
+            self.blocks
+        );
         grid(f, &title, &columns, &rows)
     }
 
@@ -284,6 +296,17 @@ pub(super) fn aligned(f: &mut fmt::Formatter<'_>, heads: &[(&str, &str)], rows: 
     rows.iter().try_for_each(|(name, cells)| line(name, &mut cells.iter().map(String::as_str)))
 }
 
+/// Width of a table as [`grid`] writes it.
+fn wide(columns: &[(String, String)], rows: &[(String, Vec<(String, bool)>)]) -> usize {
+    let wide = |text: &str| text.chars().count();
+    let first = rows.iter().map(|(name, _)| wide(name)).max().unwrap_or(0).max(8);
+    let of = |(column, head): (usize, &(String, String))| {
+        let cells = rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|(cell, _)| wide(cell));
+        cells.chain([wide(&head.0), wide(&head.1)]).max().unwrap_or(0) + 2
+    };
+    2 + first + columns.iter().enumerate().map(of).sum::<usize>()
+}
+
 /// Writes one table: rows of texts, each marked or not, under headings with units.
 fn grid(
     f: &mut fmt::Formatter<'_>,
@@ -388,7 +411,8 @@ mod tests {
         found.stride = 20;
         let text = found.to_string();
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
-        assert!(text.contains("every 20th sample") && text.contains("(7) a model with"), "{text}");
+        let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains("every 20th sample") && words.contains("(7) a model with") && words.contains("number 7"), "{text}");
         assert!(text.contains("one block of ten seconds: nothing can be said of chance"), "{text}");
         Ok(())
     }

@@ -26,12 +26,16 @@ pub fn wrapped(first: &str, text: &str) -> String {
     lines.join("\n")
 }
 
-/// A name cut to `most` characters, the end of what is left out marked by an ellipsis.
+/// A name of at most `most` characters; of a longer one the beginning and the end, where names differ, with an ellipsis between.
 pub fn clipped(name: &str, most: usize) -> String {
-    if name.chars().count() <= most {
+    let letters: Vec<char> = name.chars().collect();
+    if letters.len() <= most {
         return name.to_owned();
     }
-    name.chars().take(most.saturating_sub(1)).chain(['…']).collect()
+    let kept = most.saturating_sub(1);
+    let (head, tail) = (kept - kept / 2, kept / 2);
+    let end = &letters[letters.len() - tail..];
+    letters[..head].iter().chain(['…'].iter()).chain(end).collect()
 }
 
 #[cfg(test)]
@@ -45,7 +49,7 @@ mod tests {
         let text = wrapped("note: ", &format!("a b {long} c"));
         assert_eq!(text, format!("note: a b\n      {long}\n      c"));
         assert_eq!(wrapped("  ", ""), "  ");
-        assert_eq!((clipped("short", 8), clipped("much too long", 8)), ("short".to_owned(), "much to…".to_owned()));
+        assert_eq!((clipped("short", 8), clipped("much too long", 8)), ("short".to_owned(), "much…ong".to_owned()));
     }
 
     proptest! {

@@ -95,14 +95,13 @@ impl std::fmt::Display for Calibration {
                 (None, None) => String::new(),
             };
             write!(f, "{effect:<20} {name:<8} {value:>12.5}   {interval:<27} {unit}")?;
-            match bounds {
-                Some([low, high]) if estimate.is_implausible() => write!(f, "   outside its physical bounds {low} to {high}")?,
-                _ => {}
-            }
             let doubt = self.signs.iter().find(|doubt| doubt.effect == *effect && doubt.name == *name);
-            match doubt.map(|doubt| doubt.finding) {
-                Some(SignFinding::Wrong) => writeln!(f, "   WRONG SIGN")?,
-                Some(SignFinding::NotDetermined) => writeln!(f, "   sign not determined")?,
+            match (bounds, doubt.map(|doubt| doubt.finding)) {
+                (Some([low, high]), _) if estimate.is_implausible() => {
+                    writeln!(f, "   outside its physical bounds {low} to {high}")?
+                }
+                (_, Some(SignFinding::Wrong)) => writeln!(f, "   WRONG SIGN")?,
+                (_, Some(SignFinding::NotDetermined)) => writeln!(f, "   sign not determined")?,
                 _ => writeln!(f)?,
             }
         }

@@ -1,0 +1,327 @@
+//! Answers that do not mislead: which model was taken, what was judged and how sure that is, what is said of effects that unseen flights
+//! deny, and that output is short where nobody asked for more.
+#![cfg(all(feature = "cli", unix))]
+
+use phyture::critique::diagnose::{Options, Status, diagnose};
+use phyture::flight::split::Split;
+use phyture::flight::{DataSet, Targets};
+use phyture::physics::{Effect, Model, SignFinding, implant};
+use phyture::sim::{INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
+use phyture::{Error, Result};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// Widest line of text.
+const WIDTH: usize = 120;
+
+fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
+    Command::new(env!("CARGO_BIN_EXE_phyture")).args(arguments).current_dir(folder).output().map_err(Error::io("phyture"))
+}
+
+/// Standard output of a run that must succeed.
+fn run(folder: &Path, arguments: &[&str]) -> Result<String> {
+    let output = phyture(folder, arguments)?;
+    assert!(output.status.success(), "{arguments:?}: {}", errors(&output));
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+fn errors(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn folder() -> Result<tempfile::TempDir> {
+    tempfile::tempdir().map_err(Error::io("temporary folder"))
+}
+
+fn json(folder: &Path, name: &str) -> Result<Value> {
+    let text = std::fs::read(folder.join(name)).map_err(Error::io(name))?;
+    serde_json::from_slice(&text).map_err(|error| Error::Undetermined(error.to_string()))
+}
+
+fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
+    std::fs::write(folder.join(name), text).map_err(Error::io(name))
+}
+
+fn read(folder: &Path, name: &str) -> Result<String> {
+    std::fs::read_to_string(folder.join(name)).map_err(Error::io(name))
+}
+
+fn fits(text: &str) {
+    let wide: Vec<&str> = text.lines().filter(|line| line.chars().count() > WIDTH).collect();
+    assert!(wide.is_empty(), "wider than {WIDTH}: {wide:#?}");
+}
+
+#[test]
+fn a_model_beside_the_flights_is_taken_and_said_and_a_guess_is_a_warning() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "3", "--seed", "7401"])?;
+    let own = "[model]\nname = \"mine\"\nmass_kg = 7.5\ninertia = [0.3, 0.5, 0.4]\nrotor_radius_m = 0.9\nbaseline = \"paper\"\n";
+    write(place.path(), "data/model.toml", own)?;
+    let said = run(place.path(), &["calibrate", "data", "-o", "out.toml"])?;
+    assert!(said.contains("model: data/model.toml (`mine`, helicopter, 7.5 kg"), "{said}");
+    assert_eq!(Model::read(place.path().join("out.toml"))?.mass_kg.to_bits(), 7.5_f64.to_bits());
+    for command in [&["check", "data"][..], &["diagnose", "data"], &["loop", "data", "-o", "loop.toml"]] {
+        let said = run(place.path(), command)?;
+        assert!(said.contains("model: data/model.toml"), "{command:?}: {said}");
+        fits(&said);
+    }
+    // The model of another folder is not taken, and with none the guess is said where it cannot be missed.
+    std::fs::rename(place.path().join("data/model.toml"), place.path().join("model.toml")).map_err(Error::io("model.toml"))?;
+    for quiet in [&[][..], &["--quiet"]] {
+        let output = phyture(place.path(), &[&["calibrate", "data", "-o", "guess.toml"], quiet].concat())?;
+        let warned = errors(&output);
+        assert!(output.status.success() && warned.starts_with("warning: no model was given"), "{warned}");
+        assert!(warned.contains("4.58 kg") && warned.contains("-m FILE"), "{warned}");
+        assert!(quiet.is_empty() || output.stdout.is_empty());
+    }
+    // A guess stays one in the file that was written, and the effects that read it are named.
+    let guess = read(place.path(), "guess.toml")?;
+    assert!(guess.contains("# mass_kg = 4.58    # assumed"), "{guess}");
+    let output = phyture(place.path(), &["calibrate", "data", "-m", "guess.toml", "-o", "again.toml"])?;
+    assert!(errors(&output).contains("does not give mass_kg, inertia, rotor_radius_m"), "{}", errors(&output));
+    let said = String::from_utf8_lossy(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("`gyroscopic` reads the moments of inertia"), "{said}");
+    Ok(())
+}
+
+#[test]
+fn a_vehicle_that_cannot_be_is_refused() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "2", "--seed", "7402"])?;
+    for (lines, parts) in [
+        ("mass_kg = 4580", ["0.001 to 1000 kg", "looks like grams: 4.58 kg?"]),
+        ("inertia = [0.18, 0.34, 0.6]", ["the moment about z, 0.6", "about x and y together"]),
+    ] {
+        write(place.path(), "odd.toml", &format!("[model]\nbaseline = \"paper\"\n{lines}\n"))?;
+        let output = phyture(place.path(), &["calibrate", "data", "-m", "odd.toml", "-o", "out.toml"])?;
+        let said = errors(&output);
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains("odd.toml, line 3") && parts.iter().all(|part| said.contains(part)), "{said}");
+    }
+    assert!(!place.path().join("out.toml").exists());
+    Ok(())
+}
+
+/// A network that learned next to nothing beside its own model: whatever differs is chance.
+#[test]
+fn a_comparison_judges_every_sample_and_gives_stars_only_beyond_chance() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "2", "--seed", "7403"])?;
+    run(place.path(), &["calibrate", "data", "-o", "model.toml"])?;
+    let config =
+        "epochs = 1\nstride = 50\n[network]\nhistory = 16\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\nmoving_average = 5\n";
+    write(place.path(), "train.toml", config)?;
+    run(place.path(), &["train", "data", "-m", "model.toml", "-o", "run", "--config", "train.toml"])?;
+    let said = run(place.path(), &["compare", "data", "-m", "model.toml", "-n", "run", "--json", "all.json", "--report", "pages"])?;
+    fits(&said);
+    let all = json(place.path(), "all.json")?;
+    assert_eq!(all["stride"], 1, "this network is quick: every sample by default");
+    assert!(said.contains("every sample") && said.contains("RMSE less that of"), "{said}");
+    // Stars in the text are those of the JSON, and each stands beyond its interval.
+    let (models, best) = (all["models"].as_array().cloned().unwrap_or_default(), &all["best"]["rmse"]);
+    let mut stars = 0;
+    for channel in ["vx_dot", "vy_dot", "vz_dot", "wx_dot", "wy_dot", "wz_dot", "mean"] {
+        let Some(index) = best[channel].as_u64() else { continue };
+        stars += 1;
+        let winner = &models[index as usize]["name"];
+        let of = |model: &Value| model["difference_to_best"]["to"] == *winner;
+        for apart in models.iter().filter(|model| of(model)).map(|model| &model["difference_to_best"]["ci95"][channel]) {
+            assert!(apart[0].as_f64().is_some_and(|low| low > 0.0), "{channel}: {apart}");
+        }
+    }
+    let rmse: Vec<&str> =
+        said.lines().skip_while(|line| !line.starts_with("RMSE, root")).take_while(|line| !line.is_empty()).collect();
+    assert_eq!(rmse.concat().matches('*').count(), stars, "{said}");
+    for part in ["by_manoeuvre", "by_regime"] {
+        let parts = models[0][part].as_object().cloned().unwrap_or_default();
+        assert!(parts.values().all(|part| part["n"].as_u64() != Some(1) || part["rmse"]["vx_dot"].is_null()), "{parts:?}");
+    }
+    // Further apart: said in text, JSON and page, where no line joins what is 0.3 s apart.
+    let pages = ["compare", "data", "-m", "model.toml", "-n", "run", "--stride", "30", "--json", "few.json", "--report", "pages"];
+    let said = run(place.path(), &pages)?;
+    let few = json(place.path(), "few.json")?;
+    assert!(said.contains("every 30th sample") && few["stride"] == 30, "{said}");
+    assert!(few["models"][0]["windows"].as_u64() < all["models"][0]["windows"].as_u64());
+    let page = read(place.path(), "pages/comparison.html")?;
+    assert!(page.contains("Predictions are points") && page.contains("\"mode\":\"markers\""));
+    run(place.path(), &["diagnose", "data", "-m", "model.toml", "--report", "pages"])?;
+    assert!(place.path().join("pages/comparison.html").exists() && place.path().join("pages/diagnosis.html").exists());
+    assert!(!place.path().join("pages/report.html").exists());
+    let output = phyture(place.path(), &["compare", "data", "-m", "model.toml", "--stride", "0"])?;
+    assert!(output.status.code() == Some(2) && errors(&output).contains("1 (every sample) or more"));
+    Ok(())
+}
+
+#[test]
+fn the_loop_ends_with_before_and_after_and_gives_each_number_once() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "10", "--seed", "7404", "--hide", "weathercock"])?;
+    let said = run(place.path(), &["loop", "data", "-o", "amended.toml", "--json", "loop.json"])?;
+    fits(&said);
+    let table: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("RMSE on ")).collect();
+    assert!(table.len() > 5 && table[0].contains("added: weathercock"), "{said}");
+    assert!(table.iter().any(|line| line.trim_start().starts_with("change") && line.matches('%').count() == 6), "{said}");
+    assert!(!said.contains("tail_lag ") && said.contains("--verbose lists them"), "candidates are counted: {said}");
+    let found = json(place.path(), "loop.json")?;
+    let amended = Model::read(place.path().join("amended.toml"))?;
+    let effect = amended.effect("weathercock").ok_or_else(|| Error::Undetermined("no weathercock".into()))?;
+    let numbers = found["rounds"][0]["steps"][0]["coefficients"].as_array().cloned().unwrap_or_default();
+    assert_eq!(numbers.len(), effect.coefficients.len());
+    for (number, coefficient) in numbers.iter().zip(&effect.coefficients) {
+        assert_eq!(number["value"].as_f64().map(f64::to_bits), Some(coefficient.value.to_bits()), "{number} {coefficient:?}");
+    }
+    let formula = found["rounds"][0]["steps"][0]["formula"].as_str().unwrap_or_default();
+    assert_eq!(formula, effect.to_string(), "the formula has the numbers that stand beside it");
+    let verbose = run(place.path(), &["diagnose", "data", "--verbose"])?;
+    fits(&verbose);
+    assert!(verbose.lines().any(|line| line.starts_with("tail_lag ")) && verbose.contains("could be chance: p "), "{verbose}");
+    Ok(())
+}
+
+/// The opposite of a fin, added to flights that have none.
+#[test]
+fn an_effect_with_the_wrong_sign_is_not_named() -> Result<()> {
+    let set = simulate(&Simulation { minutes: 12.0, seed: 7405, ..Simulation::baseline() })?;
+    let model = Model::paper("sim", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+    let search = |set: &DataSet| {
+        let split = Split::for_search(&set.flights, 1);
+        diagnose(&set.flights, &model, &split.training, &split.test, "test", &Options::default())
+    };
+    for (size, named) in [(0.04, true), (-0.04, false)] {
+        let changed = implant(&set, &model, &Effect::formula("fin", 5, "airspeed * vy", size)?)?;
+        assert!(changed.flights.iter().all(|flight| flight.targets == Targets::Recorded));
+        let found = search(&changed)?.diagnosis;
+        assert_eq!(found.accepted.iter().any(|effect| effect == "weathercock"), named, "{size}: {found:#}");
+        let report = found.candidates.iter().find(|candidate| candidate.effect == "weathercock");
+        let report = report.ok_or_else(|| Error::Undetermined("no weathercock".into()))?;
+        if named {
+            let fin = found.steps[0].coefficients.iter().find(|number| number.name == "k_fin");
+            assert_eq!(fin.and_then(|number| number.sign), Some(SignFinding::Physical), "{found}");
+        } else {
+            assert_eq!(report.status, Status::Implausible, "{found:#}");
+            assert!(report.reason.contains("wrong sign of k_fin"), "{}", report.reason);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn quiet_is_quiet_verbose_is_not_and_a_pipe_gets_no_colour() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "2", "--seed", "7406"])?;
+    // A log with a bad cell in each flight, in a column of its own.
+    for entry in walk(&place.path().join("data"))? {
+        let text = std::fs::read_to_string(&entry).map_err(Error::io(&entry))?;
+        let line = |(row, line): (usize, &str)| match row {
+            0 => format!("{line},rpm"),
+            40 => format!("{line},-1"),
+            _ => format!("{line},1500"),
+        };
+        let text: Vec<String> = text.lines().enumerate().map(line).collect();
+        std::fs::write(&entry, text.join("\n")).map_err(Error::io(&entry))?;
+    }
+    let description = "extra = [\"rpm\"]\n[[repair]]\ncolumns = [\"rpm\"]\nvalid = [\"value >= 0\"]\nmax_gap_s = 0.1\n";
+    write(place.path(), "data/dataset.toml", description)?;
+    let short = run(place.path(), &["check", "data"])?;
+    let long = run(place.path(), &["check", "data", "--verbose"])?;
+    let count = |text: &str| text.matches("bad cells interpolated").count();
+    assert!(count(&short) == 1 && short.contains("--verbose lists them by flight"), "{short}");
+    assert!(count(&long) > 3 && !long.contains("--verbose lists"), "{long}");
+    for text in [&short, &long] {
+        assert!(!text.contains('\u{1b}'), "no colour in a pipe");
+    }
+    let quiet = phyture(place.path(), &["check", "data", "--quiet", "--json", "check.json"])?;
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", errors(&quiet));
+    assert!(place.path().join("check.json").exists());
+    // The page has every note.
+    run(place.path(), &["diagnose", "data", "--quiet", "--report", "pages"])?;
+    let page = read(place.path(), "pages/diagnosis.html")?;
+    assert!(page.contains("Notes on the data (") && page.matches("bad cells interpolated").count() > 3);
+    let list = phyture(place.path(), &["effect", "list", "--quiet"])?;
+    assert!(!list.stdout.is_empty(), "what was asked for is printed all the same");
+    Ok(())
+}
+
+/// Every CSV below a folder.
+fn walk(folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(Error::io(folder))? {
+        let path = entry.map_err(Error::io(folder))?.path();
+        if path.is_dir() {
+            found.extend(walk(&path)?);
+        } else if path.extension().is_some_and(|ending| ending == "csv") {
+            found.push(path);
+        }
+    }
+    Ok(found)
+}
+
+#[test]
+fn too_little_data_is_said_in_a_sentence() -> Result<()> {
+    let place = folder()?;
+    run(place.path(), &["simulate", "data", "--minutes", "2", "--seed", "7407"])?;
+    let said = run(place.path(), &["diagnose", "data", "--json", "diagnosis.json"])?;
+    assert_eq!(json(place.path(), "diagnosis.json")?["verdict"], "too_little_data");
+    assert!(said.contains("too few to tell a missing effect from chance; 30 are needed"), "{said}");
+    fits(&said);
+    // Six seconds of one flight: one block to judge on.
+    let logs = walk(&place.path().join("data"))?;
+    let text = std::fs::read_to_string(&logs[0]).map_err(Error::io(&logs[0]))?;
+    let text: Vec<&str> = text.lines().take(601).collect();
+    write(place.path(), "short.csv", &text.join("\n"))?;
+    run(place.path(), &["calibrate", "data", "-o", "model.toml"])?;
+    let said = run(place.path(), &["compare", "short.csv", "-m", "model.toml", "--split", "first 0.5"])?;
+    assert!(said.contains("one block of ten seconds: nothing can be said of chance"), "{said}");
+    let rows = said.lines().take_while(|line| !line.starts_with("* best"));
+    assert!(rows.clone().all(|line| !line.contains('*')) && !said.contains("NaN"), "{said}");
+    let output = phyture(place.path(), &["diagnose", "short.csv", "-m", "model.toml"])?;
+    let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), errors(&output));
+    assert!(said.contains("too few to tell a missing effect from chance") || said.contains("give"), "{said}");
+    Ok(())
+}
+
+/// The flights of a Crazyflie, where they are at hand: beside the project, never in it.
+fn crazyflie() -> Option<PathBuf> {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/crazyflie");
+    if data.is_dir() {
+        return Some(data);
+    }
+    eprintln!("skipped: the Crazyflie flights are not at {}", data.display());
+    None
+}
+
+#[test]
+fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
+    let Some(data) = crazyflie() else { return Ok(()) };
+    let place = folder()?;
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie");
+    let [data, dataset, model] =
+        [data, fixtures.join("dataset.toml"), fixtures.join("model.toml")].map(|path| path.display().to_string());
+    let common = [data.as_str(), "--dataset", &dataset, "-m", &model];
+    let said = run(place.path(), &[&["calibrate"], &common[..], &["-o", "model.toml", "--json", "calibration.json"]].concat())?;
+    assert!(said.contains("WRONG SIGN") && said.contains("wrong sign (anti-damping)"), "{said}");
+    assert_eq!(said.matches("  note: ").count(), 7, "one line for 34 notes on single flights: {said}");
+    let signs = json(place.path(), "calibration.json")?["signs"].as_array().cloned().unwrap_or_default();
+    let wrong: Vec<&Value> = signs.iter().filter(|sign| sign["finding"] == "wrong").map(|sign| &sign["name"]).collect();
+    assert_eq!(wrong, ["b_x", "b_y"], "{signs:?}");
+    let told = run(place.path(), &[&["diagnose"], &common[..], &["--json", "diagnosis.json"]].concat())?;
+    fits(&told);
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    let found = json(place.path(), "diagnosis.json")?;
+    let fall = &found["locked"]["mse_fall"]["vz_dot"];
+    assert!(fall[2].as_f64().is_some_and(|high| high < 0.0), "the interval is wholly negative: {fall}");
+    assert_eq!(found["confirmation"], "contradicted");
+    assert!(told.contains("Verdict: nothing to add") && !told.contains("effects missing"), "{told}");
+    assert!(told.contains("of vz_dot grows by") && !told.contains("holds zero"), "{told}");
+    assert!(told.contains("Nearly all the error is in") && told.contains("wx_dot") && told.contains("u1"), "{told}");
+    assert!(!told.contains("usual 1.5 to 4"), "a Crazyflie is no 5 kg helicopter: {told}");
+    // What does not hold on unseen flights is not suggested, and what is suggested shows its measure.
+    for unknown in found["unknown"].as_array().into_iter().flatten() {
+        let Some(low) = unknown["tried"]["locked_mse_fall"][1].as_f64() else { continue };
+        assert_eq!(unknown["suggested_formula"].is_string(), low > 0.0, "{unknown}");
+    }
+    let tried = found["unknown"][0]["tried"]["formula"].as_str().unwrap_or_default();
+    assert!(tried == "u1 * abs(u1)" && told.contains("`u1 * abs(u1)`, does not hold on 251 s"), "{told}");
+    Ok(())
+}
