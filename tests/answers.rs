@@ -69,7 +69,7 @@ fn a_model_beside_the_flights_is_taken_and_said_and_a_guess_is_a_warning() -> Re
     // The model of another folder is not taken, and with none the guess is said where it cannot be missed.
     std::fs::rename(place.path().join("data/model.toml"), place.path().join("model.toml")).map_err(Error::io("model.toml"))?;
     for quiet in [&[][..], &["--quiet"]] {
-        let output = phyture(place.path(), &[&["calibrate", "data", "-o", "guess.toml"], quiet].concat())?;
+        let output = phyture(place.path(), &[&["calibrate", "data", "-o", "guess.toml", "--force"], quiet].concat())?;
         let warned = errors(&output);
         assert!(output.status.success() && warned.starts_with("warning: no model was given"), "{warned}");
         assert!(warned.contains("4.58 kg") && warned.contains("-m FILE"), "{warned}");
@@ -138,7 +138,7 @@ fn a_comparison_judges_every_sample_and_gives_stars_only_beyond_chance() -> Resu
         assert!(parts.values().all(|part| part["n"].as_u64() != Some(1) || part["rmse"]["vx_dot"].is_null()), "{parts:?}");
     }
     // Further apart: said in text, JSON and page, where no line joins what is 0.3 s apart.
-    let pages = ["compare", "data", "-m", "model.toml", "-n", "run", "--stride", "30", "--json", "few.json", "--report", "pages"];
+    let pages = ["compare", "data", "-m", "model.toml", "-n", "run", "--stride", "30", "--json", "few.json", "--report", "pages", "--force"];
     let said = run(place.path(), &pages)?;
     let few = json(place.path(), "few.json")?;
     assert!(said.contains("every 30th sample") && few["stride"] == 30, "{said}");
