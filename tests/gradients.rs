@@ -111,7 +111,7 @@ fn pieces_of_one_window_give_the_bits_of_the_whole() -> Result<()> {
         let run = |threads| -> Result<_> {
             let mut infer = Session::infer(network.graph(), &[network.output()], Threads(threads))?;
             infer.step(&parameters, samples, None, &fill)?;
-            let outputs: Vec<_> = (0..samples).map(|sample| bits(infer.output(0, sample))).collect();
+            let outputs = (0..samples).map(|sample| infer.output(0, sample).map(bits)).collect::<Result<Vec<_>>>()?;
             let mut train = Session::train(network.graph(), network.loss(), &[], Threads(threads))?;
             let loss = train.step(&parameters, samples, Some(KEY), &fill)?;
             Ok((outputs, loss.to_bits(), bits(train.gradients())))

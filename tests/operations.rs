@@ -24,7 +24,7 @@ fn run(op: impl Op<f64> + 'static, operands: &[(&[usize], &Values)], dy: Option<
     infer.step(&[], 1, None, &|_, inputs: &mut [&mut [f64]]| {
         inputs.iter_mut().zip(operands).for_each(|(input, (_, values))| input.copy_from_slice(values));
     })?;
-    let result = infer.output(0, 0).to_vec();
+    let result = infer.output(0, 0)?.to_vec();
     let Some(dy) = dy else { return Ok((result, Vec::new())) };
     // Half the squared error to y − dy has the gradient dy.
     let target = graph.input("target", lengths.lengths())?;
@@ -35,7 +35,8 @@ fn run(op: impl Op<f64> + 'static, operands: &[(&[usize], &Values)], dy: Option<
         let values = operands.iter().map(|(_, values)| *values).chain([&targets]);
         inputs.iter_mut().zip(values).for_each(|(input, values)| input.copy_from_slice(values));
     })?;
-    Ok((result, (0..operands.len()).map(|index| train.input_gradient(index, 0).to_vec()).collect()))
+    let gradients = (0..operands.len()).map(|index| train.input_gradient(index, 0).map(<[f64]>::to_vec));
+    Ok((result, gradients.collect::<Result<_>>()?))
 }
 
 fn close(a: f64, b: f64) -> bool {

@@ -104,7 +104,7 @@ impl Hybrid {
                     // The session's gradient is that of the mean over the chunk.
                     let factor = description.gate[channel] * chunk.len() as f64;
                     for (sample, &index) in chunk.iter().enumerate() {
-                        let gradient = session.input_gradient(1, sample);
+                        let gradient = session.input_gradient(1, sample)?;
                         for (found, change) in found.iter_mut().zip(&changes) {
                             found[index].hybrid[channel] += factor * change.through(gradient, last(sample), description);
                         }

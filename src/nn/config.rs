@@ -135,6 +135,9 @@ impl Default for PhyTureConfig {
 const MOST_LEVELS: usize = 8;
 const MOST_STACKS: usize = 16;
 
+/// Most blocks of all trees together; the paper's two trees have 14.
+const MOST_BLOCKS: usize = 512;
+
 impl PhyTureConfig {
     /// Checks each field and how they fit together.
     ///
@@ -158,6 +161,11 @@ impl PhyTureConfig {
         ];
         let reals = [("leak", self.leak, 0.0, 1.0), ("norm_eps", self.norm_eps, 0.0, 1.0), ("dropout", self.dropout, 0.0, 0.95)];
         check_ranges(&sizes, &reals)?;
+        let blocks = self.stacks * ((1 << self.levels) - 1);
+        if blocks > MOST_BLOCKS {
+            let expected = format!("fewer: stacks · (2^levels − 1) is {blocks}, at most {MOST_BLOCKS} blocks are allowed");
+            return refuse("levels", format!("{} with {} stacks", self.levels, self.stacks), expected);
+        }
         if !self.d_model.is_multiple_of(self.heads) {
             return refuse("heads", self.heads.to_string(), format!("a divisor of d_model = {}", self.d_model));
         }
@@ -207,6 +215,7 @@ mod tests {
             ("heads", PhyTureConfig { heads: 0, ..base() }),
             ("d_model", PhyTureConfig { d_model: 9, heads: 3, ..base() }),
             ("levels", PhyTureConfig { levels: 64, ..base() }),
+            ("levels", PhyTureConfig { levels: 8, stacks: 3, history: 1024, ..base() }),
             ("hidden", PhyTureConfig { hidden: f64::NAN, ..base() }),
             ("hidden", PhyTureConfig { hidden: 1e300, ..base() }),
             ("dropout", PhyTureConfig { dropout: 1.0, ..base() }),

@@ -136,9 +136,13 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
     ];
     let [state, physics, target] = inputs.map(|(name, shape)| tensor::<T>(file, name, &shape));
     let given = [state?, physics?, target?];
+    // All of them are found before memory for them is asked for: the sizes are the file's claim.
+    let of_file = network.parameters().iter().map(|parameter| {
+        Ok((parameter, tensor::<T>(file, &format!("param.{}", parameter.name), &parameter.file_lengths())?))
+    });
+    let of_file: Vec<_> = of_file.collect::<Result<_, Problem>>()?;
     let mut parameters = vec![T::ZERO; network.graph().parameter_count()];
-    for parameter in network.parameters() {
-        let numbers = tensor::<T>(file, &format!("param.{}", parameter.name), &parameter.file_lengths())?;
+    for (parameter, numbers) in of_file {
         parameter.put_file_order(numbers, &mut parameters);
     }
     let known = |name: &str| network.parameters().iter().any(|parameter| parameter.name == name);
@@ -155,11 +159,12 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
     })?;
 
     let mut compared = Compared::<T>::new();
-    let output: Vec<T> = (0..samples).flat_map(|sample| session.output(0, sample)).copied().collect();
+    let all = |of: &dyn Fn(usize) -> Result<Vec<T>>| (0..samples).map(of).collect::<Result<Vec<_>>>().map(|each| each.concat());
+    let output = all(&|sample| session.output(0, sample).map(<[T]>::to_vec))?;
     compared.insert("output".into(), (output, tensor(file, "output", &[samples, horizon, outputs])?));
     compared.insert("loss".into(), (vec![T::of(loss)], tensor(file, "loss", &[1])?));
     for (index, (name, shape)) in inputs.into_iter().take(2).enumerate() {
-        let mut gradient: Vec<T> = (0..samples).flat_map(|sample| session.input_gradient(index, sample)).copied().collect();
+        let mut gradient = all(&|sample| session.input_gradient(index, sample).map(<[T]>::to_vec))?;
         // Physics does not reach the loss of a network without physics.
         if gradient.is_empty() {
             gradient.resize(shape.iter().product(), T::ZERO);
@@ -238,11 +243,13 @@ mod tests {
                 input.copy_from_slice(&given[sample * len..][..len]);
             }
         })?;
-        let collect = |part: &dyn Fn(usize) -> Vec<f64>| (0..samples).flat_map(part).collect::<Vec<f64>>();
+        let collect = |part: &dyn Fn(usize) -> Result<Vec<f64>>| {
+            (0..samples).map(part).collect::<Result<Vec<_>>>().map(|each| each.concat())
+        };
         put("loss", &[1], vec![loss]);
-        put("output", &[samples, 1, 6], collect(&|sample| session.output(0, sample).to_vec()));
+        put("output", &[samples, 1, 6], collect(&|sample| session.output(0, sample).map(<[f64]>::to_vec))?);
         for (index, (name, shape)) in shapes.into_iter().take(2).enumerate() {
-            let mut gradient = collect(&|sample| session.input_gradient(index, sample).to_vec());
+            let mut gradient = collect(&|sample| session.input_gradient(index, sample).map(<[f64]>::to_vec))?;
             gradient.resize(shape.iter().product(), 0.0);
             put(&format!("grad.{name}"), &shape, gradient);
         }

@@ -358,10 +358,15 @@ pub fn graph(
                 for ((to, from), direction) in moved[range.clone()].iter_mut().zip(&parameters[range.clone()]).zip(&direction) {
                     *to = from + step * direction;
                 }
-                if let Err(error) = values.step(&moved, samples, dropout, fill) {
+                let mut run = || -> crate::Result<f64> {
+                    values.step(&moved, samples, dropout, fill)?;
+                    let each = (0..samples).map(|sample| values.output(0, sample).map(|loss| loss.iter().sum::<f64>()));
+                    each.sum()
+                };
+                let sum = run().unwrap_or_else(|error| {
                     failure = Some(error);
-                }
-                let sum: f64 = (0..samples).flat_map(|sample| values.output(0, sample)).sum();
+                    f64::NAN
+                });
                 vec![sum / (samples as f64 * norm)]
             });
             moved[range.clone()].copy_from_slice(&parameters[range.clone()]);

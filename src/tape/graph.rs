@@ -9,14 +9,27 @@ use super::parameter::{Parameter, Storage};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use phyture_kernels::Real;
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Largest number of inputs of one graph.
 pub const MAX_INPUTS: usize = 8;
 
-/// Handle to a value of the graph it was recorded on.
+/// Which graph a handle is of: a number that no other graph of the process has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct Var(pub(crate) usize);
+pub(crate) struct GraphId(u64);
+
+impl GraphId {
+    fn next() -> Self {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        Self(LAST.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+/// Handle to a value of the graph it was recorded on, and of its clones; any other graph refuses it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Var(pub(crate) usize, GraphId);
 
 pub(crate) enum Source<T> {
     /// Filled by the caller for each sample; `gradient` tells whether its gradient is wanted.
@@ -37,18 +50,43 @@ impl<T> Clone for Source<T> {
     }
 }
 
-#[derive(Clone)]
 pub(crate) struct Node<T> {
     pub source: Source<T>,
     pub shape: Shape,
 }
 
+impl<T> Clone for Node<T> {
+    fn clone(&self) -> Self {
+        Self { source: self.source.clone(), shape: self.shape }
+    }
+}
+
 /// A recorded computation of one sample.
-#[derive(Clone)]
+///
+/// A clone takes over the handles recorded so far. What is recorded later on either of the two is its own.
 pub struct Graph<T> {
     pub(crate) nodes: Vec<Node<T>>,
     parameters: Vec<Parameter>,
+    parameter_names: BTreeSet<String>,
     inputs: Vec<(String, Var)>,
+    id: GraphId,
+    /// Graphs it is a clone of, directly or not, each with how many of its values were recorded before.
+    origins: Vec<(GraphId, usize)>,
+}
+
+impl<T> Clone for Graph<T> {
+    fn clone(&self) -> Self {
+        let mut origins = self.origins.clone();
+        origins.push((self.id, self.nodes.len()));
+        Self {
+            nodes: self.nodes.clone(),
+            parameters: self.parameters.clone(),
+            parameter_names: self.parameter_names.clone(),
+            inputs: self.inputs.clone(),
+            id: GraphId::next(),
+            origins,
+        }
+    }
 }
 
 impl<T: Real> Default for Graph<T> {
@@ -59,8 +97,15 @@ impl<T: Real> Default for Graph<T> {
 
 impl<T: Real> Graph<T> {
     /// An empty graph.
-    pub const fn new() -> Self {
-        Self { nodes: Vec::new(), parameters: Vec::new(), inputs: Vec::new() }
+    pub fn new() -> Self {
+        Self {
+            nodes: Vec::new(),
+            parameters: Vec::new(),
+            parameter_names: BTreeSet::new(),
+            inputs: Vec::new(),
+            id: GraphId::next(),
+            origins: Vec::new(),
+        }
     }
 
     /// A value the caller fills for each sample, in the order in which inputs are recorded.
@@ -108,7 +153,7 @@ impl<T: Real> Graph<T> {
 
     fn record_parameter(&mut self, name: &str, lengths: &[usize], storage: Storage) -> Result<Var> {
         let shape = Shape::new("parameter", lengths)?;
-        if self.parameters.iter().any(|taken| taken.name == name) {
+        if !self.parameter_names.insert(name.to_owned()) {
             return Err(Error::Shape {
                 operation: "parameter",
                 message: format!("`{name}` is already recorded; names are unique"),
@@ -129,7 +174,7 @@ impl<T: Real> Graph<T> {
         let operation = op.name();
         let mut shapes = Vec::with_capacity(operands.len());
         for var in operands {
-            let Some(node) = self.nodes.get(var.0) else {
+            let Some(node) = self.node(*var) else {
                 return Err(Error::Shape {
                     operation,
                     message: "an operand belongs to another graph; record it on this one".into(),
@@ -152,12 +197,19 @@ impl<T: Real> Graph<T> {
 
     fn push(&mut self, node: Node<T>) -> Var {
         self.nodes.push(node);
-        Var(self.nodes.len() - 1)
+        Var(self.nodes.len() - 1, self.id)
+    }
+
+    /// What a handle stands for; `None` if it is of another graph.
+    pub(crate) fn node(&self, var: Var) -> Option<&Node<T>> {
+        let is_origin = |(id, recorded): &(GraphId, usize)| *id == var.1 && var.0 < *recorded;
+        let is_ours = var.1 == self.id || self.origins.iter().any(is_origin);
+        self.nodes.get(var.0).filter(|_| is_ours)
     }
 
     /// Shape of a value; the empty shape for a handle of another graph.
     pub fn shape(&self, var: Var) -> Shape {
-        self.nodes.get(var.0).map(|node| node.shape).unwrap_or_default()
+        self.node(var).map(|node| node.shape).unwrap_or_default()
     }
 
     /// All parameter tensors, in the order of the flat slab.
@@ -193,7 +245,33 @@ mod tests {
         assert!(text.contains("linear") && text.contains("[7, 3]") && text.contains("[5, 4]"), "{text}");
         assert!(graph.parameter("weight", &[1]).is_err(), "a name was taken twice");
         assert!(graph.input("x", &[1]).is_err(), "an input name was taken twice");
-        assert!(graph.apply(Add, &[x, Var(99)]).is_err(), "a handle of another graph was accepted");
+        Ok(())
+    }
+
+    #[test]
+    fn handles_of_another_graph_are_refused_whatever_their_number() -> Result<()> {
+        use super::super::{Session, Threads};
+        let record = |graph: &mut Graph<f64>| -> Result<[Var; 3]> {
+            let (x, weight) = (graph.input("x", &[7, 3])?, graph.parameter("weight", &[3, 3])?);
+            Ok([x, weight, graph.apply(Linear, &[x, weight])?])
+        };
+        let (mut ours, mut theirs) = (Graph::<f64>::new(), Graph::<f64>::new());
+        let (own, foreign) = (record(&mut ours)?, record(&mut theirs)?);
+        for foreign in foreign {
+            // The same number, and the same shape, in both.
+            let refused = ours.apply(Add, &[own[0], foreign]);
+            assert!(refused.is_err_and(|error| error.to_string().contains("belongs to another graph")));
+            assert!(ours.shape(foreign).is_empty());
+        }
+        assert!(Session::infer(&ours, &[foreign[2]], Threads(1)).is_err(), "an output of another graph");
+        assert!(Session::infer(&ours, &[own[2]], Threads(1)).is_ok());
+        // A clone knows the handles from before, and neither knows what the other records afterwards.
+        let mut clone = ours.clone();
+        let later = ours.apply(Add, &[own[2], own[0]])?;
+        let in_clone = clone.apply(Add, &[own[2], own[0]])?;
+        assert!(clone.apply(Add, &[own[2], later]).is_err() && ours.apply(Add, &[own[2], in_clone]).is_err());
+        assert!(Session::train(&clone, later, &[], Threads(1)).is_err());
+        assert!(clone.clone().apply(Add, &[own[0], in_clone]).is_ok(), "a clone's clone");
         Ok(())
     }
 

@@ -24,6 +24,10 @@ pub(crate) use large_weights::LargeWeight;
 /// Alignment of every buffer, bytes: one cache line, one 512-bit vector.
 pub(crate) const ALIGNMENT_BYTES: usize = 64;
 
+/// Most numbers that one sample may take: 4 GiB in f32, some hundred times what the paper's network takes. Sizes that come from a file
+/// meet this bound before any memory is asked for.
+pub(crate) const LARGEST_SLAB: usize = 1 << 30;
+
 /// Elements of `T` in [`ALIGNMENT_BYTES`].
 pub(crate) const fn alignment<T>() -> usize {
     let size = size_of::<T>();
@@ -113,6 +117,8 @@ pub(crate) struct Plan<T> {
     pub large_weight_scratch: usize,
     /// Parameters that no path joins to the loss: their gradient is zero.
     pub unreached: Vec<Range<usize>>,
+    /// Of the forward and of the backward list: runs of steps without a coupling but, perhaps, at their start.
+    pub stretches: [Vec<Range<usize>>; 2],
     #[cfg(test)]
     pub buffers: Vec<Buffer>,
 }
@@ -177,7 +183,8 @@ impl<T: Real> Plan<T> {
 
     /// Forward and backward from `loss`, a value of one element.
     pub fn train(graph: &Graph<T>, loss: Var, outputs: &[Var]) -> Result<Self> {
-        if graph.shape(loss).len() != 1 || graph.shape(loss).is_empty() {
+        // A handle of another graph has no shape, and is refused with the outputs.
+        if !graph.shape(loss).is_empty() && graph.shape(loss).len() != 1 {
             let message = format!("the loss has shape {}; expected [1]", graph.shape(loss));
             return Err(Error::Shape { operation: "train", message });
         }
@@ -197,7 +204,7 @@ impl<T: Real> Plan<T> {
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
         let nodes = &graph.nodes;
         for var in loss.iter().chain(outputs) {
-            if !nodes.get(var.0).is_some_and(|node| matches!(node.source, Source::Op { .. })) {
+            if !graph.node(*var).is_some_and(|node| matches!(node.source, Source::Op { .. })) {
                 let message = "a loss or output that no operation of this graph computes".into();
                 return Err(Error::Shape { operation: "plan", message });
             }
@@ -260,9 +267,15 @@ impl<T: Real> Plan<T> {
             lifetimes.used(buffer, end);
         }
         let slab_len = lifetimes.place(alignment::<T>());
+        if slab_len > LARGEST_SLAB {
+            let message = format!(
+                "one sample takes {slab_len} numbers of memory; at most {LARGEST_SLAB} are allowed: make history or width smaller"
+            );
+            return Err(Error::Shape { operation: "plan", message });
+        }
 
         // Steps, now that every place is known.
-        let parameter_range = |var: Var| match nodes[var.0].source {
+        let parameter_range = |node: usize| match nodes[node].source {
             Source::Parameter(index) => graph.parameters().get(index).map(|parameter| parameter.range()),
             _ => None,
         };
@@ -281,12 +294,12 @@ impl<T: Real> Plan<T> {
             let mut parameter_gradients = Vec::new();
             for (index, &var) in operands.iter().enumerate() {
                 if reads.is_none_or(|reads| reads.operands[index]) {
-                    match parameter_range(var) {
+                    match parameter_range(var.0) {
                         Some(range) => parameters.push((index, range)),
                         None => pieces.push(lifetimes.piece(values[var.0]?, Role::X(index))),
                     }
                 }
-                let parameter = parameter_range(var);
+                let parameter = parameter_range(var.0);
                 let wanted = backward && op.differentiable()?.reaches(index) && (parameter.is_some() || gradients[var.0].is_some());
                 if wanted {
                     let write = if std::mem::replace(&mut written[var.0], true) { Write::Add } else { Write::Set };
@@ -315,7 +328,7 @@ impl<T: Real> Plan<T> {
             let (op, shapes) = (Arc::clone(op), shapes_of(graph, operands));
             let memory: Memory = op.memory(&shapes);
             let len = if backward { memory.backward_packed } else { memory.forward_packed };
-            let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var)).filter(|_| len > 0);
+            let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var.0)).filter(|_| len > 0);
             let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
             *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
             let bundled = bundles.nodes.contains(&node);
@@ -352,8 +365,9 @@ impl<T: Real> Plan<T> {
             .filter_map(|(index, (_, var))| Some(lifetimes.piece(values[var.0]?, Role::X(index))))
             .collect();
         inputs.sort_by_key(|piece| piece.start);
-        let unreached = (0..nodes.len()).filter(|&node| !written[node]).filter_map(|node| parameter_range(Var(node))).collect();
+        let unreached = (0..nodes.len()).filter(|&node| !written[node]).filter_map(parameter_range).collect();
         Ok(Self {
+            stretches: [&forward_steps, &backward_steps].map(|steps| stretches(steps)),
             forward: forward_steps,
             backward: backward_steps,
             inputs,
@@ -375,6 +389,13 @@ impl<T: Real> Plan<T> {
             buffers: lifetimes.buffers,
         })
     }
+}
+
+fn stretches<T: Real>(steps: &[Step<T>]) -> Vec<Range<usize>> {
+    let couplings = steps.iter().enumerate().filter(|(_, step)| step.op.coupling().is_some()).map(|(index, _)| index);
+    let starts: Vec<usize> = std::iter::once(0).chain(couplings).collect();
+    let ends = starts.iter().skip(1).copied().chain([steps.len()]);
+    starts.iter().copied().zip(ends).map(|(start, end)| start..end).collect()
 }
 
 fn shapes_of<T: Real>(graph: &Graph<T>, operands: &[Var]) -> Vec<Shape> {

@@ -4,7 +4,7 @@
 //! from memory once for all of them. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
 //! gradient slab of its own; shards are summed in order. Where there are fewer samples than threads, large operations work on pieces
 //! of their rows, which have the bits of the whole. So neither the number of threads nor their timing can change a bit.
-//! In the steady state (no more samples than in an earlier call) nothing is allocated.
+//! In the steady state (no more samples than in an earlier call) nothing is allocated, in plans that couple samples neither.
 //!
 //! This file owns the memory and is the interface; what happens in a step is in `packing`, `replay` (or `lockstep`) and `shards`.
 
@@ -71,6 +71,8 @@ pub struct Session<T> {
     loaded: Vec<T>,
     shards: Vec<Shard<T>>,
     gradients: Vec<T>,
+    /// Samples of the last step. Only of these is anything handed out: the memory behind may be that of an earlier, larger step.
+    samples: usize,
     losses: Vec<f64>,
     /// By sample: outputs in order, then the gradients of the inputs that have one, then what is kept for the gradients of large weights.
     results: Vec<T>,
@@ -112,6 +114,7 @@ impl<T: Real> Session<T> {
             loaded: Vec::new(),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; shard_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
+            samples: 0,
             losses: Vec::new(),
             results: Vec::new(),
             lockstep: plan.forward.iter().any(|step| step.op.coupling().is_some()).then(Lockstep::default),
@@ -206,6 +209,10 @@ impl<T: Real> Session<T> {
             self.losses.resize(samples, 0.0);
             self.results.resize(samples * result_len, T::ZERO);
         }
+        self.samples = samples;
+        if let Some(lockstep) = &mut self.lockstep {
+            lockstep.forget();
+        }
         let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers, .. } = self;
         let (level, poison, count) = (*level, *poison, shards.len());
         let losses = &mut losses[..samples];
@@ -286,30 +293,47 @@ impl<T: Real> Session<T> {
         &self.gradients
     }
 
-    /// Loss of each sample of the last step.
+    /// Loss of each sample of the last step, and of no other.
     pub fn losses(&self) -> &[f64] {
-        &self.losses
+        &self.losses[..self.samples]
     }
 
-    /// Output `index` of a sample of the last step; empty if there is no such output or sample.
-    pub fn output(&self, index: usize, sample: usize) -> &[T] {
+    /// Output `index` of a sample of the last step.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if there is no such output, or no such sample in the last step.
+    pub fn output(&self, index: usize, sample: usize) -> Result<&[T]> {
         let before = self.plan.outputs.iter().take(index).map(ExactSizeIterator::len).sum::<usize>();
-        let len = self.plan.outputs.get(index).map_or(0, ExactSizeIterator::len);
-        self.result(sample, before, len)
+        let range = self.plan.outputs.get(index).ok_or_else(|| Error::Shape {
+            operation: "session",
+            message: format!("output {index} was asked for; it has {} (counted from 0)", self.plan.outputs.len()),
+        })?;
+        self.result(sample, before, range.len())
     }
 
     /// Gradient of the mean loss with respect to input `index` of a sample of the last step. Empty if the input was recorded
     /// without gradient, or no path joins it to the loss.
-    pub fn input_gradient(&self, index: usize, sample: usize) -> &[T] {
+    ///
+    /// # Errors
+    /// [`Error::Shape`] if there is no such input, or no such sample in the last step.
+    pub fn input_gradient(&self, index: usize, sample: usize) -> Result<&[T]> {
         let len = |range: &Option<std::ops::Range<usize>>| range.as_ref().map_or(0, ExactSizeIterator::len);
         let outputs = self.plan.outputs.iter().map(ExactSizeIterator::len).sum::<usize>();
         let before = outputs + self.plan.input_gradients.iter().take(index).map(len).sum::<usize>();
-        self.result(sample, before, self.plan.input_gradients.get(index).map_or(0, len))
+        let own = self.plan.input_gradients.get(index).ok_or_else(|| Error::Shape {
+            operation: "session",
+            message: format!("the gradient of input {index} was asked for; there are {} inputs", self.plan.input_gradients.len()),
+        })?;
+        self.result(sample, before, len(own))
     }
 
-    fn result(&self, sample: usize, start: usize, len: usize) -> &[T] {
+    fn result(&self, sample: usize, start: usize, len: usize) -> Result<&[T]> {
+        if sample >= self.samples {
+            let message = format!("sample {sample} was asked for; the last step had {} (counted from 0)", self.samples);
+            return Err(Error::Shape { operation: "session", message });
+        }
         let start = sample * self.result_len() + start;
-        self.results.get(start..start + len).unwrap_or_default()
+        Ok(&self.results[start..start + len])
     }
 
     fn result_len(&self) -> usize {
@@ -360,6 +384,31 @@ mod tests {
         values.iter().map(|value| value.to_bits()).collect()
     }
 
+    fn all<'a>(samples: usize, of: impl Fn(usize) -> Result<&'a [f32]>) -> Result<Vec<u32>> {
+        let each = (0..samples).map(|sample| of(sample).map(bits)).collect::<Result<Vec<_>>>()?;
+        Ok(each.concat())
+    }
+
+    #[test]
+    fn a_smaller_step_shows_nothing_of_a_larger_one_before() -> Result<()> {
+        let (graph, loss, output) = shared_weight::<f32>()?;
+        let parameters = parameters(graph.parameter_count());
+        let mut session = Session::train(&graph, loss, &[output], Threads(1))?;
+        assert!(session.losses().is_empty() && session.output(0, 0).is_err(), "before the first step");
+        session.step(&parameters, 32, None, &fill)?;
+        assert!(session.losses().len() == 32 && session.output(0, 31).is_ok());
+        session.step(&parameters, 4, None, &fill)?;
+        assert_eq!(session.losses().len(), 4);
+        assert!(session.output(0, 3).is_ok() && session.input_gradient(0, 3).is_ok());
+        for sample in [4, 31, 32, usize::MAX] {
+            for refused in [session.output(0, sample), session.input_gradient(0, sample)] {
+                assert!(refused.is_err_and(|error| error.to_string().contains("the last step had 4")), "{sample}");
+            }
+        }
+        assert!(session.output(1, 0).is_err() && session.input_gradient(2, 0).is_err(), "no such output or input");
+        Ok(())
+    }
+
     #[test]
     fn any_number_of_threads_gives_the_same_bits() -> Result<()> {
         let (graph, loss, output) = shared_weight::<f32>()?;
@@ -370,9 +419,9 @@ mod tests {
             for threads in [1, 2, 16] {
                 let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
                 let loss = session.step(&parameters, samples, KEY, &fill)?;
-                let outputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.output(0, sample))).collect();
-                let inputs: Vec<u32> = (0..samples).flat_map(|sample| bits(session.input_gradient(0, sample))).collect();
-                assert!(session.input_gradient(1, 0).is_empty(), "a target has no gradient");
+                let outputs: Vec<u32> = all(samples, |sample| session.output(0, sample))?;
+                let inputs: Vec<u32> = all(samples, |sample| session.input_gradient(0, sample))?;
+                assert!(session.input_gradient(1, 0)?.is_empty(), "a target has no gradient");
                 found.push((loss.to_bits(), bits(session.gradients()), outputs, inputs));
             }
             assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
@@ -433,9 +482,9 @@ mod tests {
         let mut sums = vec![0.0; graph.parameter_count()];
         for sample in 0..samples {
             alone.step(&parameters, 1, None, &|_, inputs: &mut [&mut [f64]]| fill(sample, inputs))?;
-            assert_eq!(session.output(0, sample), alone.output(0, 0));
-            let scaled: Vec<f64> = alone.input_gradient(0, 0).iter().map(|value| value / samples as f64).collect();
-            assert_eq!(session.input_gradient(0, sample), scaled);
+            assert_eq!(session.output(0, sample)?, alone.output(0, 0)?);
+            let scaled: Vec<f64> = alone.input_gradient(0, 0)?.iter().map(|value| value / samples as f64).collect();
+            assert_eq!(session.input_gradient(0, sample)?, scaled);
             sums.iter_mut().zip(alone.gradients()).for_each(|(sum, value)| *sum += value / samples as f64);
         }
         let largest = sums.iter().fold(0.0_f64, |largest, sum| largest.max(sum.abs()));
@@ -454,7 +503,7 @@ mod tests {
             for threads in [1, 2, 5] {
                 let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
                 let loss = session.step(&parameters, samples, KEY, &fill)?;
-                found.push((loss.to_bits(), bits(session.gradients()), bits(session.output(0, samples - 1))));
+                found.push((loss.to_bits(), bits(session.gradients()), bits(session.output(0, samples - 1)?)));
             }
             assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
         }
@@ -486,7 +535,7 @@ mod tests {
         let mut train = Session::train(&graph, loss, &[output], Threads(1))?;
         let mut run = |key| {
             train.step(&parameters, 2, key, &fill)?;
-            Ok::<_, Error>(bits(train.output(0, 1)))
+            Ok::<_, Error>(bits(train.output(0, 1)?))
         };
         let (first, again, off) = (run(KEY)?, run(KEY)?, run(None)?);
         let other = run(Some(DropoutKey { seed: 4, step: 3 }))?;
@@ -520,9 +569,9 @@ mod tests {
                 let (a, b) = (plain.step(&parameters, 3, None, &fill)?, poisoned.step(&parameters, 3, None, &fill)?);
                 prop_assert_eq!(a.to_bits(), b.to_bits());
                 prop_assert_eq!(plain.gradients(), poisoned.gradients());
-                prop_assert_eq!(plain.input_gradient(0, 2), poisoned.input_gradient(0, 2));
+                prop_assert_eq!(plain.input_gradient(0, 2)?, poisoned.input_gradient(0, 2)?);
                 for index in 0..values.len() {
-                    prop_assert_eq!(plain.output(index, 1), poisoned.output(index, 1));
+                    prop_assert_eq!(plain.output(index, 1)?, poisoned.output(index, 1)?);
                 }
             }
             // Keeping outputs alive changes the places of buffers, not the numbers.

@@ -161,7 +161,7 @@ mod tests {
                         slab.iter_mut().enumerate().for_each(|(at, value)| *value = stream.uniform(at as u64) - 0.5);
                     }
                 })?;
-                found.push([session.output(0, 0), session.gradients(), session.input_gradient(0, 0)].concat());
+                found.push([session.output(0, 0)?, session.gradients(), session.input_gradient(0, 0)?].concat());
             }
             let size = found[1].iter().fold(1.0_f64, |size, value| size.max(value.abs()));
             let off = found[0].iter().zip(&found[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / size;

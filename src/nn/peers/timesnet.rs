@@ -29,6 +29,7 @@ use serde::{Deserialize, Serialize};
 
 const LARGEST_HISTORY: usize = 16_384;
 const MOST_LAYERS: usize = 16;
+const MOST_PERIODS: usize = 64;
 const NORM_EPS: f64 = 1e-5;
 
 /// Sizes of TimesNet.
@@ -72,7 +73,7 @@ impl Configuration for TimesNetConfig {
             ("state_channels", self.state_channels, LARGEST_WIDTH),
             ("d_model", self.d_model, LARGEST_WIDTH),
             ("d_ff", self.d_ff, LARGEST_WIDTH),
-            ("periods", self.periods, self.history / 2),
+            ("periods", self.periods, (self.history / 2).min(MOST_PERIODS)),
             ("kernels", self.kernels, inception::MOST_KERNELS),
             ("layers", self.layers, MOST_LAYERS),
         ];

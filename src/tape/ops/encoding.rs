@@ -6,21 +6,29 @@ use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, RowsMut, encoding, rows};
+use std::sync::OnceLock;
 
-/// The table `[rows, channels]`, made once.
+/// The table `[rows, channels]`, made once, when it is first read: recording a graph costs nothing that grows with its sizes, for these
+/// may be a file's claim.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PositionalEncoding {
-    table: Vec<f64>,
+    table: OnceLock<Vec<f64>>,
     rows: usize,
     channels: usize,
 }
 
 impl PositionalEncoding {
     /// The table for sequences of this length and width.
-    pub fn new(rows: usize, channels: usize) -> Self {
-        let mut table = vec![0.0; rows * channels];
-        encoding::sinusoidal(RowsMut::packed(&mut table, rows, channels));
-        Self { table, rows, channels }
+    pub const fn new(rows: usize, channels: usize) -> Self {
+        Self { table: OnceLock::new(), rows, channels }
+    }
+
+    fn table(&self) -> &[f64] {
+        self.table.get_or_init(|| {
+            let mut table = vec![0.0; self.rows * self.channels];
+            encoding::sinusoidal(RowsMut::packed(&mut table, self.rows, self.channels));
+            table
+        })
     }
 }
 
@@ -37,7 +45,7 @@ impl<T: Real> Op<T> for PositionalEncoding {
     }
 
     fn forward(&self, io: Forward<'_, T>) {
-        for ((y, x), position) in io.y.iter_mut().zip(io.x[0]).zip(&self.table) {
+        for ((y, x), position) in io.y.iter_mut().zip(io.x[0]).zip(self.table()) {
             *y = *x + T::of(*position);
         }
     }

@@ -121,7 +121,7 @@ mod tests {
         let mut session = Session::infer(&graph, &[y], Threads(1))?;
         session
             .step(parameters, 1, None, &|_, slabs: &mut [&mut [f64]]| slabs.iter_mut().for_each(|slab| slab.copy_from_slice(x)))?;
-        Ok(session.output(0, 0).to_vec())
+        Ok(session.output(0, 0)?.to_vec())
     }
 
     #[test]

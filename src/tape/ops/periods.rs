@@ -135,7 +135,7 @@ mod tests {
                 *value = 5.0 + 0.012 * wave(20.0, t, c as f64) + 0.008 * wave(3.0, t, 1.0) + third;
             }
         })?;
-        let found = session.output(0, 0);
+        let found = session.output(0, 0)?;
         assert_eq!([found[0], found[2], found[4]], [50.0, 333.0, 142.0]);
         // |X| = amplitude·n/2.
         let amplitudes = [0.012 * 500.0, 0.008 * 500.0, 0.006 * 500.0 / 2.0_f64];

@@ -108,7 +108,7 @@ mod tests {
                 input.iter_mut().enumerate().for_each(|(at, value)| *value = 2.0 * stream.uniform(at as u64) - 1.0);
             }
         })?;
-        let pairs = session.output(0, 0).iter().zip(session.output(1, 0));
+        let pairs = session.output(0, 0)?.iter().zip(session.output(1, 0)?);
         assert!(pairs.into_iter().all(|(a, b)| (a - b).abs() < Tolerance::Close.relative_f64()));
         Ok(())
     }

@@ -7,10 +7,9 @@
 use super::replay::Replay;
 use super::shards::Shard;
 use crate::tape::op::{Coupled, Pass};
-use crate::tape::plan::{Plan, Step};
+use crate::tape::plan::Plan;
 use crate::tape::slab::Slab;
 use phyture_kernels::Real;
-use std::ops::Range;
 
 /// One sample.
 struct Lane<T> {
@@ -18,18 +17,21 @@ struct Lane<T> {
     part: Vec<T>,
 }
 
-/// All samples of a step.
+/// All samples of a step. What is allocated in a step is kept for the next one.
 pub(super) struct Lockstep<T> {
     lanes: Vec<Lane<T>>,
     parts: Vec<T>,
-    /// Total of each coupling of the last forward pass, and of how many samples.
+    /// Total of each coupling of the last forward pass.
     totals: Vec<Vec<T>>,
+    /// Total of the coupling that the backward pass was at last.
+    backward_total: Vec<T>,
+    /// Samples that gave the totals; 0 once these are settled.
     samples: usize,
 }
 
 impl<T> Default for Lockstep<T> {
     fn default() -> Self {
-        Self { lanes: Vec::new(), parts: Vec::new(), totals: Vec::new(), samples: 0 }
+        Self { lanes: Vec::new(), parts: Vec::new(), totals: Vec::new(), backward_total: Vec::new(), samples: 0 }
     }
 }
 
@@ -53,14 +55,6 @@ fn each<T: Real>(replay: &Replay<'_, T>, shards: &mut [Shard<T>], first: usize, 
     }
 }
 
-/// Stretches of steps without a coupling but, perhaps, at their start.
-fn stretches<T: Real>(steps: &[Step<T>]) -> Vec<Range<usize>> {
-    let couplings = steps.iter().enumerate().filter(|(_, step)| step.op.coupling().is_some()).map(|(index, _)| index);
-    let starts: Vec<usize> = std::iter::once(0).chain(couplings).collect();
-    let ends = starts.iter().skip(1).copied().chain([steps.len()]);
-    starts.iter().copied().zip(ends).map(|(start, end)| start..end).collect()
-}
-
 impl<T: Real> Lockstep<T> {
     /// One step of a session.
     pub fn run(&mut self, replay: &Replay<'_, T>, shards: &mut [Shard<T>], losses: &mut [f64], results: &mut [T]) {
@@ -69,8 +63,9 @@ impl<T: Real> Lockstep<T> {
             self.lanes.push(Lane { slab: Slab::new(replay.plan.slab_len), part: Vec::new() });
         }
         self.samples = samples;
+        let couplings = replay.plan.stretches[0].len() - 1;
+        self.totals.resize_with(couplings.max(self.totals.len()), Vec::new);
         each(replay, shards, 0, &mut self.lanes[..samples], &|_, lane, sample, _| replay.begin(lane.slab.aligned(), sample));
-        self.totals.clear();
         self.pass(replay, shards, Pass::Forward);
         if let Some((value, gradient)) = replay.plan.loss {
             for (lane, loss) in self.lanes.iter_mut().zip(losses) {
@@ -87,63 +82,75 @@ impl<T: Real> Lockstep<T> {
 
     /// All steps of one pass.
     fn pass(&mut self, replay: &Replay<'_, T>, shards: &mut [Shard<T>], pass: Pass) {
+        let Self { lanes, parts, totals, backward_total, .. } = self;
         let samples = replay.samples;
-        let steps = if pass == Pass::Forward { &replay.plan.forward } else { &replay.plan.backward };
-        let mut total: Option<Vec<T>> = None;
-        for stretch in stretches(steps) {
+        let lanes = &mut lanes[..samples];
+        let (steps, stretches) = match pass {
+            Pass::Forward => (&replay.plan.forward, &replay.plan.stretches[0]),
+            Pass::Backward => (&replay.plan.backward, &replay.plan.stretches[1]),
+        };
+        for (number, stretch) in stretches.iter().enumerate() {
             let next = steps.get(stretch.end).and_then(|step| Some((step, step.op.coupling()?)));
             let part_len = next.map_or(0, |(step, coupling)| coupling.part_len(&step.shapes));
-            each(replay, shards, 0, &mut self.lanes[..samples], &|shard, lane, sample, first| {
+            // The coupling that this stretch begins with; the first one begins with none.
+            let total: Option<&[T]> = number.checked_sub(1).map(|before| match pass {
+                Pass::Forward => totals[before].as_slice(),
+                Pass::Backward => backward_total.as_slice(),
+            });
+            each(replay, shards, 0, lanes, &|shard, lane, sample, first| {
                 let Lane { slab, part } = lane;
                 let (slab, gradients) = (slab.aligned(), &mut shard.gradients);
                 for (index, step) in steps[stretch.clone()].iter().enumerate() {
-                    let coupled = total.as_deref().filter(|_| index == 0).map(|total| Coupled { total, samples });
+                    let coupled = total.filter(|_| index == 0).map(|total| Coupled { total, samples });
                     match pass {
                         Pass::Forward => step.op.forward(replay.forward(step, slab, sample, coupled)),
                         Pass::Backward => {
                             if let Some(differentiable) = step.op.differentiable() {
-                                differentiable.backward(replay.backward(
-                                    step,
-                                    slab,
-                                    Some(&mut *gradients),
-                                    (sample, first),
-                                    coupled,
-                                ));
+                                let at = (sample, first);
+                                differentiable.backward(replay.backward(step, slab, Some(&mut *gradients), at, coupled));
                             }
                         }
                     }
                 }
-                if let Some((step, coupling)) = next {
-                    part.resize(part_len, T::ZERO);
-                    match pass {
-                        Pass::Forward => coupling.gather(&replay.forward(step, slab, sample, None), part),
-                        Pass::Backward => {
-                            coupling
-                                .gather_backward(&replay.backward(step, slab, Some(&mut *gradients), (sample, first), None), part);
-                        }
+                let Some((step, coupling)) = next else { return };
+                part.resize(part_len, T::ZERO);
+                match pass {
+                    Pass::Forward => coupling.gather(&replay.forward(step, slab, sample, None), part),
+                    Pass::Backward => {
+                        let at = (sample, first);
+                        coupling.gather_backward(&replay.backward(step, slab, Some(&mut *gradients), at, None), part);
                     }
                 }
             });
-            total = next.map(|(step, coupling)| {
-                self.parts.clear();
-                self.lanes[..samples].iter().for_each(|lane| self.parts.extend_from_slice(&lane.part));
-                let mut total = vec![T::ZERO; part_len];
-                coupling.combine(pass, &step.shapes, &self.parts, &mut total);
-                if pass == Pass::Forward {
-                    self.totals.push(total.clone());
-                }
-                total
-            });
+            let Some((step, coupling)) = next else { continue };
+            parts.clear();
+            lanes.iter().for_each(|lane| parts.extend_from_slice(&lane.part));
+            let total = match pass {
+                Pass::Forward => &mut totals[number],
+                Pass::Backward => &mut *backward_total,
+            };
+            total.clear();
+            total.resize(part_len, T::ZERO);
+            coupling.combine(pass, &step.shapes, parts, total);
         }
+    }
+
+    /// There is nothing to settle any more.
+    pub fn forget(&mut self) {
+        self.samples = 0;
     }
 
     /// Hands the totals of the last forward pass to the operations, once.
     pub fn settle(&mut self, plan: &Plan<T>, parameters: &mut [T]) {
+        let samples = std::mem::take(&mut self.samples);
+        if samples == 0 {
+            return;
+        }
         let coupled = plan.forward.iter().filter_map(|step| Some((step, step.op.coupling()?)));
-        for ((step, coupling), total) in coupled.zip(self.totals.drain(..)) {
+        for ((step, coupling), total) in coupled.zip(&self.totals) {
             for (operand, range) in &step.parameters {
                 if let Some(values) = parameters.get_mut(range.clone()) {
-                    coupling.settle(*operand, &step.shapes, Coupled { total: &total, samples: self.samples }, values);
+                    coupling.settle(*operand, &step.shapes, Coupled { total, samples }, values);
                 }
             }
         }
