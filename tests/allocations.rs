@@ -1,10 +1,12 @@
 //! The steady state allocates nothing: a counting allocator sees no request in steps 3 to 10, nor, once its threads have started, on two
-//! threads; neither in training, Adam included, nor in the prediction of one window, whose large operations two threads share.
+//! threads; neither in training, Adam included, nor in the prediction of one window, whose large operations two threads share, nor where
+//! a batch normalisation couples the samples of a step.
 //!
 //! A file of its own, because the allocator counts for the whole program.
 
 use phyture::Result;
-use phyture::nn::{Network, OutputScale, PhyTureConfig};
+use phyture::nn::peers::InformerConfig;
+use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
 use phyture_kernels::adam::Adam;
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -41,8 +43,13 @@ fn the_steady_state_allocates_nothing() -> Result<()> {
     // On one thread steps 3 to 10. On two the second one starts when the system likes, and entering a thread pool grows one of its
     // queues once in some dozens of calls: there the same number of steps in a row, soon or late.
     for (threads, most) in [(1, 2 + QUIET), (2, 25 * QUIET)] {
-        for (history, samples, trains) in [(32, 9, true), (240, 1, false)] {
-            let config = PhyTureConfig { history, d_model: 16, moving_average: 5, ..PhyTureConfig::default() };
+        let phyture = |history| -> Architecture {
+            PhyTureConfig { history, d_model: 16, moving_average: 5, ..PhyTureConfig::default() }.into()
+        };
+        // Two encoder layers, so that there is a batch normalisation between them.
+        let coupled =
+            InformerConfig { history: 32, d_model: 16, d_ff: 16, heads: 2, decoder_rows: 8, ..InformerConfig::default() }.into();
+        for (config, samples, trains) in [(phyture(32), 9, true), (phyture(240), 1, false), (coupled, 9, true)] {
             let network = Network::<f32>::new(&config, &OutputScale::unit(6), false)?;
             let mut parameters = network.initial(1);
             let mut moments = [(); 2].map(|()| vec![0.0; parameters.len()]);
@@ -61,11 +68,12 @@ fn the_steady_state_allocates_nothing() -> Result<()> {
                 if trains {
                     let [first, second] = moments.each_mut().map(|values| &mut values[..]);
                     session.adam(&Adam::default(), steps as u64 + 1, &mut parameters, first, second)?;
+                    session.settle(&mut parameters);
                 }
                 steps += 1;
                 quiet = if REQUESTS.load(Ordering::Relaxed) == before { quiet + 1 } else { 0 };
             }
-            assert_eq!(quiet, QUIET, "{samples} samples, {threads:?}: no {QUIET} quiet steps in a row among {steps}");
+            assert_eq!(quiet, QUIET, "{}, {samples} samples, {threads:?}: no {QUIET} quiet steps in a row among {steps}", config.name());
             sessions.push(session);
         }
     }

@@ -8,6 +8,7 @@ use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
 use super::resample::Resampler;
 use super::schema::Schema;
 use super::table::RawTable;
+use super::taint::tainted;
 use super::timing::{Part, parts};
 use super::{Column, Flight, Targets, attitude, repair};
 use crate::error::Result;
@@ -38,6 +39,7 @@ pub(super) struct Assembled {
 /// [`Error::Cell`](crate::Error::Cell) and [`Error::Log`](crate::Error::Log) for everything that [`super::read`] lists; [`Error::Formula`](crate::Error::Formula), [`Error::Config`](crate::Error::Config) for what
 /// the description asks of this file in vain.
 pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
+    let tainted = tainted(&table, schema);
     let covered = schema.repairs.iter().flat_map(|rule| rule.columns.iter().map(String::as_str)).collect();
     check_finite(&table, &covered)?;
     let Some((time_s, time_name)) = source(&table, schema, 1.0, "t")? else {
@@ -65,6 +67,7 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     if let [only] = done.flights.as_mut_slice() {
         only.name = name.to_owned();
     }
+    done.flights.iter_mut().for_each(|flight| flight.tainted.clone_from(&tainted));
     Ok(done)
 }
 

@@ -30,6 +30,8 @@ pub mod stanford;
 #[cfg(feature = "files")]
 mod table;
 #[cfg(feature = "files")]
+mod taint;
+#[cfg(feature = "files")]
 mod timing;
 #[cfg(feature = "files")]
 mod units;
@@ -46,6 +48,9 @@ use std::collections::BTreeMap;
 
 /// Standard gravity g₀, m/s² (exact by definition; 3rd CGPM 1901).
 pub const GRAVITY_M_S2: f64 = 9.806_65;
+
+/// Why nothing that predicts an acceleration may read one.
+pub const TARGET: &str = "it is one of the six accelerations that are to be predicted";
 
 /// Where the six acceleration targets of a flight come from. Every output that shows errors says which.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -77,6 +82,9 @@ pub struct Flight {
     pub absent: Vec<Column>,
     /// Further columns of the log, by name, usable in formulas.
     pub extra: BTreeMap<String, Vec<f64>>,
+    /// Columns, canonical or further ones, that give an acceleration away as the log's description computes columns, with the reason;
+    /// see [`Flight::gives_target_away`].
+    pub tainted: BTreeMap<String, String>,
     /// `[22, samples]`, one row a [`Column`], in the order of [`Column::ALL`].
     canonical: Array2<f64>,
 }
@@ -121,6 +129,7 @@ impl Flight {
             targets,
             absent: Vec::new(),
             extra: BTreeMap::new(),
+            tainted: BTreeMap::new(),
             canonical,
             name,
         })
@@ -146,6 +155,17 @@ impl Flight {
     /// A column by the name it has in the log: canonical, or one of [`Flight::extra`].
     pub fn named(&self, name: &str) -> Option<&[f64]> {
         Column::from_name(name).map(|column| self.column(column)).or_else(|| self.extra.get(name).map(Vec::as_slice))
+    }
+
+    /// Why a quantity of this name gives one of the six accelerations away, if it does: it is one, it is made of one, or one is made of
+    /// it. Nothing that predicts accelerations may read it.
+    pub fn gives_target_away(&self, name: &str) -> Option<String> {
+        if Column::TARGETS.iter().any(|target| target.name() == name) {
+            return Some(TARGET.into());
+        }
+        let reads = derived::Derived::from_name(name).map_or(&[][..], derived::Derived::reads);
+        let made_of = reads.iter().map(|column| column.name());
+        made_of.chain([name]).find_map(|name| self.tainted.get(name)).cloned()
     }
 
     /// All canonical columns as a `[22, samples]` view, rows in the order of [`Column::ALL`].
@@ -186,7 +206,7 @@ impl Flight {
     pub fn with_columns(&self, other: impl Fn(Column) -> Option<Vec<f64>>) -> Result<Self> {
         let columns = Column::ALL.map(|column| other(column).unwrap_or_else(|| self.column(column).to_vec()));
         let made = Self::new(self.name.clone(), self.manoeuvre.clone(), self.start_s, self.step_s, columns, self.targets)?;
-        Ok(Self { absent: self.absent.clone(), extra: self.extra.clone(), ..made })
+        Ok(Self { absent: self.absent.clone(), extra: self.extra.clone(), tainted: self.tainted.clone(), ..made })
     }
 
     /// The samples `range` as a flight of its own, with a new name. Panics never: the range is cut to what is there.
@@ -203,6 +223,7 @@ impl Flight {
             targets: self.targets,
             absent: self.absent.clone(),
             extra: self.extra.iter().map(|(name, values)| (name.clone(), values[range.clone()].to_vec())).collect(),
+            tainted: self.tainted.clone(),
             canonical: self.canonical.slice_axis(ndarray::Axis(1), range.into()).as_standard_layout().into_owned(),
         })
     }

@@ -93,7 +93,8 @@ pub fn table_parquet(path: &Path, table: &Table) -> Result<()> {
     write_atomically(path, |out| out.write_all(&bytes))
 }
 
-/// Writes one flight as CSV with the canonical header, then its further columns by name.
+/// Writes one flight as CSV with the canonical header, then its further columns by name, but for those that give an acceleration
+/// away ([`Flight::tainted`]).
 ///
 /// Columns that the flight's log did not have ([`Flight::absent`]) are left out, so that they stay absent for the next reader.
 ///
@@ -117,7 +118,9 @@ fn with_table<T>(flight: &Flight, without: &[Column], then: impl FnOnce(&Table) 
     let mut table: Vec<(&str, Values)> = vec![("t", Values::Numbers(&time_s))];
     let kept = Column::ALL.into_iter().filter(|column| !without.contains(column));
     table.extend(kept.map(|column| (column.name(), Values::Numbers(flight.column(column)))));
-    table.extend(flight.extra.iter().map(|(name, values)| (name.as_str(), Values::Numbers(values))));
+    // Columns do not say where they come from: what gives an acceleration away would be a plain column for the next reader.
+    let kept = flight.extra.iter().filter(|(name, _)| !flight.tainted.contains_key(*name));
+    table.extend(kept.map(|(name, values)| (name.as_str(), Values::Numbers(values))));
     then(&table)
 }
 

@@ -1,7 +1,7 @@
 //! Evaluation: a formula bound to a step and to its constants, with its hidden state. Whole columns and single samples go
 //! through the same code, block by block or one by one, so that both give the same bits.
 
-use super::memory::{MAX_DELAY_S, Memory};
+use super::memory::{MAX_DELAY_S, MAX_DELAY_SAMPLES, Memory};
 use super::operation::{History, Operation};
 use super::{Formula, Instruction, Value};
 use crate::error::{Error, Result};
@@ -97,6 +97,14 @@ impl Builder<'_> {
                 if !(0.0..=largest).contains(&time_s) {
                     let limit = if history == History::Lag { String::new() } else { format!(" and at most {largest}") };
                     return Err(self.fault(format!("the time of `{name}` is {time_s} s, expected at least 0{limit}"), at));
+                }
+                let samples = time_s / self.step_s;
+                if history == History::Delay && samples > MAX_DELAY_SAMPLES {
+                    let step_s = self.step_s;
+                    let message = format!(
+                        "the time of `delay` is {time_s} s, {samples:.0} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:.0} can be kept"
+                    );
+                    return Err(self.fault(message, at));
                 }
                 self.program.truncate(start);
                 if history == History::Lag { Memory::lag(time_s, self.step_s) } else { Memory::delay(time_s, self.step_s) }

@@ -19,6 +19,9 @@ impl History {
 /// Longest delay, s: bounds the memory a formula can ask for.
 pub(super) const MAX_DELAY_S: f64 = 60.0;
 
+/// Longest delay, samples: 60 s at more than 100 kHz.
+pub(super) const MAX_DELAY_SAMPLES: f64 = 1e7;
+
 /// State of one operator.
 #[derive(Clone, Debug)]
 pub(super) enum Memory {

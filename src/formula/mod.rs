@@ -30,6 +30,7 @@ use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;
 use operation::{History, Operation};
 use std::borrow::Cow;
+use std::collections::BTreeSet;
 
 /// How each function of the grammar is called, and what it gives.
 pub fn functions() -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -100,6 +101,39 @@ impl Formula {
     /// The columns and parameters it needs, each once, in order of appearance.
     pub fn names(&self) -> Vec<&str> {
         self.names.iter().map(|name| name.0.as_str()).collect()
+    }
+
+    /// The columns and parameters that stand somewhere outside the argument of a `rate`, each once: those whose values, not whose changes,
+    /// the formula is made of.
+    pub fn names_outside_rates(&self) -> Vec<&str> {
+        // One entry an operand on the stack: the names in it.
+        let mut stack: Vec<BTreeSet<usize>> = Vec::new();
+        for (instruction, _) in &self.program {
+            let operands = match instruction {
+                Instruction::Number(_) | Instruction::Name(_) => 0,
+                Instruction::Apply(_, count) => *count,
+                Instruction::Recall(history) => history.operands(),
+            };
+            let mut names: BTreeSet<usize> = stack.drain(stack.len().saturating_sub(operands)..).flatten().collect();
+            match instruction {
+                Instruction::Name(index) => {
+                    names.insert(*index);
+                }
+                Instruction::Recall(History::Rate) => names.clear(),
+                _ => {}
+            }
+            stack.push(names);
+        }
+        let left = stack.pop().unwrap_or_default();
+        self.names.iter().enumerate().filter(|(index, _)| left.contains(index)).map(|(_, name)| name.0.as_str()).collect()
+    }
+
+    /// An error that points at the first name for which `reason` has a text against it.
+    pub fn refused_name(&self, reason: &dyn Fn(&str) -> Option<String>) -> Option<Error> {
+        self.names.iter().find_map(|(name, at)| {
+            let reason = reason(name)?;
+            Some(Error::Formula { message: format!("`{name}` cannot be read here: {reason}"), formula: self.text.clone(), at: *at })
+        })
     }
 
     /// Whether it contains `lag`, `delay`, `rate` or `slew`: then its value depends on earlier samples.

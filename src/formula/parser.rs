@@ -10,14 +10,31 @@ use crate::suggest::did_you_mean;
 /// Deepest nesting of brackets, calls, signs and powers.
 const MAX_DEPTH: usize = 100;
 
-/// Parses a whole formula.
+/// How much longer than its text a formula may print: `9e15` is printed with its zeros, and operators with spaces around them.
+const PRINTS_AT_MOST: usize = 8;
+
+/// Parses a whole formula. What is accepted is accepted again as it prints: files hold formulas as printed.
 pub(super) fn parse(text: &str) -> Result<Formula> {
     let characters = text.chars().count();
+    let too_long = |message: String| {
+        let head: String = text.chars().take(60).map(|c| if c.is_control() { ' ' } else { c }).collect();
+        Err(Error::Formula { message, formula: format!("{head}…"), at: 0 })
+    };
     if characters > lexer::MAX_CHARACTERS {
-        let head: String = text.chars().take(60).collect();
-        let message = format!("{characters} characters, at most {} are allowed", lexer::MAX_CHARACTERS);
-        return Err(Error::Formula { message, formula: format!("{head}…"), at: 0 });
+        return too_long(format!("{characters} characters, at most {} are allowed", lexer::MAX_CHARACTERS));
     }
+    let formula = parse_text(text)?;
+    if characters * PRINTS_AT_MOST > lexer::MAX_CHARACTERS {
+        let printed = formula.to_string().chars().count();
+        if printed > lexer::MAX_CHARACTERS {
+            let most = lexer::MAX_CHARACTERS;
+            return too_long(format!("{printed} characters as it is written to files ({characters} here), at most {most} are allowed"));
+        }
+    }
+    Ok(formula)
+}
+
+fn parse_text(text: &str) -> Result<Formula> {
     // One space for each control or blank character: the caret of an error message stays under its place.
     let text: String = text.chars().map(|c| if c.is_whitespace() || c.is_control() { ' ' } else { c }).collect();
     let mut parser = Parser {

@@ -32,6 +32,25 @@ fn formulas() -> impl Strategy<Value = String> {
     })
 }
 
+/// Formulas about as long as they may be, many of which grow when printed.
+fn long_formulas() -> impl Strategy<Value = String> {
+    let words = prop::sample::select(vec!["a", "b", "1e15", "9e15", "-2e15", "1e-5", "0.1e9", ".5", "max(a,b)", "(a<b)", "-a^-b^2", "rate(-(a-b))"]);
+    let operators = prop::sample::select(vec!["+", "-", "*", "/", "^", "-(", "*("]);
+    (proptest::collection::vec((words, operators), 150..900), 100..4097_usize).prop_map(|(parts, length)| {
+        let (mut text, mut open) = (String::new(), 0);
+        for (word, operator) in parts {
+            if text.len() + word.len() + operator.len() + open + 2 > length {
+                break;
+            }
+            // No deeper than the parser allows.
+            let operator = if open < 60 { operator } else { "+" };
+            open += usize::from(operator.ends_with('('));
+            text = text + word + operator;
+        }
+        format!("{text}a{}", ")".repeat(open))
+    })
+}
+
 fn columns(samples: usize, phase: f64) -> (Vec<f64>, Vec<f64>) {
     let a = (0..samples).map(|k| (0.37 * k as f64 + phase).sin() * 3.0).collect();
     let b = (0..samples).map(|k| (0.11 * k as f64 - phase).cos()).collect();
@@ -44,6 +63,21 @@ proptest! {
         match Formula::parse(&text) {
             Ok(formula) => prop_assert_eq!(&Formula::parse(&formula.to_string())?, &formula),
             Err(Error::Formula { at, .. }) => prop_assert!(at <= text.chars().count()),
+            Err(other) => prop_assert!(false, "{}", other),
+        }
+    }
+
+    #[test]
+    fn what_is_accepted_is_accepted_as_it_prints(text in long_formulas()) {
+        match Formula::parse(&text) {
+            Ok(formula) => {
+                let printed = formula.to_string();
+                let again = Formula::parse(&printed);
+                prop_assert!(matches!(&again, Ok(again) if *again == formula), "{} characters, printed {}", text.len(), printed.len());
+            }
+            Err(Error::Formula { message, .. }) => {
+                prop_assert!(message.contains("as it is written to files") || message.contains("deep"), "{message}: {text}");
+            }
             Err(other) => prop_assert!(false, "{}", other),
         }
     }
@@ -187,6 +221,34 @@ fn hostile_texts_are_refused_without_harm() {
     let long = format!("{}1", "a+".repeat(2040));
     let sum = Formula::parse(&long).and_then(|formula| formula.evaluate(1, STEP_S, &|_| Some(1.0.into())));
     assert!(matches!(sum.as_deref(), Ok([total]) if *total == 2041.0), "{sum:?}");
+}
+
+#[test]
+fn the_limit_is_on_what_is_printed() {
+    // 2047 characters that print as 4093 are read again; 3000 that print as 5999 were not.
+    let chain = |terms: usize| format!("a{}", "+a".repeat(terms - 1));
+    let printed = Formula::parse(&chain(1024)).map(|formula| formula.to_string());
+    assert!(matches!(printed, Ok(printed) if printed.len() == 4093 && Formula::parse(&printed).is_ok()));
+    let message = Formula::parse(&chain(1500)).map_err(|error| error.to_string());
+    assert!(matches!(message, Err(text) if text.contains("5997 characters as it is written to files (2999 here)")));
+    // The longest growth there is stays below what is left unlooked at.
+    let grown = Formula::parse("9e15*9e15").map(|formula| formula.to_string().len());
+    assert!(matches!(grown, Ok(length) if length < 8 * 9), "{grown:?}");
+}
+
+#[test]
+fn a_delay_of_too_many_samples_is_refused() -> Result<()> {
+    let refused = Formula::parse("delay(vx, 1)")?.stream(1e-302).map(|_| ()).map_err(|error| error.to_string());
+    assert!(matches!(refused, Err(text) if text.contains("samples of 1e-302 s")));
+    assert!(Formula::parse("delay(vx, 60)")?.stream(1e-5).is_ok());
+    Ok(())
+}
+
+#[test]
+fn names_inside_a_rate_are_told_apart() -> Result<()> {
+    let formula = Formula::parse("rate(gx + k * a) + a * lag(b, 0.1) - rate(a)")?;
+    assert_eq!(formula.names_outside_rates(), ["a", "b"]);
+    Ok(())
 }
 
 #[test]

@@ -4,11 +4,11 @@
 //! the physics leaves over; and, fitted to the accelerations themselves, it is the yardstick of the same name. It never sees a
 //! target at prediction time. What it learns has no physical name.
 
+use super::inputs;
 use crate::blocks::{BLOCK_S, Blocks};
 use crate::error::{Error, Result};
 use crate::flight::{Flight, Window};
 use crate::formula::Formula;
-use crate::physics::evaluate;
 use nalgebra::{Cholesky, DMatrix};
 use ndarray::{Array1, Array2};
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,12 @@ const FOLDS: usize = 5;
 
 /// Decades of the penalties tried, λ a window in units of the standardised inputs: 10⁻⁸ … 10².
 const PENALTY_EXPONENTS: std::ops::RangeInclusive<i32> = -8..=2;
+
+/// Most numbers that a prediction is a sum over, the constant included: with the normal matrices of all folds, half a GiB.
+const MOST_FEATURES: usize = 2048;
+
+/// Signals of each row, where nothing else is asked for.
+const INPUTS: [&str; 13] = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4", "g_x", "g_y", "g_z"];
 
 /// Rows gathered before one matrix product adds them to the normal matrix.
 const BATCH: usize = 512;
@@ -34,28 +40,37 @@ pub struct LinearConfig {
 
 impl Default for LinearConfig {
     fn default() -> Self {
-        const INPUTS: [&str; 13] = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4", "g_x", "g_y", "g_z"];
         Self { lags: 11, inputs: INPUTS.map(str::to_owned).into() }
     }
 }
 
 impl LinearConfig {
-    /// Checks the number of lags and that there are inputs.
+    /// Most lags of the default inputs.
+    pub const MOST_LAGS: usize = (MOST_FEATURES - 1) / INPUTS.len();
+
+    /// Checks that there are inputs, that none of them gives a target away, and that lags times inputs is at most 2047.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the field.
+    /// [`Error::Config`] naming the field; [`Error::Formula`] pointing at what is wrong in an input.
     pub fn check(&self) -> Result<()> {
-        let (field, found) = match (self.lags, self.inputs.len()) {
-            (0, _) => ("linear.lags", "0"),
-            (_, 0) => ("linear.inputs", "none"),
-            _ => return Ok(()),
+        let fault = |field: &str, found: String, expected: String| {
+            Err(Error::Config { place: "linear history".into(), field: field.into(), found, expected })
         };
-        Err(Error::Config {
-            place: "linear history".into(),
-            field: field.into(),
-            found: found.into(),
-            expected: "at least 1".into(),
-        })
+        let count = self.inputs.len();
+        if count == 0 || count >= MOST_FEATURES {
+            return fault("linear.inputs", format!("a list of {count}"), format!("1 to {}", MOST_FEATURES - 1));
+        }
+        let most = (MOST_FEATURES - 1) / count;
+        if self.lags == 0 || self.lags > most {
+            let expected = format!("1 to {most}: with {count} inputs, lags · inputs is then at most {}", MOST_FEATURES - 1);
+            return fault("linear.lags", self.lags.to_string(), expected);
+        }
+        inputs::parse(&self.inputs).map(|_| ())
+    }
+
+    /// Numbers that a prediction is a sum over, the constant included. At most [`MOST_FEATURES`] once checked.
+    fn features(&self) -> usize {
+        self.lags * self.inputs.len() + 1
     }
 }
 
@@ -69,15 +84,15 @@ impl Signals {
     /// Evaluates the inputs on a flight.
     ///
     /// # Errors
-    /// [`Error::Formula`] pointing at a name the flight lacks (a target is none of them: it would predict itself).
+    /// [`Error::Formula`] pointing at a name that the flight lacks, or that is a target or gives one away: it would predict itself.
     pub fn new(flight: &Flight, config: &LinearConfig) -> Result<Self> {
-        let inputs = config.inputs.len();
-        let mut rows = vec![0.0; flight.len() * inputs];
+        let count = config.inputs.len();
+        let mut rows = vec![0.0; flight.len() * count];
         for (index, text) in config.inputs.iter().enumerate() {
-            let column = evaluate(&Formula::parse(text)?, flight)?;
-            rows.chunks_exact_mut(inputs).zip(column).for_each(|(row, value)| row[index] = value);
+            let column = inputs::values(&Formula::parse(text)?, flight)?;
+            rows.chunks_exact_mut(count).zip(column).for_each(|(row, value)| row[index] = value);
         }
-        Ok(Self { rows, inputs })
+        Ok(Self { rows, inputs: count })
     }
 
     /// A row; before the first one, the first one.
@@ -110,7 +125,8 @@ impl Linear {
     ///
     /// # Errors
     /// [`Error::Shape`] if a window lies outside its flight, or targets and windows differ in number; [`Error::Config`] or
-    /// [`Error::Formula`] for the inputs; [`Error::Undetermined`] if the windows fill fewer than two 10-s blocks.
+    /// [`Error::Formula`] for the inputs, or for more unknowns than windows; [`Error::Undetermined`] if the windows fill fewer than two
+    /// 10-s blocks.
     pub fn fit(flights: &[Flight], windows: &[Window], targets: &[[f64; 6]], config: &LinearConfig) -> Result<Self> {
         config.check()?;
         let inside = |window: &Window| flights.get(window.flight).is_some_and(|flight| window.last < flight.len());
@@ -119,9 +135,18 @@ impl Linear {
             return Err(Error::Shape { operation: "linear history", message });
         }
         let folds = folds(flights, windows)?;
+        let features = config.features();
+        if features > windows.len() {
+            let (count, windows) = (config.inputs.len(), windows.len());
+            return Err(Error::Config {
+                place: "linear history".into(),
+                field: "lags".into(),
+                found: format!("{} of {count} inputs, {features} unknowns for {windows} training windows", config.lags),
+                expected: format!("at most {} on these flights, or more of them", (windows - 1) / count),
+            });
+        }
         let signals: Vec<Signals> = flights.iter().map(|flight| Signals::new(flight, config)).collect::<Result<_>>()?;
         let (mean, inverse_deviation) = moments(&signals, windows, config.inputs.len());
-        let features = config.lags * config.inputs.len() + 1;
         let mut linear = Self { config: config.clone(), mean, inverse_deviation, weights: Vec::new(), penalty: [0.0; 6] };
         let mut sums: Vec<Normal> = (0..FOLDS).map(|_| Normal::zero(features)).collect();
         let mut design = Array2::zeros((BATCH, features));
@@ -160,7 +185,7 @@ impl Linear {
 
     /// The six values at `sample`; `row(lag)` is the row of inputs so many samples ago.
     pub fn predict<'a>(&self, row: impl Fn(usize) -> &'a [f64]) -> [f64; 6] {
-        let features = self.config.lags * self.mean.len() + 1;
+        let features = self.config.features();
         let mut values = vec![0.0; features];
         self.features(row, &mut values);
         std::array::from_fn(|channel| {
@@ -189,17 +214,12 @@ impl Linear {
     /// # Errors
     /// A text for a person.
     pub fn check(&self) -> Result<(), String> {
+        self.config.check().map_err(|error| error.to_string())?;
         let inputs = self.config.inputs.len();
-        let sizes = [
-            (self.mean.len(), inputs),
-            (self.inverse_deviation.len(), inputs),
-            (self.weights.len(), 6 * (inputs * self.config.lags + 1)),
-        ];
-        let numbers = self.mean.iter().chain(&self.inverse_deviation).chain(&self.weights);
-        if self.config.check().is_err()
-            || sizes.iter().any(|(found, expected)| found != expected)
-            || !numbers.clone().all(|number| number.is_finite())
-        {
+        let sizes =
+            [(self.mean.len(), inputs), (self.inverse_deviation.len(), inputs), (self.weights.len(), 6 * self.config.features())];
+        let mut numbers = self.mean.iter().chain(&self.inverse_deviation).chain(&self.weights);
+        if sizes.iter().any(|(found, expected)| found != expected) || !numbers.all(|number| number.is_finite()) {
             return Err("the linear history's numbers do not fit its inputs and lags".into());
         }
         Ok(())
@@ -438,6 +458,23 @@ mod tests {
     }
 
     #[test]
+    fn numbers_of_a_file_that_do_not_fit_are_refused_before_they_are_multiplied() {
+        let linear = |lags: usize, weights: usize| Linear {
+            config: LinearConfig { lags, inputs: vec!["vx".into(); 4] },
+            mean: vec![0.0; 4],
+            inverse_deviation: vec![1.0; 4],
+            weights: vec![0.0; weights],
+            penalty: [0.0; 6],
+        };
+        assert_eq!(linear(2, 54).check(), Ok(()));
+        assert!(linear(2, 53).check().is_err_and(|message| message.contains("do not fit")));
+        // 4 · (2^62 + 1) + 1 wraps to 5: thirty weights would fit.
+        for (lags, weights) in [(1 << 63, 6), ((1 << 62) + 1, 30)] {
+            assert!(linear(lags, weights).check().is_err_and(|message| message.contains("linear.lags")), "{lags}");
+        }
+    }
+
+    #[test]
     fn an_input_that_stands_still_does_no_harm() {
         let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.3; 3000]);
         let mut noise = Noise(3);
@@ -459,7 +496,15 @@ mod tests {
         let standard = LinearConfig::default();
         assert!(refused(&windows(0, 10..500), &standard).contains("longer flights"));
         assert!(refused(&[], &standard).contains("longer flights"));
-        assert!(refused(&windows(0, 10..3000), &LinearConfig { lags: 0, ..standard.clone() }).contains("linear.lags"));
+        for lags in [0, LinearConfig::MOST_LAGS + 1, 1 << 62, (1 << 62) + 1, 1 << 63, usize::MAX] {
+            let message = refused(&windows(0, 10..3000), &LinearConfig { lags, ..standard.clone() });
+            assert!(message.contains(&format!("`linear.lags` is {lags}, expected 1 to 157")), "{message}");
+        }
+        let most = LinearConfig { lags: LinearConfig::MOST_LAGS, ..standard.clone() };
+        assert!(most.check().is_ok());
+        let message = refused(&windows(0, 1000..3000), &most);
+        assert!(message.contains("2042 unknowns for 2000 training windows, expected at most 153"), "{message}");
+        assert!(refused(&windows(0, 10..3000), &LinearConfig { inputs: vec![], ..standard }).contains("linear.inputs"));
         let of = |name: &str| LinearConfig { lags: 1, inputs: vec![name.into()] };
         assert!(refused(&windows(0, 10..3000), &of("rpm")).contains("`rpm`"));
     }

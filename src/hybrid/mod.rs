@@ -3,6 +3,7 @@
 //! A [`Hybrid`] holds everything a prediction needs (calibrated model, inputs, scales, weights) and is one file. How it was
 //! trained is in `train`.
 
+pub mod inputs;
 pub mod linear;
 pub mod scaling;
 pub mod sensitivity;
@@ -23,7 +24,7 @@ use crate::flight::{Column, Flight, Window};
 use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::nn::{Architecture, Network, OutputScale};
 use crate::physics::Model;
-use crate::tape::{Session, Threads};
+use crate::tape::{Parameter, Session, Threads};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -32,6 +33,15 @@ const CHUNK: usize = 64;
 
 /// Steps of a log may differ from the trained one by this share (the tolerance of a log's own step).
 const STEP_TOLERANCE: f64 = 0.01;
+
+/// Longest and shortest step that a description may have, s.
+const STEPS_S: std::ops::RangeInclusive<f64> = 1e-6..=1e3;
+
+/// Largest mean and deviation of what the network says, m/s² or rad/s²: the squares of six such errors are finite in f32.
+const LARGEST_OUTPUT: f64 = 1e15;
+
+/// Largest mean and deviation of an input, and the reciprocal of the smallest deviation.
+const LARGEST_INPUT: f64 = 1e30;
 
 /// Key of the metadata of a hybrid's file.
 const METADATA: &str = "phyture_hybrid";
@@ -87,13 +97,26 @@ impl Description {
         if let Some((field, found, expected)) = sizes.into_iter().find(|(_, found, expected)| found != expected) {
             return fault(field, found.to_string(), expected.to_string());
         }
-        let scales = scaling.state.iter().chain(&scaling.physics).chain(&scaling.output);
-        if !scales.clone().all(|scale| scale.mean.is_finite() && scale.deviation.is_finite() && scale.deviation > 0.0) {
-            return fault("scaling", "a mean or deviation that is none".into(), "finite means and positive deviations".into());
+        let groups: [(&str, &[Scale], f64); 3] = [
+            ("scaling.state", &scaling.state, LARGEST_INPUT),
+            ("scaling.physics", &scaling.physics, LARGEST_INPUT),
+            ("scaling.output", &scaling.output, LARGEST_OUTPUT),
+        ];
+        for (field, scales, largest) in groups {
+            let possible = |scale: &&Scale| scale.mean.abs() <= largest && (largest.recip()..=largest).contains(&scale.deviation);
+            if let Some(wrong) = scales.iter().find(|scale| !possible(scale)) {
+                let found = format!("mean {:e}, deviation {:e}", wrong.mean, wrong.deviation);
+                let expected = format!("means up to ±{largest:e} and deviations of {:e} to {largest:e}", largest.recip());
+                return fault(field, found, expected);
+            }
         }
-        if !(step_s.is_finite() && *step_s > 0.0 && gate.iter().all(|factor| factor.is_finite())) {
-            return fault("step_s, gate", format!("{step_s}, {gate:?}"), "a positive step and finite factors".into());
+        if !STEPS_S.contains(step_s) {
+            return fault("step_s", step_s.to_string(), format!("{:e} s to {:e} s", STEPS_S.start(), STEPS_S.end()));
         }
+        if !gate.iter().all(|factor| (0.0..=1.0).contains(factor)) {
+            return fault("gate", format!("{gate:?}"), "six factors between 0 and 1".into());
+        }
+        inputs::parse(inputs)?;
         match linear.as_ref().map_or(Ok(()), Linear::check) {
             Ok(()) => self.model.check(),
             Err(message) => fault("linear", message, "numbers that fit".into()),
@@ -125,7 +148,8 @@ impl Hybrid {
     /// Joins a description and weights.
     ///
     /// # Errors
-    /// [`Error::Config`] if the configuration is impossible; [`Error::Shape`] if the number of weights is not the network's.
+    /// [`Error::Config`] if the configuration is impossible; [`Error::Shape`] if the number of weights is not the network's;
+    /// [`Error::Undetermined`] if one of them is not finite.
     pub fn new(description: Description, parameters: Vec<f32>) -> Result<Self> {
         description.check()?;
         let network = description.network(false)?;
@@ -133,6 +157,9 @@ impl Hybrid {
         if parameters.len() != count {
             let message = format!("{} weights, and the network has {count}", parameters.len());
             return Err(Error::Shape { operation: "hybrid", message });
+        }
+        if let Some(at) = parameters.iter().position(|weight| !weight.is_finite()) {
+            return Err(Error::Undetermined(format!("weight {at} of {count} is {}: the training has diverged", parameters[at])));
         }
         Ok(Self { description, network, parameters })
     }
@@ -176,7 +203,7 @@ impl Hybrid {
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string(&self.description)
             .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
-        let tensor = |parameter: &crate::tape::Parameter| {
+        let tensor = |parameter: &Parameter| {
             let numbers = Numbers::F32(parameter.to_file_order(&self.parameters));
             (parameter.name.clone(), Tensor { shape: parameter.file_lengths(), numbers })
         };
@@ -196,24 +223,12 @@ impl Hybrid {
             serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;
         description.check().map_err(|error| fault(error.to_string()))?;
         let network = description.network(false)?;
+        // Sizes are a claim until the tensors are found to have them: no memory is asked for before.
+        let of_file = |parameter| Ok((parameter, numbers_of(&file, parameter).map_err(fault)?));
+        let of_file: Vec<(&Parameter, &[f32])> = network.parameters().iter().map(of_file).collect::<Result<_>>()?;
         let mut parameters = vec![0.0; network.graph().parameter_count()];
-        for parameter in network.parameters() {
-            let tensor =
-                file.tensors.get(&parameter.name).ok_or_else(|| fault(format!("lacks the tensor `{}`", parameter.name)))?;
-            match &tensor.numbers {
-                Numbers::F32(numbers)
-                    if tensor.shape == parameter.file_lengths() && numbers.iter().all(|number| number.is_finite()) =>
-                {
-                    parameter.put_file_order(numbers, &mut parameters);
-                }
-                _ => {
-                    return Err(fault(format!(
-                        "tensor `{}` is not finite f32 of shape {:?}",
-                        parameter.name,
-                        parameter.file_lengths()
-                    )));
-                }
-            }
+        for (parameter, numbers) in of_file {
+            parameter.put_file_order(numbers, &mut parameters);
         }
         Self::new(description, parameters)
     }
@@ -222,11 +237,11 @@ impl Hybrid {
     /// rad/s².
     ///
     /// # Errors
-    /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; what evaluating the
-    /// model gives.
+    /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; [`Error::Undetermined`] if a
+    /// prediction is not finite; what evaluating the model gives.
     pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
         self.check_windows(flights, windows)?;
-        self.complete_windows(&sequence::sequences(flights, &self.description)?, windows, threads)
+        self.complete_windows(flights, &sequence::sequences(flights, &self.description)?, windows, threads)
     }
 
     /// Refuses a flight sampled at another step than the training data, and a window without a full history.
@@ -247,7 +262,13 @@ impl Hybrid {
     }
 
     /// The network on windows that have been checked, on top of the sequences' baselines.
-    fn complete_windows(&self, sequences: &[sequence::Sequence], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
+    fn complete_windows(
+        &self,
+        flights: &[Flight],
+        sequences: &[sequence::Sequence],
+        windows: &[Window],
+        threads: Threads,
+    ) -> Result<Vec<[f64; 6]>> {
         let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
         session.load(&self.parameters)?;
         let mut predicted = Vec::with_capacity(windows.len());
@@ -261,6 +282,9 @@ impl Hybrid {
                 let window = chunk[sample];
                 predicted.push(self.complete(sequences[window.flight].baseline(window.last), output));
             })?;
+        }
+        for (window, values) in windows.iter().zip(&predicted) {
+            check_finite(&flights[window.flight], window.last, values)?;
         }
         Ok(predicted)
     }
@@ -282,6 +306,32 @@ impl Hybrid {
     pub fn stream(&self) -> Result<StreamingHybrid<'_>> {
         StreamingHybrid::new(self)
     }
+}
+
+/// The numbers of a parameter in a network's file, or what is wrong with them.
+fn numbers_of<'a>(file: &'a SafeTensors, parameter: &Parameter) -> Result<&'a [f32], String> {
+    let (name, lengths) = (&parameter.name, parameter.file_lengths());
+    let tensor = file.tensors.get(name).ok_or_else(|| format!("lacks the tensor `{name}`"))?;
+    match &tensor.numbers {
+        Numbers::F32(numbers) if tensor.shape == lengths && numbers.iter().all(|number| number.is_finite()) => Ok(numbers),
+        _ => Err(format!("tensor `{name}` is not finite f32 of shape {lengths:?}, which its description asks for")),
+    }
+}
+
+/// Refuses a prediction that is no number.
+///
+/// # Errors
+/// [`Error::Undetermined`] naming flight, sample and channel.
+pub fn check_finite(flight: &Flight, sample: usize, predicted: &[f64; 6]) -> Result<()> {
+    let Some(channel) = predicted.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+    Err(Error::Undetermined(format!(
+        "flight `{}`, sample {sample} ({:.2} s): the predicted `{}` is {}, not a finite number; look at the flight there, and at the \
+         scales and weights of the network",
+        flight.name,
+        flight.time_s(sample),
+        Column::TARGETS[channel].name(),
+        predicted[channel]
+    )))
 }
 
 /// The factor γ of [`Hybrid::fit_gate`] for pairs (left over by the baseline, said by the network) and the block of each.

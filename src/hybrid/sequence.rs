@@ -1,6 +1,7 @@
 //! Flights as the network sees them: scaled state and physics rows, ready to be cut into histories.
 
 use super::Description;
+use super::inputs;
 use super::linear::{Linear, LinearConfig, Signals};
 use super::scaling::{Scale, Scaling};
 use crate::error::{Error, Result};
@@ -26,8 +27,8 @@ struct Raw {
 }
 
 impl Raw {
-    fn new(flight: &Flight, model: &Model, inputs: &[Formula], linear: Option<&Linear>, residual: bool) -> Result<Self> {
-        let state = inputs.iter().map(|formula| crate::physics::evaluate(formula, flight)).collect::<Result<_>>()?;
+    fn new(flight: &Flight, model: &Model, formulas: &[Formula], linear: Option<&Linear>, residual: bool) -> Result<Self> {
+        let state = formulas.iter().map(|formula| inputs::values(formula, flight)).collect::<Result<_>>()?;
         let mut baseline = model.predict(flight)?;
         if let Some(linear) = linear {
             let signals = Signals::new(flight, linear.config())?;
@@ -93,22 +94,15 @@ fn copy_ending_at(rows: &[f32], last: usize, channels: usize, target: &mut [f32]
     target.copy_from_slice(&rows[end - target.len()..end]);
 }
 
-/// Parses the inputs of a hybrid.
-///
-/// # Errors
-/// [`Error::Formula`] pointing at the character.
-pub fn parse_inputs(inputs: &[String]) -> Result<Vec<Formula>> {
-    inputs.iter().map(|text| Formula::parse(text)).collect()
-}
-
 /// The flights of a data set as sequences, as the description says.
 ///
 /// # Errors
-/// [`Error::Formula`] if an input or an effect names a column that a flight lacks; [`Error::Undetermined`] if a value is not
+/// [`Error::Formula`] if an input names a column that a flight lacks, or an acceleration or what gives one away, or if an effect names a
+/// column that a flight lacks; [`Error::Undetermined`] if a value is not
 /// finite: a NaN never reaches the network.
 pub fn sequences(flights: &[Flight], description: &Description) -> Result<Vec<Sequence>> {
     let Description { model, config, inputs, linear, scaling, .. } = description;
-    let formulas = parse_inputs(inputs)?;
+    let formulas = inputs::parse(inputs)?;
     let one = |flight: &Flight| {
         let raw = Raw::new(flight, model, &formulas, linear.as_ref(), config.predicts_residual())?;
         let sequence = Sequence::new(raw, scaling);
@@ -130,7 +124,7 @@ pub fn scaling(
     linear: Option<&Linear>,
     network: &Architecture,
 ) -> Result<Scaling> {
-    let formulas = parse_inputs(inputs)?;
+    let formulas = inputs::parse(inputs)?;
     let residual = network.predicts_residual();
     let raw: Vec<Raw> = flights.iter().map(|flight| Raw::new(flight, model, &formulas, linear, residual)).collect::<Result<_>>()?;
     let of = |column: &dyn Fn(&Raw) -> &Vec<f64>| {

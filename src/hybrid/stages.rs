@@ -37,7 +37,7 @@ impl Hybrid {
         Ok(Stages {
             physics: windows.iter().map(alone).collect(),
             with_linear: added.then(|| windows.iter().map(with_linear).collect()),
-            hybrid: self.complete_windows(&sequences, windows, threads)?,
+            hybrid: self.complete_windows(flights, &sequences, windows, threads)?,
         })
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Hybrid;
 use super::linear::Linear;
-use super::sequence::parse_inputs;
+use super::inputs;
 use crate::error::{Error, Result};
 use crate::formula::StreamingFormula;
 use crate::physics::{StreamingModel, quantity_at};
@@ -30,7 +30,7 @@ fn known(name: &str) -> bool {
 impl<'a> StreamingHybrid<'a> {
     pub(super) fn new(hybrid: &'a Hybrid) -> Result<Self> {
         let description = hybrid.description();
-        let formulas = parse_inputs(&description.inputs)?;
+        let formulas = inputs::parse(&description.inputs)?;
         if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&known)) {
             return Err(error);
         }
@@ -108,7 +108,7 @@ struct StreamingLinear {
 
 impl StreamingLinear {
     fn new(linear: &Linear, step_s: f64) -> Result<Self> {
-        let formulas = parse_inputs(&linear.config().inputs)?;
+        let formulas = inputs::parse(&linear.config().inputs)?;
         if let Some(error) = formulas.iter().find_map(|formula| formula.unknown_name(&known)) {
             return Err(error);
         }

@@ -79,6 +79,7 @@ pub fn network_target(
             let (start_s, step_s) = (flight.time_s(target.first), flight.step_s * stride as f64);
             let mut made = Flight::new(flight.name.clone(), flight.manoeuvre.clone(), start_s, step_s, columns, flight.targets)?;
             made.absent.clone_from(&flight.absent);
+            made.tainted.clone_from(&flight.tainted);
             made.extra = flight.extra.iter().map(|(name, values)| (name.clone(), pick(values))).collect();
             Ok::<_, Error>(made)
         };

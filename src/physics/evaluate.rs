@@ -132,6 +132,9 @@ impl Program {
         let known: Vec<&str> = standard_names().into_iter().chain(flight.extra.keys().map(String::as_str)).collect();
         for formula in formulas {
             formula.check_names(&known)?;
+            if let Some(error) = formula.refused_name(&|name| flight.gives_target_away(name)) {
+                return Err(error);
+            }
             let formula = formula.stream(flight.step_s)?;
             let inputs = formula.inputs().iter().map(|name| program.source(name)).collect();
             let place = Place { effect: 0, coefficient: None, channel: 0 };
@@ -151,6 +154,19 @@ impl Program {
                     Source::Derived(derived) => derived.reads(),
                     Source::Extra(_) => &[],
                 };
+                let name = match source {
+                    Source::State(column) => column.name(),
+                    Source::Derived(derived) => derived.name(),
+                    Source::Extra(index) => program.extras.get(*index).map_or("", String::as_str),
+                };
+                if let Some(reason) = flight.gives_target_away(name) {
+                    let effect = model.effects.get(term.place.effect).map_or("?", |effect| effect.name.as_str());
+                    return Err(Error::Log {
+                        path: (&flight.name).into(),
+                        found: format!("effect `{effect}`, which reads `{name}`: {reason}"),
+                        expected: "effects of measured states and controls, which predict accelerations and are not made of them".into(),
+                    });
+                }
                 if let Some(column) = reads.iter().find(|column| flight.absent.contains(column)) {
                     let effect = model.effects.get(term.place.effect).map_or("?", |effect| effect.name.as_str());
                     return Err(Error::Log {
