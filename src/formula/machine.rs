@@ -102,7 +102,7 @@ impl Builder<'_> {
                 if history == History::Delay && samples > MAX_DELAY_SAMPLES {
                     let step_s = self.step_s;
                     let message = format!(
-                        "the time of `delay` is {time_s} s, {samples:.0} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:.0} can be kept"
+                        "the time of `delay` is {time_s} s, {samples:.1e} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:e} can be kept"
                     );
                     return Err(self.fault(message, at));
                 }

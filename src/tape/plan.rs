@@ -565,6 +565,16 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn a_graph_that_no_machine_can_hold_is_refused_before_its_slab_is_asked_for() -> Result<()> {
+        let mut graph = Graph::<f64>::new();
+        let x = graph.input("x", &[1 << 20, 1 << 10])?;
+        let y = graph.apply(Activation { kind: Kind::Tanh }, &[x])?;
+        let refused = Plan::infer(&graph, &[y]).map(|_| ());
+        assert!(refused.is_err_and(|error| error.to_string().contains("make history or width smaller")));
+        Ok(())
+    }
+
+    #[test]
     fn an_operation_without_backward_is_refused_by_name_only_where_it_matters() -> Result<()> {
         let mut graph = Graph::<f64>::new();
         let (x, target) = (graph.input("x", &[2, 2])?, graph.input("target", &[2, 2])?);

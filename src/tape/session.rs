@@ -32,6 +32,9 @@ mod replay;
 mod shards;
 mod update;
 
+/// Most numbers of all samples of a step in which they wait for each other: 32 GiB in f32.
+const LARGEST_STEP: usize = 1 << 33;
+
 /// Key of the random streams of one training step. With the same key the same dropout masks are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DropoutKey {
@@ -103,6 +106,7 @@ impl<T: Real> Session<T> {
         let level = instruction_set()?;
         let trains = plan.loss.is_some();
         let count = threads.count();
+        let workers = Workers::new(count)?;
         // Inference has nothing to sum, so its number of shards is free.
         let shards = if trains { SHARDS } else { SHARDS.max(count) };
         let [gradient_len, shard_len] = [plan.parameter_len, plan.shard_len()].map(|len| if trains { len } else { 0 });
@@ -118,7 +122,7 @@ impl<T: Real> Session<T> {
             losses: Vec::new(),
             results: Vec::new(),
             lockstep: plan.forward.iter().any(|step| step.op.coupling().is_some()).then(Lockstep::default),
-            workers: Workers::new(count)?,
+            workers,
             plan,
         })
     }
@@ -144,8 +148,10 @@ impl<T: Real> Session<T> {
     /// holds the gradient of that mean. `dropout: None` turns dropout off.
     ///
     /// # Errors
-    /// [`Error::Shape`] if `parameters` is not as long as the graph's flat slab.
+    /// [`Error::Shape`] if `parameters` is not as long as the graph's flat slab, or if the plan couples samples and there are more than
+    /// can be held in memory together.
     pub fn step(&mut self, parameters: &[T], samples: usize, dropout: Option<DropoutKey>, fill: Fill<'_, T>) -> Result<f64> {
+        self.check_lanes(samples, dropout)?;
         self.pack(parameters)?;
         // What was loaded is not what is packed any more.
         self.loaded.clear();
@@ -178,6 +184,17 @@ impl<T: Real> Session<T> {
             each(sample, &self.results[sample * result_len..][..output_len]);
         }
         Ok(())
+    }
+
+    /// Samples that wait for each other have a slab each.
+    fn check_lanes(&self, samples: usize, dropout: Option<DropoutKey>) -> Result<()> {
+        let numbers = samples.saturating_mul(self.plan.slab_len);
+        if self.lockstep.is_none() || dropout.is_none() || numbers <= LARGEST_STEP {
+            return Ok(());
+        }
+        let most = LARGEST_STEP / self.plan.slab_len.max(1);
+        let message = format!("{samples} samples that wait for each other, {numbers} numbers; at most {most} samples: lower `batch`");
+        Err(Error::Shape { operation: "session", message })
     }
 
     fn check(&self, parameters: &[T]) -> Result<()> {
@@ -507,6 +524,14 @@ mod tests {
             }
             assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
         }
+        Ok(())
+    }
+
+    #[test]
+    fn more_threads_than_there_may_be_are_refused() -> Result<()> {
+        let (graph, loss, _) = shared_weight::<f32>()?;
+        let refused = Session::train(&graph, loss, &[], Threads(100_000)).map(|_| ());
+        assert!(refused.is_err_and(|error| error.to_string().contains("`threads` is 100000, expected 0 (all cores) to 1024")));
         Ok(())
     }
 

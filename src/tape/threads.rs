@@ -6,11 +6,15 @@
 use crate::error::Error;
 use crate::error::Result;
 
-/// How many threads a session works on; 0 means all cores. Without the feature `rayon`, always the calling one.
+/// How many threads a session works on, at most [`Threads::MOST`]; 0 means all cores. Without the feature `rayon`, always the calling
+/// one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Threads(pub usize);
 
 impl Threads {
+    /// Most threads of a session.
+    pub const MOST: usize = 1024;
+
     /// The number meant.
     pub(super) fn count(self) -> usize {
         match self.0 {
@@ -57,9 +61,13 @@ impl Workers {
     /// This many threads.
     ///
     /// # Errors
-    /// [`Error::Config`] if they cannot be started.
+    /// [`Error::Config`] if they are more than [`Threads::MOST`](super::Threads::MOST), or cannot be started.
     #[cfg(feature = "rayon")]
     pub(super) fn new(count: usize) -> Result<Self> {
+        if count > Threads::MOST {
+            let (place, field) = ("session".into(), "threads".into());
+            return Err(Error::Config { place, field, found: count.to_string(), expected: format!("0 (all cores) to {}", Threads::MOST) });
+        }
         Ok(Self { pool: if count > 1 { Some(pool(count)?) } else { None } })
     }
 

@@ -3,11 +3,19 @@
 use super::schedule::WARMUP_EPOCHS;
 use crate::error::{Error, Result};
 use crate::flight::windows::TRAINING_STRIDE;
+use crate::hybrid::inputs;
 use crate::hybrid::linear::LinearConfig;
-use crate::nn::Architecture;
+use crate::nn::{Architecture, PhyTureConfig};
 use serde::{Deserialize, Serialize};
 
-/// Settings of a training run. Every field has a default, the paper's where it states one.
+/// Longest time between checkpoints, s.
+const LONGEST_CHECKPOINT_S: f64 = 86_400.0;
+
+/// Largest distance of the blocks that are kept for the gate.
+const MOST_GATE_EVERY: usize = 1_000_000;
+
+/// Settings of a training run. Every field has a default, the paper's where it states one; what fits into minutes is
+/// [`TrainConfig::in_minutes`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrainConfig {
@@ -19,15 +27,15 @@ pub struct TrainConfig {
     /// A linear history between physics and network: ridge regression of what physics leaves over, fitted in closed form before
     /// the network. Default none, as in the paper.
     pub linear: Option<LinearConfig>,
-    /// Passes over the training windows. Default 100; the paper does not state its number.
+    /// Passes over the training windows, at most 1 000 000. Default 100; the paper does not state its number.
     pub epochs: usize,
-    /// Windows a step. Default 32.
+    /// Windows a step, at most 65 536. Default 32.
     pub batch: usize,
     /// Peak learning rate. Default 1e-3 (paper section 4.2).
     pub peak_rate: f64,
-    /// Epochs of warm-up, at most a tenth of all. Default 10 (paper section 4.2).
+    /// Epochs of warm-up; at most a tenth of all are taken. Default 10 (paper section 4.2).
     pub warmup_epochs: usize,
-    /// Samples between training windows. Default 50.
+    /// Samples between training windows, at most 1 000 000. Default 50.
     pub stride: usize,
     /// Weight of each channel's squared error in the loss is 1/σ² of the residual instead of 1. Default off (paper eq. 13).
     pub standardise_loss: bool,
@@ -36,7 +44,7 @@ pub struct TrainConfig {
     pub gate_every: usize,
     /// Seed of initial weights, order and dropout. Default 0.
     pub seed: u64,
-    /// Seconds between checkpoints. Default 30.
+    /// Seconds between checkpoints, at most a day. Default 30.
     pub checkpoint_s: f64,
 }
 
@@ -60,32 +68,40 @@ impl Default for TrainConfig {
 }
 
 impl TrainConfig {
-    /// Reads a TOML file; what it leaves out keeps its default.
-    ///
-    /// # Errors
-    /// [`Error::Io`], or [`Error::Config`] naming line and field, with the fields there are.
-    #[cfg(feature = "files")]
-    pub fn read(path: &std::path::Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
-        let config: Self = toml::from_str(&text).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
-        config.check()?;
-        Ok(config)
+    /// Most epochs.
+    pub const MOST_EPOCHS: usize = 1_000_000;
+    /// Most windows a step.
+    pub const MOST_BATCH: usize = 65_536;
+    /// Most samples between windows.
+    pub const MOST_STRIDE: usize = 1_000_000;
+
+    /// What ends in a few minutes on two cores and half an hour of flight at 100 Hz: a history of 128 samples, width 32, 20 epochs, a
+    /// window every 12 samples.
+    pub fn in_minutes() -> Self {
+        let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
+        Self { network: network.into(), epochs: 20, stride: 12, ..Self::default() }
     }
 
-    /// Checks every field against its range.
+    /// Checks every field against its range, and that no input is a target or made of one.
     ///
     /// # Errors
-    /// [`Error::Config`] naming the field, its value and its range.
+    /// [`Error::Config`] naming the field, its value and its range; [`Error::Formula`] pointing into an input.
     pub fn check(&self) -> Result<()> {
-        let at_least_one = [("epochs", self.epochs), ("batch", self.batch), ("stride", self.stride)];
-        if let Some((field, value)) = at_least_one.into_iter().find(|(_, value)| *value == 0) {
-            return Err(fault(field, value, "at least 1"));
+        let counts = [
+            ("epochs", self.epochs, 1, Self::MOST_EPOCHS),
+            ("batch", self.batch, 1, Self::MOST_BATCH),
+            ("stride", self.stride, 1, Self::MOST_STRIDE),
+            ("warmup_epochs", self.warmup_epochs, 0, Self::MOST_EPOCHS),
+            ("gate_every", self.gate_every, 0, MOST_GATE_EVERY),
+        ];
+        if let Some((field, value, least, most)) = counts.into_iter().find(|(_, value, least, most)| value < least || value > most) {
+            return Err(fault(field, value, &format!("{least} to {most}")));
         }
         if !(self.peak_rate > 0.0 && self.peak_rate <= 1.0) {
             return Err(fault("peak_rate", self.peak_rate, "a learning rate above 0 and at most 1"));
         }
-        if !(self.checkpoint_s >= 0.0 && self.checkpoint_s.is_finite()) {
-            return Err(fault("checkpoint_s", self.checkpoint_s, "seconds, 0 or more"));
+        if !(0.0..=LONGEST_CHECKPOINT_S).contains(&self.checkpoint_s) {
+            return Err(fault("checkpoint_s", self.checkpoint_s, &format!("0 to {LONGEST_CHECKPOINT_S} seconds")));
         }
         if self.inputs.len() != self.network.state_channels() {
             return Err(fault(
@@ -97,6 +113,7 @@ impl TrainConfig {
         if self.gate_every == 1 {
             return Err(fault("gate_every", 1, "0 (no gate), or 2 and more: 1 would leave nothing to train on"));
         }
+        inputs::parse(&self.inputs)?;
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
         self.network.check()
     }
@@ -122,6 +139,31 @@ mod tests {
         assert!(message(TrainConfig { epochs: 0, ..Default::default() }).contains("`epochs` is 0"));
         assert!(message(TrainConfig { peak_rate: f64::NAN, ..Default::default() }).contains("`peak_rate` is NaN"));
         assert!(message(TrainConfig { inputs: vec!["vx".into()], ..Default::default() }).contains("state_channels"));
+    }
+
+    #[test]
+    fn every_count_has_a_bound_and_no_product_of_bounds_overflows() {
+        let set: [(&str, fn(&mut TrainConfig, usize)); 5] = [
+            ("epochs", |config, value| config.epochs = value),
+            ("batch", |config, value| config.batch = value),
+            ("stride", |config, value| config.stride = value),
+            ("warmup_epochs", |config, value| config.warmup_epochs = value),
+            ("gate_every", |config, value| config.gate_every = value),
+        ];
+        for (field, set) in set {
+            for value in [1 << 62, 1 << 63, usize::MAX, 1_000_001] {
+                let mut config = TrainConfig::default();
+                set(&mut config, value);
+                let message = config.check().map_err(|error| error.to_string()).err().unwrap_or_default();
+                assert!(message.contains(&format!("`{field}` is {value}, expected ")), "{message}");
+            }
+        }
+        // Windows are counted in 32 bits.
+        assert!(TrainConfig::MOST_EPOCHS.checked_mul(u32::MAX as usize).is_some());
+        assert!(TrainConfig::in_minutes().check().is_ok());
+        for seconds in [-1.0, f64::INFINITY, f64::NAN, 1e300] {
+            assert!(TrainConfig { checkpoint_s: seconds, ..Default::default() }.check().is_err());
+        }
     }
 
     #[cfg(feature = "files")]

@@ -21,6 +21,8 @@ pub struct Job {
     pub windows: Vec<Window>,
     /// Windows kept from training, for the gate; empty without one.
     pub gate_windows: Vec<Window>,
+    /// Windows of the split's validation part, as dense as those that train; empty if the split has none.
+    pub validation: Vec<Window>,
 }
 
 impl Job {
@@ -47,7 +49,9 @@ impl Job {
         let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
         let choose =
             |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
-        Ok(Self { description, sequences, windows: choose(false).collect(), gate_windows: choose(true).collect() })
+        let (training, gate_windows) = (choose(false).collect(), choose(true).collect());
+        let validation = windows(&split.validation, config.network.history(), config.stride);
+        Ok(Self { description, sequences, windows: training, gate_windows, validation })
     }
 
     /// The hybrid with these weights, its gate fitted where windows were kept for one.

@@ -8,6 +8,8 @@ pub mod container;
 mod job;
 pub mod run;
 pub mod schedule;
+#[cfg(feature = "files")]
+mod text;
 pub mod trainer;
 
 pub use config::TrainConfig;

@@ -3,7 +3,7 @@
 //! | file | content |
 //! | --- | --- |
 //! | `checkpoint.phyture` | state of the run, with the configuration and a digest of the data it belongs to |
-//! | `metrics.jsonl` | one line a step |
+//! | `metrics.jsonl` | one line a step; that of an epoch's last step has the validation loss, where the split has a validation part |
 //! | `network.safetensors` | the trained hybrid, written when the run is at its end |
 //!
 //! Killed at any moment, a run loses at most what came after its last checkpoint, and no file is ever half written.
@@ -51,6 +51,8 @@ pub struct Report {
     pub step: StepReport,
     /// Steps of the whole run.
     pub steps: u64,
+    /// Loss on the validation windows, after the last step of an epoch.
+    pub validation_loss: Option<f64>,
 }
 
 impl RunFolder {
@@ -113,7 +115,8 @@ impl RunFolder {
         Ok(checkpoint.state)
     }
 
-    /// Trains until the end or until `go_on` says no, with a checkpoint every `config.checkpoint_s` seconds and at the end.
+    /// Trains until the end or until `go_on` says no, with a checkpoint every `config.checkpoint_s` seconds and at the end. Where the
+    /// trainer has validation windows, they are judged after each epoch.
     ///
     /// # Errors
     /// What [`Trainer::step`] and writing give. On a diverged run the last good state is saved first.
@@ -138,8 +141,10 @@ impl RunFolder {
                     return Err(error);
                 }
             };
-            metrics.line(&step, begun.elapsed().as_secs_f64())?;
-            let stop = !go_on(&Report { step, steps: trainer.steps() });
+            let ends_epoch = step.step.is_multiple_of(trainer.steps_an_epoch() as u64);
+            let validation_loss = if ends_epoch { trainer.validation_loss()? } else { None };
+            metrics.line(&step, validation_loss, begun.elapsed().as_secs_f64())?;
+            let stop = !go_on(&Report { step, steps: trainer.steps(), validation_loss });
             if stop || saved.elapsed().as_secs_f64() >= config.checkpoint_s {
                 metrics.flush()?;
                 save(trainer.state())?;
@@ -174,14 +179,16 @@ impl Metrics {
         Ok(Self { path: path.into(), file: BufWriter::new(file) })
     }
 
-    fn line(&mut self, step: &StepReport, seconds: f64) -> Result<()> {
+    fn line(&mut self, step: &StepReport, validation_loss: Option<f64>, seconds: f64) -> Result<()> {
         #[derive(Serialize)]
         struct Line<'a> {
             #[serde(flatten)]
             step: &'a StepReport,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            validation_loss: Option<f64>,
             seconds: f64,
         }
-        let text = serde_json::to_string(&Line { step, seconds })
+        let text = serde_json::to_string(&Line { step, validation_loss, seconds })
             .map_err(|error| Error::File { path: self.path.clone(), message: error.to_string() })?;
         writeln!(self.file, "{text}").map_err(Error::io(&self.path))
     }

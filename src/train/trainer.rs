@@ -39,12 +39,21 @@ pub struct StepReport {
     pub gradient_norm: f64,
 }
 
+/// Windows that are judged at a time.
+const CHUNK: usize = 64;
+
 /// A training run in memory.
 pub struct Trainer<'a> {
     config: &'a TrainConfig,
+    network: &'a Network<f32>,
     sequences: &'a [Sequence],
     windows: &'a [Window],
+    /// Windows that nothing is learned from.
+    validation: &'a [Window],
     session: Session<f32>,
+    /// For losses without dropout; made when the first is asked for.
+    judge: Option<Session<f32>>,
+    threads: Threads,
     schedule: Schedule,
     state: State,
     /// Order of the windows in `epoch_of_order`.
@@ -59,7 +68,7 @@ impl<'a> Trainer<'a> {
     /// [`Error::Undetermined`] if there are no windows; [`Error::File`] if the state is not one of this network.
     pub fn new(
         config: &'a TrainConfig,
-        network: &Network<f32>,
+        network: &'a Network<f32>,
         sequences: &'a [Sequence],
         windows: &'a [Window],
         state: Option<State>,
@@ -70,6 +79,10 @@ impl<'a> Trainer<'a> {
                 "no training window: no run of training samples is as long as the history of {} samples; shorten `network.history` or give longer flights",
                 config.network.history()
             )));
+        }
+        if u32::try_from(windows.len()).is_err() {
+            let message = format!("{} training windows; at most {} can be put in order: make `stride` larger", windows.len(), u32::MAX);
+            return Err(Error::Undetermined(message));
         }
         let count = network.graph().parameter_count();
         let state = state.unwrap_or_else(|| State {
@@ -84,7 +97,27 @@ impl<'a> Trainer<'a> {
         }
         let schedule = Schedule::new(config.peak_rate, config.warmup_epochs, config.epochs, windows.len().div_ceil(config.batch));
         let session = Session::train(network.graph(), network.loss(), &[], threads)?;
-        Ok(Self { config, sequences, windows, session, schedule, state, order: Vec::new(), epoch_of_order: None })
+        Ok(Self {
+            config,
+            network,
+            sequences,
+            windows,
+            validation: &[],
+            session,
+            judge: None,
+            threads,
+            schedule,
+            state,
+            order: Vec::new(),
+            epoch_of_order: None,
+        })
+    }
+
+    /// The same run with windows to judge it by, of the same sequences; they change nothing of what is learned.
+    #[must_use]
+    pub fn with_validation(mut self, windows: &'a [Window]) -> Self {
+        self.validation = windows;
+        self
     }
 
     /// Steps in one epoch; the last may have fewer windows than the others.
@@ -100,6 +133,43 @@ impl<'a> Trainer<'a> {
     /// What has been learned so far.
     pub fn state(&self) -> &State {
         &self.state
+    }
+
+    /// Mean loss of the present weights on the training windows, without dropout; the unit is that of [`StepReport::loss`].
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if it is not finite.
+    pub fn training_loss(&mut self) -> Result<f64> {
+        self.loss_on(self.windows)
+    }
+
+    /// The same on the validation windows; `None` if there are none.
+    ///
+    /// # Errors
+    /// As [`Trainer::training_loss`].
+    pub fn validation_loss(&mut self) -> Result<Option<f64>> {
+        if self.validation.is_empty() { Ok(None) } else { self.loss_on(self.validation).map(Some) }
+    }
+
+    fn loss_on(&mut self, windows: &[Window]) -> Result<f64> {
+        let Self { network, sequences, judge, state, threads, .. } = self;
+        let session = match judge {
+            Some(session) => session,
+            None => judge.insert(Session::infer(network.graph(), &[network.loss()], *threads)?),
+        };
+        session.load(&state.parameters)?;
+        let mut sum = 0.0;
+        for chunk in windows.chunks(CHUNK) {
+            let fill = |sample: usize, inputs: &mut [&mut [f32]]| fill_window(sequences, chunk[sample], inputs);
+            session.predict(chunk.len(), &fill, &mut |_, loss| sum += loss.iter().copied().map(f64::from).sum::<f64>())?;
+        }
+        let mean = sum / windows.len() as f64;
+        if !mean.is_finite() {
+            let (step, rate) = (state.step, self.config.peak_rate);
+            let message = format!("training diverged: after step {step} the loss is {mean}; lower `peak_rate` ({rate})");
+            return Err(Error::Undetermined(message));
+        }
+        Ok(mean)
     }
 
     /// One step; `None` when the run is at its end.
@@ -119,13 +189,7 @@ impl<'a> Trainer<'a> {
         let start = batch * self.config.batch;
         let chosen = &self.order[start..(start + self.config.batch).min(self.order.len())];
         let (sequences, windows) = (self.sequences, self.windows);
-        let fill = |sample: usize, inputs: &mut [&mut [f32]]| {
-            let window = windows[chosen[sample] as usize];
-            if let [state, physics, target] = inputs {
-                sequences[window.flight].history(window.last, state, physics);
-                sequences[window.flight].target(window.last, target);
-            }
-        };
+        let fill = |sample: usize, inputs: &mut [&mut [f32]]| fill_window(sequences, windows[chosen[sample] as usize], inputs);
         let dropout = self.config.network.is_random().then_some(DropoutKey { seed: self.config.seed, step: done });
         let loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
         let gradient_norm = norm(self.session.gradients());
@@ -143,6 +207,14 @@ impl<'a> Trainer<'a> {
         self.session.settle(parameters);
         self.state.step += 1;
         Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
+    }
+}
+
+/// History and target of a window, as the network's inputs.
+fn fill_window(sequences: &[Sequence], window: Window, inputs: &mut [&mut [f32]]) {
+    if let [state, physics, target] = inputs {
+        sequences[window.flight].history(window.last, state, physics);
+        sequences[window.flight].target(window.last, target);
     }
 }
 

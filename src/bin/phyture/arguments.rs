@@ -1,10 +1,43 @@
 //! The commands and their options, as `phyture <command> --help` shows them.
 
 use crate::commands::Shard;
+use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use phyture::flight::split::Protocol;
+use phyture::hybrid::linear::LinearConfig;
 use phyture::protocol::TableId;
+use phyture::tape::Threads;
+use phyture::train::TrainConfig;
+use std::ops::RangeInclusive;
 use std::path::PathBuf;
+
+/// Longest simulated flight time, minutes: a day, 2 GB of memory.
+const MOST_MINUTES: f64 = 1440.0;
+
+/// Most runs of a network in a benchmark, tasks of its job array, and effects that a search names.
+const MOST_SEEDS: usize = 1000;
+const MOST_SHARDS: usize = 10_000;
+const MOST_EFFECTS: usize = 100;
+
+/// Samples between windows.
+const STRIDES: RangeInclusive<usize> = 1..=TrainConfig::MOST_STRIDE;
+
+/// A count in a range, which the error message states.
+fn count(range: RangeInclusive<usize>) -> RangedU64ValueParser<usize> {
+    RangedU64ValueParser::new().range(*range.start() as u64..=*range.end() as u64)
+}
+
+/// A flight time.
+fn minutes(text: &str) -> Result<f64, String> {
+    let minutes = text.parse::<f64>().map_err(|error| error.to_string())?;
+    if minutes > 0.0 && minutes <= MOST_MINUTES { Ok(minutes) } else { Err(format!("expected more than 0 and at most {MOST_MINUTES}")) }
+}
+
+/// A factor.
+fn finite(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().map_err(|error| error.to_string())?;
+    if number.is_finite() { Ok(number) } else { Err("expected a finite number".into()) }
+}
 
 /// Where to begin, and what a script has to know.
 const HELP: &str = "\
@@ -34,8 +67,8 @@ pub struct Common {
     /// Seed of everything random [default: 2030]
     #[arg(long, global = true)]
     pub seed: Option<u64>,
-    /// Threads to work on [default: all cores]
-    #[arg(long, global = true)]
+    /// Threads to work on, at most 1024; 0 is all cores [default: 0]
+    #[arg(long, global = true, allow_negative_numbers = true, value_parser = count(0..=Threads::MOST))]
     pub threads: Option<usize>,
     /// Overwrite what is there already
     #[arg(long, global = true)]
@@ -92,8 +125,8 @@ pub enum Command {
     Simulate {
         /// Folder to write
         dir: PathBuf,
-        /// Flight time, minutes
-        #[arg(long, default_value_t = 30.0)]
+        /// Flight time, minutes, at most 1440
+        #[arg(long, default_value_t = 30.0, allow_negative_numbers = true, value_parser = minutes)]
         minutes: f64,
         /// Switch one effect on in the truth that the model file beside the data does not list; EFFECT or EFFECT=SCALE; repeatable
         #[arg(long, value_name = "EFFECT[=SCALE]")]
@@ -164,13 +197,13 @@ pub enum Command {
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
         /// Samples between evaluated windows [default: 1, or what lets the networks take about a minute]
-        #[arg(long)]
+        #[arg(long, allow_negative_numbers = true, value_parser = count(STRIDES))]
         stride: Option<usize>,
         /// Evaluate every flight, also those that were trained on
         #[arg(long)]
         all: bool,
-        /// Add a ridge regression on so many lags, fitted on the training part, as a further row
-        #[arg(long, value_name = "LAGS")]
+        /// Add a ridge regression on so many lags (1 to 157), fitted on the training part, as a further row
+        #[arg(long, value_name = "LAGS", allow_negative_numbers = true, value_parser = count(1..=LinearConfig::MOST_LAGS))]
         ridge: Option<usize>,
         /// Show how far each network's prediction moves with the intervals of its model's coefficients
         #[arg(long, requires = "network")]
@@ -195,7 +228,7 @@ pub enum Command {
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
         /// Most effects to name
-        #[arg(long, default_value_t = 6)]
+        #[arg(long, default_value_t = 6, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
         max_effects: usize,
         /// What is searched and what only confirms.
         #[command(flatten)]
@@ -221,22 +254,35 @@ pub enum Command {
         division: Division,
     },
     /// Train the residual network; crash-safe checkpoints, Ctrl-C saves
+    ///
+    /// Without a configuration: a history of 128 samples, width 32, 20 epochs, a window every 12 samples. On two cores and 20 min of
+    /// flight at 100 Hz that takes a few minutes. With --paper: a history of 1000 samples, width 64, 100 epochs, a window every 50
+    /// samples; days on two cores. After each epoch the loss on the validation part (of the split `segments`) is shown.
     #[command(
-        after_help = "Example:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume"
+        after_help = "Examples:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume\n  phyture train --print-config > train.toml\n  phyture train flights -m n9-calibrated.toml -o run --config train.toml --epochs 5"
     )]
     Train {
         /// Flights.
         #[command(flatten)]
-        data: Data,
+        data: Option<Data>,
         /// Calibrated model file
-        #[arg(short, long)]
-        model: PathBuf,
+        #[arg(short, long, required_unless_present = "print_config")]
+        model: Option<PathBuf>,
         /// Run folder to write
-        #[arg(short, long)]
-        output: PathBuf,
-        /// Training configuration (TOML)
+        #[arg(short, long, required_unless_present = "print_config")]
+        output: Option<PathBuf>,
+        /// Training configuration (TOML); what it leaves out keeps the default
         #[arg(long, value_name = "FILE")]
         config: Option<PathBuf>,
+        /// The paper's sizes, stride and our reading of its epochs as defaults
+        #[arg(long)]
+        paper: bool,
+        /// Passes over the training windows, 1 to 1000000, in place of the configuration's
+        #[arg(long, value_name = "N", allow_negative_numbers = true, value_parser = count(1..=TrainConfig::MOST_EPOCHS))]
+        epochs: Option<usize>,
+        /// Train nothing; print the configuration in force as commented TOML, for --config
+        #[arg(long)]
+        print_config: bool,
         /// Go on from the run folder's last checkpoint
         #[arg(long)]
         resume: bool,
@@ -244,23 +290,25 @@ pub enum Command {
         #[command(flatten)]
         division: Division,
     },
-    /// Hybrid predictions for every sample that has a full history
-    #[command(after_help = "Example:\n  phyture predict flights -m n9-calibrated.toml -n run -o predictions.parquet")]
+    /// Predictions for every sample: of a network, where there is a full history; or of a model alone
+    #[command(
+        after_help = "Examples:\n  phyture predict flights -n run -o predictions.parquet\n  phyture predict flights -m n9-calibrated.toml -o physics.csv     # physics alone"
+    )]
     Predict {
         /// Flights.
         #[command(flatten)]
         data: Data,
-        /// Model file; the run's own where it is left out
-        #[arg(short, long)]
+        /// Model file: predicts alone without -n; with -n it has to be the run's own, which is taken where it is left out
+        #[arg(short, long, required_unless_present = "network")]
         model: Option<PathBuf>,
         /// Run folder
         #[arg(short, long)]
-        network: PathBuf,
-        /// CSV or Parquet file to write, by its ending
+        network: Option<PathBuf>,
+        /// File to write: .csv or .parquet
         #[arg(short, long)]
         output: PathBuf,
         /// Samples between predictions
-        #[arg(long, default_value_t = 1)]
+        #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = count(STRIDES))]
         stride: usize,
     },
     /// The catalogue of physical effects; add one to a model
@@ -289,7 +337,7 @@ pub enum Command {
         #[arg(long, value_name = "FORMULA")]
         formula: Option<String>,
         /// Times its usual size
-        #[arg(long, default_value_t = 1.0, allow_negative_numbers = true)]
+        #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = finite)]
         scale: f64,
         /// A coefficient or parameter in place of the usual one; repeatable
         #[arg(long, value_name = "NAME=VALUE", conflicts_with = "formula")]
@@ -323,8 +371,8 @@ pub enum Command {
         /// Row of the tables by identifier, such as `timesnet`; repeatable [default: all]
         #[arg(long, value_name = "METHOD")]
         method: Vec<String>,
-        /// Seeds of each network [default: the plan's]
-        #[arg(long)]
+        /// Seeds of each network, at most 1000 [default: the plan's]
+        #[arg(long, allow_negative_numbers = true, value_parser = count(1..=MOST_SEEDS))]
         seeds: Option<usize>,
         /// Budget: the paper's (days), an hour's for table 1, or one that only shows that it works
         #[arg(long, value_enum, default_value_t = Plans::Paper)]
@@ -342,7 +390,7 @@ pub enum Command {
         #[arg(long, value_name = "SYSTEM", value_parser = ["slurm"], conflicts_with = "shard")]
         emit: Option<String>,
         /// Tasks of the job array
-        #[arg(long, default_value_t = 10, requires = "emit")]
+        #[arg(long, default_value_t = 10, requires = "emit", allow_negative_numbers = true, value_parser = count(1..=MOST_SHARDS))]
         shards: usize,
     },
     /// The language of formulas: its operators, functions and names; or what a formula of yours is read as

@@ -70,5 +70,14 @@ impl<T: Real> Differentiable<T> for PositionalEncoding {
 mod tests {
     use super::*;
 
+    #[test]
+    fn recording_makes_no_table_and_reading_makes_it_once() {
+        let claimed = PositionalEncoding::new(100_000, 4096);
+        assert!(claimed.table.get().is_none());
+        let encoding = PositionalEncoding::new(3, 2);
+        assert_eq!(encoding.table()[..2], [0.0, 1.0]);
+        assert!(std::ptr::eq(encoding.table(), encoding.table()));
+    }
+
     gradcheck!(positional_encoding: PositionalEncoding::new(7, 4), [[7, 4]]);
 }

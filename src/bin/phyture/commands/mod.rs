@@ -70,11 +70,24 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             };
             compare::run(&context, data, &wanted, division)
         }
-        Command::Train { data, model, output, config, resume, division } => {
-            train::run(&context, data, &train::Wanted { model, output, config: config.as_deref(), resume: *resume }, division)
+        Command::Train { data, model, output, config, paper, epochs, print_config, resume, division } => {
+            let settings = train::Settings { config: config.as_deref(), paper: *paper, epochs: *epochs };
+            match (data, model, output) {
+                _ if *print_config => train::print_config(&context, &settings),
+                (Some(data), Some(model), Some(output)) => {
+                    train::run(&context, data, &train::Wanted { model, output, settings, resume: *resume }, division)
+                }
+                _ => Err(Error::Config {
+                    place: "command line".into(),
+                    field: "DATA".into(),
+                    found: "nothing".into(),
+                    expected: "the flights to train on: phyture train DATA -m MODEL -o RUN".into(),
+                }),
+            }
         }
         Command::Predict { data, model, network, output, stride } => {
-            predict::run(&context, data, &predict::Wanted { model: model.as_deref(), network, output, stride: *stride })
+            let (model, network) = (model.as_deref(), network.as_deref());
+            predict::run(&context, data, &predict::Wanted { model, network, output, stride: *stride })
         }
         Command::Diagnose { data, model, of_network, report, max_effects, division } => {
             let (model, of_network, report) = (model.as_deref(), of_network.as_deref(), report.as_deref());

@@ -1,12 +1,12 @@
-//! `predict`: hybrid predictions for every sample with a full history, as CSV or Parquet.
+//! `predict`: the accelerations that a hybrid or a model predicts, as CSV or Parquet.
 
 use super::Context;
 use crate::arguments::Data;
 use crate::output::Progress;
 use phyture::flight::windows::windows;
 use phyture::flight::write::{self, Values};
-use phyture::flight::{Column, Span};
-use phyture::hybrid::Hybrid;
+use phyture::flight::{Column, DataSet, Flight, Span, Window};
+use phyture::hybrid::{Hybrid, check_finite};
 use phyture::physics::Model;
 use phyture::{Error, Result};
 use serde::Serialize;
@@ -15,10 +15,10 @@ use std::process::ExitCode;
 
 /// What was asked for.
 pub struct Wanted<'a> {
-    /// Model file, to be the one that the network was trained on.
+    /// Model file: what predicts without a network; with one, to be the one that it was trained on.
     pub model: Option<&'a Path>,
     /// Run folder or network file.
-    pub network: &'a Path,
+    pub network: Option<&'a Path>,
     /// File to write.
     pub output: &'a Path,
     /// Samples between predictions.
@@ -29,6 +29,8 @@ pub struct Wanted<'a> {
 #[derive(Serialize)]
 struct Output {
     predictions: PathBuf,
+    /// `hybrid` or `physics`.
+    of: &'static str,
     rows: usize,
     flights: usize,
 }
@@ -38,23 +40,96 @@ pub fn read_network(path: &Path) -> Result<Hybrid> {
     Hybrid::read(&if path.is_dir() { path.join("network.safetensors") } else { path.into() })
 }
 
-/// Predicts and writes one table: flight, manoeuvre, t, measured and predicted accelerations.
-pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
-    let target = context.new_file(wanted.output, &[])?;
-    let hybrid = read_network(wanted.network)?;
-    if let Some(path) = wanted.model {
-        let model = Model::read(path)?;
-        if model.effects != hybrid.description().model.effects {
-            return Err(Error::Config {
+/// A file that can be written, by its ending.
+#[derive(Clone, Copy)]
+enum Format {
+    Csv,
+    Parquet,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self> {
+        let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        match ending.as_deref() {
+            Some("csv") => Ok(Self::Csv),
+            Some("parquet") => Ok(Self::Parquet),
+            _ => Err(Error::Config {
+                place: "command line".into(),
+                field: "--output".into(),
+                found: format!("`{}`", path.display()),
+                expected: "a file that ends in .csv or .parquet".into(),
+            }),
+        }
+    }
+}
+
+/// What predicts.
+enum Predictor {
+    Hybrid(Box<Hybrid>),
+    Physics(Model),
+}
+
+impl Predictor {
+    fn new(wanted: &Wanted) -> Result<Self> {
+        let model = wanted.model.map(Model::read).transpose()?;
+        let Some(network) = wanted.network else {
+            return model.map(Self::Physics).ok_or_else(|| Error::Config {
+                place: "command line".into(),
+                field: "--model, --network".into(),
+                found: "neither".into(),
+                expected: "a model, a network, or both".into(),
+            });
+        };
+        let hybrid = read_network(network)?;
+        match (wanted.model, model) {
+            (Some(path), Some(model)) if model.effects != hybrid.description().model.effects => Err(Error::Config {
                 place: path.display().to_string(),
                 field: "effect".into(),
                 found: "effects or coefficients other than those the network was trained on".into(),
                 expected: "the model of the run (a residual belongs to its baseline); train again, or leave out -m".into(),
-            });
+            }),
+            _ => Ok(Self::Hybrid(Box::new(hybrid))),
         }
     }
-    let set = context.flights(data, hybrid.description().config.history())?;
-    let history = hybrid.description().config.history();
+
+    const fn name(&self) -> &'static str {
+        match self {
+            Self::Hybrid(_) => "hybrid",
+            Self::Physics(_) => "physics",
+        }
+    }
+
+    /// Samples that a prediction needs.
+    fn history(&self) -> usize {
+        match self {
+            Self::Hybrid(hybrid) => hybrid.description().config.history(),
+            Self::Physics(_) => 1,
+        }
+    }
+
+    /// At the windows of one flight, all of them finite.
+    fn predict(&self, context: &Context, flight: &Flight, windows: &[Window]) -> Result<Vec<[f64; 6]>> {
+        match self {
+            Self::Hybrid(hybrid) => hybrid.predict(std::slice::from_ref(flight), windows, context.threads()),
+            Self::Physics(model) => {
+                let columns = model.predict(flight)?;
+                let at = |window: &Window| {
+                    let values = std::array::from_fn(|channel| columns[channel][window.last]);
+                    check_finite(flight, window.last, &values).map(|()| values)
+                };
+                windows.iter().map(at).collect()
+            }
+        }
+    }
+}
+
+/// Predicts and writes one table: flight, manoeuvre, t, measured and predicted accelerations.
+pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
+    let format = Format::of(wanted.output)?;
+    let target = context.new_file(wanted.output, &[])?;
+    let predictor = Predictor::new(wanted)?;
+    let history = predictor.history();
+    let set = context.flights(data, history)?;
     let whole = |flight: usize| Span { flight, start: 0, end: set.flights[flight].len() };
     let all = windows(&(0..set.flights.len()).map(whole).collect::<Vec<_>>(), history, wanted.stride);
     let mut predicted = Vec::with_capacity(all.len());
@@ -62,11 +137,18 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
     for flight in &set.flights {
         // One flight at a time, so that there is something to show.
         let of_flight = windows(&[Span { flight: 0, start: 0, end: flight.len() }], history, wanted.stride);
-        predicted.extend(hybrid.predict(std::slice::from_ref(flight), &of_flight, context.threads())?);
+        predicted.extend(predictor.predict(context, flight, &of_flight)?);
         progress.at(predicted.len() as u64, String::new);
     }
     drop(progress);
-    let windows = all;
+    write(context.ready(&target)?, format, &set, &all, &predicted)?;
+    let of = predictor.name();
+    context.say(format!("{} predictions of the {of} written to {}", all.len(), wanted.output.display()));
+    context.json(&Output { predictions: wanted.output.into(), of, rows: all.len(), flights: set.flights.len() })?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(path: &Path, format: Format, set: &DataSet, windows: &[Window], predicted: &[[f64; 6]]) -> Result<()> {
     let numbers = |value: &dyn Fn(usize) -> f64| (0..windows.len()).map(value).collect::<Vec<f64>>();
     let flight_of = |row: usize| &set.flights[windows[row].flight];
     let text = |value: &dyn Fn(usize) -> String| (0..windows.len()).map(value).collect::<Vec<String>>();
@@ -78,11 +160,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
     }
     let mut table = vec![("manoeuvre", Values::Text(&manoeuvres)), ("flight", Values::Text(&flights))];
     table.extend(columns.iter().map(|(name, values)| (name.as_str(), Values::Numbers(values))));
-    match wanted.output.extension().and_then(|ending| ending.to_str()) {
-        Some("parquet") => write::table_parquet(context.ready(&target)?, &table)?,
-        _ => write::table_csv(context.ready(&target)?, &table)?,
+    match format {
+        Format::Csv => write::table_csv(path, &table),
+        Format::Parquet => write::table_parquet(path, &table),
     }
-    context.say(format!("{} predictions written to {}", windows.len(), wanted.output.display()));
-    context.json(&Output { predictions: wanted.output.into(), rows: windows.len(), flights: set.flights.len() })?;
-    Ok(ExitCode::SUCCESS)
 }

@@ -7,7 +7,7 @@ use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet};
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
-use phyture::train::{Job, Outcome, RunFolder, TrainConfig, Trainer};
+use phyture::train::{Job, Outcome, Report, RunFolder, TrainConfig, Trainer};
 use phyture::{Error, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -22,10 +22,42 @@ pub struct Wanted<'a> {
     pub model: &'a Path,
     /// Run folder.
     pub output: &'a Path,
-    /// Training configuration.
-    pub config: Option<&'a Path>,
+    /// Where the configuration comes from.
+    pub settings: Settings<'a>,
     /// Go on from the checkpoint.
     pub resume: bool,
+}
+
+/// Where the configuration of a run comes from.
+pub struct Settings<'a> {
+    /// File, over the defaults.
+    pub config: Option<&'a Path>,
+    /// Whether the defaults are the paper's.
+    pub paper: bool,
+    /// Over the file.
+    pub epochs: Option<usize>,
+}
+
+impl Settings<'_> {
+    /// The configuration in force.
+    fn config(&self, context: &Context) -> Result<TrainConfig> {
+        let base = if self.paper { TrainConfig::default() } else { TrainConfig::in_minutes() };
+        let mut config = self.config.map_or_else(|| Ok(base.clone()), |path| TrainConfig::read_over(path, &base))?;
+        config.seed = context.common.seed.unwrap_or(config.seed);
+        config.epochs = self.epochs.unwrap_or(config.epochs);
+        config.check()?;
+        Ok(config)
+    }
+}
+
+/// Prints the configuration in force, on standard output whatever else is asked for.
+pub fn print_config(context: &Context, settings: &Settings) -> Result<ExitCode> {
+    let config = settings.config(context)?;
+    match context.common.json {
+        Some(_) => context.json(&config)?,
+        None => context.say(config.template()?.trim_end()),
+    }
+    Ok(ExitCode::SUCCESS)
 }
 
 /// What `--json` writes.
@@ -35,15 +67,20 @@ struct Output {
     parameters: usize,
     windows: usize,
     steps: u64,
-    /// Mean loss over the steps of the last epoch, (m/s²)² + (rad/s²)².
-    last_epoch_loss: f64,
+    /// Of the network as it is written, on the windows that trained it, without dropout: mean of the squared errors, summed over the
+    /// channels, (m/s²)² + (rad/s²)².
+    training_loss: f64,
+    /// The same on the validation part, which it was not trained on; none if the split has no validation part.
+    validation_loss: Option<f64>,
+    validation_windows: usize,
+    /// Mean over the steps of the last epoch, dropout on; none if a finished run was gone on with.
+    last_epoch_loss: Option<f64>,
     seconds: f64,
 }
 
 /// Trains on the training part, with checkpoints, until the end or Ctrl-C.
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
-    let mut config = wanted.config.map_or_else(|| Ok(TrainConfig::default()), TrainConfig::read)?;
-    config.seed = context.common.seed.unwrap_or(config.seed);
+    let config = wanted.settings.config(context)?;
     let folder = RunFolder::create(wanted.output)?;
     if !wanted.resume && folder.is_begun() {
         context.existing().refuse(wanted.output, "a training run (which --resume goes on with)")?;
@@ -58,6 +95,39 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let output = task.run(context, wanted.resume, &interrupted)?;
     context.json(&output)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The epoch under way, for the display.
+#[derive(Default)]
+struct Epoch {
+    number: usize,
+    sum: f64,
+    steps: u32,
+    /// Of the last epoch that ended.
+    validation: Option<f64>,
+}
+
+impl Epoch {
+    fn take(&mut self, report: &Report) {
+        if report.step.epoch != self.number {
+            (self.number, self.sum, self.steps) = (report.step.epoch, 0.0, 0);
+        }
+        self.sum += report.step.loss;
+        self.steps += 1;
+        self.validation = report.validation_loss.or(self.validation);
+    }
+
+    /// Mean over its steps so far.
+    fn loss(&self) -> Option<f64> {
+        (self.steps > 0).then(|| self.sum / f64::from(self.steps))
+    }
+}
+
+impl std::fmt::Display for Epoch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "epoch {}  loss {:.4}", self.number + 1, self.loss().unwrap_or(f64::NAN))?;
+        self.validation.map_or(Ok(()), |loss| write!(f, "  validation {loss:.4}"))
+    }
 }
 
 /// A training run, whoever asked for it.
@@ -90,25 +160,26 @@ impl Task<'_> {
         let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
         let state = resume.then(|| folder.resume(config, digest)).transpose()?;
         let network = job.description.network(config.standardise_loss)?;
-        let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
+        let trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
+        let mut trainer = trainer.with_validation(&job.validation);
         context.say(format!(
-            "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs",
+            "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs; {}",
             network.graph().parameter_count(),
             job.windows.len(),
             config.network.history(),
             trainer.steps(),
             config.batch,
-            config.epochs
+            config.epochs,
+            match job.validation.len() {
+                0 => "this split has no validation part".to_owned(),
+                windows => format!("{windows} windows validate"),
+            }
         ));
         let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
-        let (mut sum, mut count, mut epoch) = (0.0, 0_u32, 0);
+        let mut epoch = Epoch::default();
         let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
-            if report.step.epoch != epoch {
-                (sum, count, epoch) = (0.0, 0, report.step.epoch);
-            }
-            sum += report.step.loss;
-            count += 1;
-            progress.at(report.step.step, || format!("loss {:.4}  rate {:.2e}", sum / f64::from(count), report.step.rate));
+            epoch.take(report);
+            progress.at(report.step.step, || format!("{epoch}  rate {:.2e}", report.step.rate));
             !interrupted.load(Ordering::Relaxed)
         })?;
         drop(progress);
@@ -121,7 +192,9 @@ impl Task<'_> {
             );
             return Err(Error::Interrupted { saved });
         }
+        let (training_loss, validation_loss) = (trainer.training_loss()?, trainer.validation_loss()?);
         let (steps, windows, kept) = (trainer.steps(), job.windows.len(), job.gate_windows.len());
+        let validation_windows = job.validation.len();
         let parameters = trainer.state().parameters.clone();
         let hybrid = job.hybrid(&set.flights, parameters, context.threads())?;
         if kept > 0 {
@@ -130,9 +203,9 @@ impl Task<'_> {
             context.say(format!("gate, from {kept} windows kept from training: {}", shown.join("  ")));
         }
         hybrid.write(&folder.network())?;
-        let last_epoch_loss = sum / f64::from(count.max(1));
+        let validation = validation_loss.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
         context.say(format!(
-            "trained in {:.0} s, mean loss of the last epoch {last_epoch_loss:.4}; written to {}",
+            "trained in {:.0} s: {}, training loss {training_loss:.4}, validation loss {validation}",
             begun.elapsed().as_secs_f64(),
             folder.network().display()
         ));
@@ -141,7 +214,10 @@ impl Task<'_> {
             parameters: network.graph().parameter_count(),
             windows,
             steps,
-            last_epoch_loss,
+            training_loss,
+            validation_loss,
+            validation_windows,
+            last_epoch_loss: epoch.loss(),
             seconds: begun.elapsed().as_secs_f64(),
         })
     }
