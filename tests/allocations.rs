@@ -73,7 +73,12 @@ fn the_steady_state_allocates_nothing() -> Result<()> {
                 steps += 1;
                 quiet = if REQUESTS.load(Ordering::Relaxed) == before { quiet + 1 } else { 0 };
             }
-            assert_eq!(quiet, QUIET, "{}, {samples} samples, {threads:?}: no {QUIET} quiet steps in a row among {steps}", config.name());
+            assert_eq!(
+                quiet,
+                QUIET,
+                "{}, {samples} samples, {threads:?}: no {QUIET} quiet steps in a row among {steps}",
+                config.name()
+            );
             sessions.push(session);
         }
     }

@@ -113,7 +113,7 @@ fn folders_of_other_plans_and_impossible_requests_are_refused() -> Result<()> {
         (vec!["benchmark", "collect", "flights"], "the folder of a benchmark"),
         (planned("new", &["--shard", "4/3"]), "I from 1 to N"),
         (planned("new", &["--table", "8"]), "`robustness`"),
-        (planned("new", &["--seeds", "0"]), "`seeds` is 0"),
+        (planned("new", &["--seeds", "0"]), "0 is not in 1..=1000"),
         (vec!["benchmark", "flights"], "--output"),
     ];
     for (arguments, message) in refusals {

@@ -102,3 +102,31 @@ fn the_loop_adds_what_is_hidden_and_noise_and_wrong_coefficients_cost() -> Resul
     assert!(error(&off, Condition::Clean) > error(&baseline, Condition::Clean));
     Ok(())
 }
+
+#[test]
+fn a_damaged_checkpoint_is_kept_and_told_and_the_run_begins_anew() -> Result<()> {
+    let (flights, model) = (flights()?, model()?);
+    let plan = plan(&flights, &model)?;
+    let run = Run { method: "phyture".into(), division: Division::Benchmark, treatment: Treatment::Plain, seed: 1 };
+    let undamaged = perform(&plan, &flights, &model, "phyture")?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let (working, damaged) = (place.path().join("key"), b"PHYTURE\nnot a checkpoint at all");
+    std::fs::create_dir(&working).map_err(Error::io(&working))?;
+    for number in [1, 2] {
+        std::fs::write(working.join("checkpoint.phyture"), damaged).map_err(Error::io(&working))?;
+        let experiment = Experiment::new(&plan, &flights, &model, Threads(2));
+        let outcome = experiment.perform(&run, &working, &mut |_| true)?;
+        assert_eq!(outcome.conditions, undamaged.conditions);
+        let kept = place.path().join(format!("key.damaged-checkpoint-{number}"));
+        assert_eq!(std::fs::read(&kept).map_err(Error::io(&kept))?, damaged);
+        let [note] = &experiment.take_notes()[..] else { panic!("one note is expected") };
+        let parts = [working.join("checkpoint.phyture").display().to_string(), kept.display().to_string()];
+        assert!(parts.iter().all(|part| note.contains(part)) && note.contains("begins anew"), "{note}");
+        assert!(experiment.take_notes().is_empty(), "a note is told once");
+    }
+    // A sound one is gone on with, without a word.
+    let experiment = Experiment::new(&plan, &flights, &model, Threads(2));
+    experiment.perform(&run, &working, &mut |_| true)?;
+    assert!(experiment.take_notes().is_empty());
+    Ok(())
+}

@@ -8,6 +8,7 @@ use phyture::flight::{DataSet, Window};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::{Description, Hybrid, sequence};
 use phyture::nn::PhyTureConfig;
+use phyture::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use phyture::physics::{Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
@@ -22,6 +23,7 @@ struct Job {
     config: TrainConfig,
     description: Description,
     windows: Vec<Window>,
+    validation: Vec<Window>,
 }
 
 fn job() -> Result<Job> {
@@ -50,15 +52,16 @@ fn job() -> Result<Job> {
         gate: [1.0; 6],
         step_s: 0.01,
     };
-    let windows = windows(&split.training, config.network.history(), config.stride);
-    Ok(Job { set, config, description, windows })
+    let [windows, validation] = [&split.training, &split.validation].map(|part| windows(part, 16, config.stride));
+    Ok(Job { set, config, description, windows, validation })
 }
 
 /// Trains in `folder` from `state`, stopping after `stop` steps if it is given.
 fn train(job: &Job, folder: &RunFolder, state: Option<State>, threads: usize, stop: Option<u64>) -> Result<(Outcome, State)> {
     let network = job.description.network(false)?;
     let sequences = sequence::sequences(&job.set.flights, &job.description)?;
-    let mut trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, state, Threads(threads))?;
+    let trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, state, Threads(threads))?;
+    let mut trainer = trainer.with_validation(&job.validation);
     let outcome = folder.train(&job.config, DATA, &mut trainer, &mut |report| stop != Some(report.step.step))?;
     Ok((outcome, trainer.state().clone()))
 }
@@ -89,6 +92,124 @@ fn a_resumed_run_is_the_uninterrupted_one_bit_for_bit_on_any_number_of_threads()
     ] {
         assert_eq!(bits(one), bits(other));
     }
+    // The losses on the validation part are those of the uninterrupted run, too: one at the end of each epoch.
+    let (first, second) = (metrics(&place.path().join("whole"))?, metrics(&place.path().join("parts"))?);
+    assert_eq!(first, second);
+    let epoch = job.windows.len().div_ceil(job.config.batch);
+    assert_eq!(first.len(), 3 * epoch);
+    for (index, line) in first.iter().enumerate() {
+        assert_eq!(line.get("validation_loss").is_some(), (index + 1) % epoch == 0, "{line}");
+    }
+    // And they change nothing of what is learned.
+    let alone = RunFolder::create(place.path().join("alone"))?;
+    let (_, alone) = train(&Job { validation: Vec::new(), ..job }, &alone, None, 2, None)?;
+    assert_eq!(bits(&alone.parameters), bits(&uninterrupted.parameters));
+    Ok(())
+}
+
+/// The lines of a run's metrics, without the time that each took.
+fn metrics(folder: &std::path::Path) -> Result<Vec<serde_json::Value>> {
+    let path = folder.join("metrics.jsonl");
+    let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    let line = |line| -> serde_json::Result<serde_json::Value> {
+        let mut value: serde_json::Value = serde_json::from_str(line)?;
+        value.as_object_mut().and_then(|fields| fields.remove("seconds"));
+        Ok(value)
+    };
+    text.lines().map(line).collect::<serde_json::Result<_>>().map_err(|error| Error::Undetermined(error.to_string()))
+}
+
+#[test]
+fn the_losses_are_means_over_all_windows_without_dropout() -> Result<()> {
+    let job = job()?;
+    let network = job.description.network(false)?;
+    let sequences = sequence::sequences(&job.set.flights, &job.description)?;
+    let trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, None, Threads(2))?;
+    let mut trainer = trainer.with_validation(&job.validation);
+    let hybrid = Hybrid::new(job.description.clone(), trainer.state().parameters.clone())?;
+    let expected = |windows: &[Window]| -> Result<f64> {
+        let predicted = hybrid.predict(&job.set.flights, windows, Threads(1))?;
+        let squares = windows.iter().zip(predicted).flat_map(|(window, predicted)| {
+            let flight = &job.set.flights[window.flight];
+            let measured = phyture::flight::Column::TARGETS.map(|column| flight.column(column)[window.last]);
+            measured.into_iter().zip(predicted).map(|(measured, predicted)| (measured - predicted).powi(2))
+        });
+        Ok(squares.sum::<f64>() / windows.len() as f64)
+    };
+    let close = |found: f64, expected: f64| (found / expected - 1.0).abs() < phyture_kernels::Tolerance::Close.relative_f32();
+    assert!(close(trainer.training_loss()?, expected(&job.windows)?));
+    assert!(trainer.validation_loss()?.is_some_and(|found| expected(&job.validation).is_ok_and(|loss| close(found, loss))));
+    Ok(())
+}
+
+/// The network of a job in a file, with its description changed.
+fn changed(job: &Job, path: &std::path::Path, change: impl FnOnce(&mut serde_json::Value, &mut SafeTensors)) -> Result<()> {
+    let count = job.description.network(false)?.graph().parameter_count();
+    Hybrid::new(job.description.clone(), vec![0.01; count])?.write(path)?;
+    let mut file = SafeTensors::read(path)?;
+    let text = file.metadata.get("phyture_hybrid").cloned().unwrap_or_default();
+    let mut description = serde_json::from_str(&text).map_err(|error| Error::Undetermined(error.to_string()))?;
+    change(&mut description, &mut file);
+    file.metadata.insert("phyture_hybrid".into(), description.to_string());
+    file.write(path)
+}
+
+#[test]
+fn sizes_and_scales_that_a_network_s_file_claims_are_checked_before_anything_is_made_of_them() -> Result<()> {
+    type Change = fn(&mut serde_json::Value);
+    let job = job()?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let path = place.path().join("network.safetensors");
+    let cases: [(Change, &str); 9] = [
+        (|description| description["linear"]["config"]["lags"] = (1_u64 << 63).into(), "`linear.lags` is 9223372036854775808"),
+        (
+            |description| description["linear"]["config"]["lags"] = ((1_u64 << 62) + 1).into(),
+            "`linear.lags` is 4611686018427387905",
+        ),
+        (|description| description["linear"]["config"]["inputs"][0] = "wx_dot".into(), "`wx_dot` cannot be read here"),
+        (|description| description["inputs"][2] = "lag(vx_dot, 0.1)".into(), "`vx_dot` cannot be read here"),
+        (|description| description["scaling"]["output"][1]["deviation"] = 1e308.into(), "deviation 1e308"),
+        (|description| description["scaling"]["state"][1]["mean"] = 1e300.into(), "mean 1e300"),
+        (|description| description["step_s"] = 1e-302.into(), "`step_s`"),
+        (|description| description["gate"][0] = 2.0.into(), "`gate`"),
+        (
+            |description| {
+                description["config"]["history"] = 65536.into();
+                description["config"]["d_model"] = 4096.into();
+            },
+            "tensor `paf.state.weight` is not finite f32 of shape [4096, 16]",
+        ),
+    ];
+    for (change, message) in cases {
+        changed(&job, &path, |description, _| change(description))?;
+        let refused = Hybrid::read(&path).map(|_| ()).map_err(|error| error.to_string()).err().unwrap_or_default();
+        assert!(refused.contains(message) && refused.contains("network.safetensors"), "{message}: {refused}");
+    }
+    changed(&job, &path, |_, _| {})?;
+    assert!(Hybrid::read(&path).is_ok());
+    Ok(())
+}
+
+#[test]
+fn a_prediction_that_is_no_number_is_an_error_with_its_place() -> Result<()> {
+    let job = job()?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let path = place.path().join("network.safetensors");
+    changed(&job, &path, |description, file| {
+        description["scaling"]["output"][1]["deviation"] = 1e15.into();
+        if let Some(Tensor { numbers: Numbers::F32(numbers), .. }) = file.tensors.get_mut("tsdp.output.bias") {
+            numbers[1] = f32::MAX;
+        }
+    })?;
+    let hybrid = Hybrid::read(&path)?;
+    let flights = &job.set.flights[..1];
+    let refused = hybrid.predict(flights, &[Window { flight: 0, last: 40 }], Threads(1));
+    let message = refused.map(|_| ()).map_err(|error| error.to_string()).err().unwrap_or_default();
+    let expected = format!("flight `{}`, sample 40 (", flights[0].name);
+    assert!(message.contains(&expected) && message.contains("predicted `vy_dot` is inf"), "{message}");
+    let count = job.description.network(false)?.graph().parameter_count();
+    let diverged = Hybrid::new(job.description.clone(), vec![f32::NAN; count]).map(|_| ());
+    assert!(diverged.is_err_and(|error| error.to_string().contains("diverged")));
     Ok(())
 }
 

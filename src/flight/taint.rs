@@ -52,9 +52,8 @@ pub(super) fn tainted(table: &RawTable, schema: &Schema) -> BTreeMap<String, Str
     let sources: Vec<(&str, Source)> =
         units::column_names().filter_map(|name| Some((name, Source::of(table, schema, name)?))).collect();
     let states = || sources.iter().filter(|(name, _)| !is_target(name) && *name != "t");
-    let plain: BTreeSet<&str> = states()
-        .filter_map(|(_, source)| if let Source::Column(name) = source { Some(name.as_str()) } else { None })
-        .collect();
+    let plain: BTreeSet<&str> =
+        states().filter_map(|(_, source)| if let Source::Column(name) = source { Some(name.as_str()) } else { None }).collect();
     let of_states: BTreeSet<&str> = states().flat_map(|(_, source)| source.reads()).collect();
 
     // An acceleration's own name gives it away even where the description takes the target from elsewhere.
@@ -65,8 +64,7 @@ pub(super) fn tainted(table: &RawTable, schema: &Schema) -> BTreeMap<String, Str
         let given_away: Vec<&str> = match source {
             Source::Column(name) => vec![name],
             Source::Formula(formula) => {
-                let direct: Vec<&str> =
-                    formula.names_outside_rates().into_iter().filter(|name| !plain.contains(name)).collect();
+                let direct: Vec<&str> = formula.names_outside_rates().into_iter().filter(|name| !plain.contains(name)).collect();
                 let alone: Vec<&str> = direct.iter().copied().filter(|name| !of_states.contains(name)).collect();
                 if alone.is_empty() { direct } else { alone }
             }

@@ -28,7 +28,9 @@ pub(super) fn parse(text: &str) -> Result<Formula> {
         let printed = formula.to_string().chars().count();
         if printed > lexer::MAX_CHARACTERS {
             let most = lexer::MAX_CHARACTERS;
-            return too_long(format!("{printed} characters as it is written to files ({characters} here), at most {most} are allowed"));
+            return too_long(format!(
+                "{printed} characters as it is written to files ({characters} here), at most {most} are allowed"
+            ));
         }
     }
     Ok(formula)

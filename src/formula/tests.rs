@@ -34,7 +34,20 @@ fn formulas() -> impl Strategy<Value = String> {
 
 /// Formulas about as long as they may be, many of which grow when printed.
 fn long_formulas() -> impl Strategy<Value = String> {
-    let words = prop::sample::select(vec!["a", "b", "1e15", "9e15", "-2e15", "1e-5", "0.1e9", ".5", "max(a,b)", "(a<b)", "-a^-b^2", "rate(-(a-b))"]);
+    let words = prop::sample::select(vec![
+        "a",
+        "b",
+        "1e15",
+        "9e15",
+        "-2e15",
+        "1e-5",
+        "0.1e9",
+        ".5",
+        "max(a,b)",
+        "(a<b)",
+        "-a^-b^2",
+        "rate(-(a-b))",
+    ]);
     let operators = prop::sample::select(vec!["+", "-", "*", "/", "^", "-(", "*("]);
     (proptest::collection::vec((words, operators), 150..900), 100..4097_usize).prop_map(|(parts, length)| {
         let (mut text, mut open) = (String::new(), 0);

@@ -55,7 +55,10 @@ mod tests {
     }
 
     /// Formulas of every operator and function around `core`.
-    fn around(core: impl Strategy<Value = String> + 'static, others: impl Strategy<Value = String> + 'static) -> BoxedStrategy<String> {
+    fn around(
+        core: impl Strategy<Value = String> + 'static,
+        others: impl Strategy<Value = String> + 'static,
+    ) -> BoxedStrategy<String> {
         let others = others.boxed();
         core.prop_recursive(4, 16, 2, move |inner| {
             let binary = prop::sample::select(vec!["+", "-", "*", "/", "^", "<", "<=", ">", ">="]);

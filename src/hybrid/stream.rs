@@ -1,8 +1,8 @@
 //! The hybrid in real time: one sample in, one prediction out, on the calling thread.
 
 use super::Hybrid;
-use super::linear::Linear;
 use super::inputs;
+use super::linear::Linear;
 use crate::error::{Error, Result};
 use crate::formula::StreamingFormula;
 use crate::physics::{StreamingModel, quantity_at};

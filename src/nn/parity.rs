@@ -137,9 +137,10 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
     let [state, physics, target] = inputs.map(|(name, shape)| tensor::<T>(file, name, &shape));
     let given = [state?, physics?, target?];
     // All of them are found before memory for them is asked for: the sizes are the file's claim.
-    let of_file = network.parameters().iter().map(|parameter| {
-        Ok((parameter, tensor::<T>(file, &format!("param.{}", parameter.name), &parameter.file_lengths())?))
-    });
+    let of_file = network
+        .parameters()
+        .iter()
+        .map(|parameter| Ok((parameter, tensor::<T>(file, &format!("param.{}", parameter.name), &parameter.file_lengths())?)));
     let of_file: Vec<_> = of_file.collect::<Result<_, Problem>>()?;
     let mut parameters = vec![T::ZERO; network.graph().parameter_count()];
     for (parameter, numbers) in of_file {
@@ -243,9 +244,8 @@ mod tests {
                 input.copy_from_slice(&given[sample * len..][..len]);
             }
         })?;
-        let collect = |part: &dyn Fn(usize) -> Result<Vec<f64>>| {
-            (0..samples).map(part).collect::<Result<Vec<_>>>().map(|each| each.concat())
-        };
+        let collect =
+            |part: &dyn Fn(usize) -> Result<Vec<f64>>| (0..samples).map(part).collect::<Result<Vec<_>>>().map(|each| each.concat());
         put("loss", &[1], vec![loss]);
         put("output", &[samples, 1, 6], collect(&|sample| session.output(0, sample).map(<[f64]>::to_vec))?);
         for (index, (name, shape)) in shapes.into_iter().take(2).enumerate() {

@@ -164,7 +164,8 @@ impl Program {
                     return Err(Error::Log {
                         path: (&flight.name).into(),
                         found: format!("effect `{effect}`, which reads `{name}`: {reason}"),
-                        expected: "effects of measured states and controls, which predict accelerations and are not made of them".into(),
+                        expected: "effects of measured states and controls, which predict accelerations and are not made of them"
+                            .into(),
                     });
                 }
                 if let Some(column) = reads.iter().find(|column| flight.absent.contains(column)) {

@@ -17,7 +17,7 @@ use crate::hybrid::{Hybrid, Scale};
 use crate::nn::Init;
 use crate::physics::{Model, calibrate};
 use crate::tape::Threads;
-use crate::train::{self, Job, RunFolder, TrainConfig, Trainer};
+use crate::train::{self, Job, RunFolder, State, TrainConfig, Trainer};
 use phyture_kernels::random::Stream;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -53,6 +53,8 @@ pub struct Experiment<'a> {
     pub threads: Threads,
     /// What the loop made of the model in each division: the same for every seed.
     amended: Mutex<BTreeMap<Division, (Model, Vec<String>)>>,
+    /// What a person has to be told, in the order in which it came up.
+    notes: Mutex<Vec<String>>,
 }
 
 /// A trained network, and what it took.
@@ -69,7 +71,12 @@ pub type GoOn<'a> = &'a mut dyn FnMut(f64) -> bool;
 impl<'a> Experiment<'a> {
     /// The runs of `plan` on these flights.
     pub const fn new(plan: &'a Plan, flights: &'a [Flight], model: &'a Model, threads: Threads) -> Self {
-        Self { plan, flights, model, threads, amended: Mutex::new(BTreeMap::new()) }
+        Self { plan, flights, model, threads, amended: Mutex::new(BTreeMap::new()), notes: Mutex::new(Vec::new()) }
+    }
+
+    /// What has come up in the runs since this was asked for last, for a person: each once.
+    pub fn take_notes(&self) -> Vec<String> {
+        std::mem::take(&mut *self.notes.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
     /// Makes one run. Its checkpoints are in `working`, from which an interrupted run goes on; the caller removes it afterwards.
@@ -202,7 +209,7 @@ impl<'a> Experiment<'a> {
         // The key has everything in it that the data of a run depend on.
         let identity = self.plan.key(run)?;
         let data = u64::from_str_radix(&identity, 16).unwrap_or_default();
-        let state = folder.resume(config, data).ok();
+        let state = self.resumed(run, config, data, &folder, working)?;
         let network = job.description.network(config.standardise_loss)?;
         let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, self.threads)?;
         let steps = trainer.steps();
@@ -216,6 +223,30 @@ impl<'a> Experiment<'a> {
         let weights = trainer.state().parameters.clone();
         drop(trainer);
         Ok(Trained { hybrid: job.hybrid(self.flights, weights, self.threads)?, parameters, windows, steps })
+    }
+
+    /// The state in which an interrupted run was left, if there is one. A checkpoint that cannot be gone on with is kept beside the run's
+    /// folder, which goes when the run is at its end, and noted: the run begins anew.
+    fn resumed(&self, run: &Run, config: &TrainConfig, data: u64, folder: &RunFolder, working: &Path) -> Result<Option<State>> {
+        let path = folder.checkpoint();
+        if !path.exists() {
+            return Ok(None);
+        }
+        let message = match folder.resume(config, data) {
+            Ok(state) => return Ok(Some(state)),
+            Err(Error::File { message, .. }) => message,
+            Err(other) => return Err(other),
+        };
+        let name = working.file_name().unwrap_or_default().to_string_lossy();
+        let numbered = (1_u32..).map(|number| working.with_file_name(format!("{name}.damaged-checkpoint-{number}")));
+        let kept = numbered.into_iter().find(|path| !path.exists()).expect("a folder has fewer files than there are numbers");
+        std::fs::rename(&path, &kept).map_err(Error::io(&path))?;
+        self.notes.lock().unwrap_or_else(PoisonError::into_inner).push(format!(
+            "note: {} {message}; it is kept as {}, and the run `{run}` begins anew",
+            path.display(),
+            kept.display()
+        ));
+        Ok(None)
     }
 
     fn ridge(&self, split: &Split, flights: &[Flight], judged: &[Window]) -> Result<Row> {

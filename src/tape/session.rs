@@ -193,7 +193,8 @@ impl<T: Real> Session<T> {
             return Ok(());
         }
         let most = LARGEST_STEP / self.plan.slab_len.max(1);
-        let message = format!("{samples} samples that wait for each other, {numbers} numbers; at most {most} samples: lower `batch`");
+        let message =
+            format!("{samples} samples that wait for each other, {numbers} numbers; at most {most} samples: lower `batch`");
         Err(Error::Shape { operation: "session", message })
     }
 

@@ -66,7 +66,12 @@ impl Workers {
     pub(super) fn new(count: usize) -> Result<Self> {
         if count > Threads::MOST {
             let (place, field) = ("session".into(), "threads".into());
-            return Err(Error::Config { place, field, found: count.to_string(), expected: format!("0 (all cores) to {}", Threads::MOST) });
+            return Err(Error::Config {
+                place,
+                field,
+                found: count.to_string(),
+                expected: format!("0 (all cores) to {}", Threads::MOST),
+            });
         }
         Ok(Self { pool: if count > 1 { Some(pool(count)?) } else { None } })
     }

@@ -94,7 +94,8 @@ impl TrainConfig {
             ("warmup_epochs", self.warmup_epochs, 0, Self::MOST_EPOCHS),
             ("gate_every", self.gate_every, 0, MOST_GATE_EVERY),
         ];
-        if let Some((field, value, least, most)) = counts.into_iter().find(|(_, value, least, most)| value < least || value > most) {
+        if let Some((field, value, least, most)) = counts.into_iter().find(|(_, value, least, most)| value < least || value > most)
+        {
             return Err(fault(field, value, &format!("{least} to {most}")));
         }
         if !(self.peak_rate > 0.0 && self.peak_rate <= 1.0) {

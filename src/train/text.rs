@@ -52,7 +52,10 @@ const OF_PHYTURE: [(&str, &str); 14] = [
     ("leak", "Slope of the leaky rectifier for negative numbers."),
     ("norm_eps", "Inside the root of the layer norm."),
     ("biases", "Whether linear maps have biases."),
-    ("variant", "phy_ture, without_paf, without_mstfe, without_tsdp_temporal_linear, without_tsdp_last_row, state_control_only, direct_concatenation."),
+    (
+        "variant",
+        "phy_ture, without_paf, without_mstfe, without_tsdp_temporal_linear, without_tsdp_last_row, state_control_only, direct_concatenation.",
+    ),
 ];
 
 impl TrainConfig {
@@ -88,7 +91,9 @@ impl TrainConfig {
     /// [`Error::Config`] for a seed that TOML cannot hold.
     pub fn template(&self) -> Result<String> {
         let mut table = table(self)?;
-        let mut text = String::from("# Training configuration, for `phyture train --config FILE`. Fields that are left out keep their default.\n");
+        let mut text = String::from(
+            "# Training configuration, for `phyture train --config FILE`. Fields that are left out keep their default.\n",
+        );
         for (field, comment) in FIELDS {
             match table.remove(field) {
                 Some(Value::Table(linear)) => table_text(&mut text, field, &linear, &|_| None),

@@ -81,7 +81,8 @@ impl<'a> Trainer<'a> {
             )));
         }
         if u32::try_from(windows.len()).is_err() {
-            let message = format!("{} training windows; at most {} can be put in order: make `stride` larger", windows.len(), u32::MAX);
+            let message =
+                format!("{} training windows; at most {} can be put in order: make `stride` larger", windows.len(), u32::MAX);
             return Err(Error::Undetermined(message));
         }
         let count = network.graph().parameter_count();

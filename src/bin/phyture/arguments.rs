@@ -30,7 +30,11 @@ fn count(range: RangeInclusive<usize>) -> RangedU64ValueParser<usize> {
 /// A flight time.
 fn minutes(text: &str) -> Result<f64, String> {
     let minutes = text.parse::<f64>().map_err(|error| error.to_string())?;
-    if minutes > 0.0 && minutes <= MOST_MINUTES { Ok(minutes) } else { Err(format!("expected more than 0 and at most {MOST_MINUTES}")) }
+    if minutes > 0.0 && minutes <= MOST_MINUTES {
+        Ok(minutes)
+    } else {
+        Err(format!("expected more than 0 and at most {MOST_MINUTES}"))
+    }
 }
 
 /// A factor.
