@@ -160,7 +160,7 @@ fn sizes_and_scales_that_a_network_s_file_claims_are_checked_before_anything_is_
     let job = job()?;
     let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
     let path = place.path().join("network.safetensors");
-    let cases: [(Change, &str); 9] = [
+    let cases: [(Change, &str); 10] = [
         (|description| description["linear"]["config"]["lags"] = (1_u64 << 63).into(), "`linear.lags` is 9223372036854775808"),
         (
             |description| description["linear"]["config"]["lags"] = ((1_u64 << 62) + 1).into(),
@@ -177,7 +177,14 @@ fn sizes_and_scales_that_a_network_s_file_claims_are_checked_before_anything_is_
                 description["config"]["history"] = 65536.into();
                 description["config"]["d_model"] = 4096.into();
             },
-            "tensor `paf.state.weight` is not finite f32 of shape [4096, 16]",
+            "1678098440 parameters, expected at most 268435456",
+        ),
+        (
+            |description| {
+                description["config"]["history"] = 65536.into();
+                description["config"]["d_model"] = 512.into();
+            },
+            "tensor `paf.state.weight` is not finite f32 of shape [512, 16], which its description asks for",
         ),
     ];
     for (change, message) in cases {

@@ -222,7 +222,7 @@ impl Hybrid {
         let description: Description =
             serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;
         description.check().map_err(|error| fault(error.to_string()))?;
-        let network = description.network(false)?;
+        let network = description.network(false).map_err(|error| fault(error.to_string()))?;
         // Sizes are a claim until the tensors are found to have them: no memory is asked for before.
         let of_file = |parameter| Ok((parameter, numbers_of(&file, parameter).map_err(fault)?));
         let of_file: Vec<(&Parameter, &[f32])> = network.parameters().iter().map(of_file).collect::<Result<_>>()?;

@@ -263,6 +263,7 @@ pub enum Command {
     /// flight at 100 Hz that takes a few minutes. With --paper: a history of 1000 samples, width 64, 100 epochs, a window every 50
     /// samples; days on two cores. After each epoch the loss on the validation part (of the split `segments`) is shown.
     #[command(
+        mut_arg("data", |data| data.required(false).required_unless_present("print_config")),
         after_help = "Examples:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume\n  phyture train --print-config > train.toml\n  phyture train flights -m n9-calibrated.toml -o run --config train.toml --epochs 5"
     )]
     Train {
