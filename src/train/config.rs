@@ -144,7 +144,8 @@ mod tests {
 
     #[test]
     fn every_count_has_a_bound_and_no_product_of_bounds_overflows() {
-        let set: [(&str, fn(&mut TrainConfig, usize)); 5] = [
+        type Set = fn(&mut TrainConfig, usize);
+        let set: [(&str, Set); 5] = [
             ("epochs", |config, value| config.epochs = value),
             ("batch", |config, value| config.batch = value),
             ("stride", |config, value| config.stride = value),
