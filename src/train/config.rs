@@ -104,6 +104,7 @@ impl TrainConfig {
         if !(0.0..=LONGEST_CHECKPOINT_S).contains(&self.checkpoint_s) {
             return Err(fault("checkpoint_s", self.checkpoint_s, &format!("0 to {LONGEST_CHECKPOINT_S} seconds")));
         }
+        inputs::parse(&self.inputs)?;
         if self.inputs.len() != self.network.state_channels() {
             return Err(fault(
                 "network.state_channels",
@@ -114,7 +115,6 @@ impl TrainConfig {
         if self.gate_every == 1 {
             return Err(fault("gate_every", 1, "0 (no gate), or 2 and more: 1 would leave nothing to train on"));
         }
-        inputs::parse(&self.inputs)?;
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
         self.network.check()
     }
