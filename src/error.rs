@@ -3,7 +3,8 @@
 //! Every variant carries its operands and its message tells the person what to do next. Messages about input name the file,
 //! the line (1-based, the header is line 1), the column, what was found and what was expected.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -13,12 +14,12 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// A file or folder could not be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), plain(source))]
     Io {
         /// The file or folder.
         path: PathBuf,
         /// What the operating system said.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// One cell of a log is not what it should be.
     #[error("{}, line {line}, column `{column}`: found {found}, expected {expected}", path.display())]
@@ -127,11 +128,59 @@ impl Error {
         }
     }
 
-    /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`.
-    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(std::io::Error) -> Self {
+    /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`. Where the folder of the path is what is
+    /// missing, it says so.
+    pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
-        move |source| Self::Io { path, source }
+        move |source| {
+            let source = match missing_folder(&path) {
+                Some(folder) if source.kind() == io::ErrorKind::NotFound && source.get_ref().is_none() => {
+                    let says = format!("the folder {} does not exist; make it first", folder.display());
+                    io::Error::new(source.kind(), says)
+                }
+                _ => source,
+            };
+            Self::Io { path, source }
+        }
     }
+}
+
+/// The uppermost folder on the way to a file that is not there.
+fn missing_folder(path: &Path) -> Option<&Path> {
+    let absent = |folder: &&Path| !folder.as_os_str().is_empty() && matches!(folder.try_exists(), Ok(false));
+    path.ancestors().skip(1).take_while(absent).last()
+}
+
+/// What the operating system said, as a sentence without error numbers.
+fn plain(source: &io::Error) -> String {
+    use io::ErrorKind as Kind;
+    if source.get_ref().is_some() {
+        return source.to_string();
+    }
+    let known = match source.kind() {
+        Kind::NotFound => "there is no such file or folder",
+        Kind::PermissionDenied => "permission denied; look at who owns it and who may read or write it",
+        Kind::AlreadyExists => "is there already",
+        Kind::IsADirectory => "is a folder, where a file was expected",
+        Kind::NotADirectory => "a part of this path is a file, where a folder was expected",
+        Kind::DirectoryNotEmpty => "is a folder that is not empty",
+        Kind::StorageFull => "no space is left on the device",
+        Kind::QuotaExceeded => "the quota of the disk is used up",
+        Kind::ReadOnlyFilesystem => "the file system can only be read",
+        Kind::FileTooLarge => "the file is too large for this file system",
+        Kind::InvalidFilename => "the name is too long, or none that this file system allows",
+        Kind::InvalidData => "is not UTF-8 text",
+        Kind::Interrupted => "the work on it was interrupted",
+        Kind::UnexpectedEof => "the file ends too early",
+        Kind::BrokenPipe => "the program at the other end of the pipe is gone",
+        _ => "",
+    };
+    if known.is_empty() { without_number(&source.to_string()).to_owned() } else { known.to_owned() }
+}
+
+/// `Too many levels of symbolic links (os error 40)` without what stands in brackets.
+fn without_number(text: &str) -> &str {
+    text.rfind(" (os error").map_or(text, |end| &text[..end])
 }
 
 #[cfg(test)]
@@ -142,5 +191,19 @@ mod tests {
     fn formula_errors_point_at_the_character() {
         let error = Error::Formula { message: "unknown name `vq`".into(), formula: "vx + vq".into(), at: 5 };
         assert_eq!(error.to_string(), "formula: unknown name `vq`\n  vx + vq\n       ^");
+    }
+
+    #[test]
+    fn the_operating_systems_words_become_sentences_without_numbers() {
+        let message = |kind: io::ErrorKind| Error::io("a.csv")(kind.into()).to_string();
+        assert_eq!(message(io::ErrorKind::NotFound), "a.csv: there is no such file or folder");
+        assert_eq!(message(io::ErrorKind::IsADirectory), "a.csv: is a folder, where a file was expected");
+        let far = Error::io("no_such/folder/a.csv")(io::ErrorKind::NotFound.into()).to_string();
+        assert_eq!(far, "no_such/folder/a.csv: the folder no_such does not exist; make it first");
+        // ELOOP has no kind of its own that is stable.
+        let loops = Error::io("a.csv")(io::Error::from_raw_os_error(40)).to_string();
+        assert!(!loops.contains("os error") && loops.len() > "a.csv: ".len(), "{loops}");
+        let own = Error::io("a.csv")(io::Error::other("written elsewhere")).to_string();
+        assert_eq!(own, "a.csv: written elsewhere");
     }
 }

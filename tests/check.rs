@@ -102,7 +102,7 @@ fn data(seed: u64, delay: usize, targets: Targets, plant: impl Fn(&mut [Vec<f64>
         plant(&mut columns);
         Flight::new(format!("{index}"), "test", 0.0, STEP_S, columns, targets).unwrap()
     });
-    DataSet { flights: flights.collect(), notes: Vec::new() }
+    DataSet { flights: flights.collect(), ..DataSet::default() }
 }
 
 fn finding<'a>(report: &'a CheckReport, name: &str) -> &'a Finding {

@@ -159,7 +159,7 @@ fn a_bias_is_found_flight_by_flight() -> Result<()> {
 #[test]
 fn what_is_implanted_is_found_again() -> Result<()> {
     let model = helicopter();
-    let data = DataSet { flights: vec![flown_by(&model, 1, 3000, 0.3)?, flown_by(&model, 2, 3000, 0.3)?], notes: Vec::new() };
+    let data = DataSet { flights: vec![flown_by(&model, 1, 3000, 0.3)?, flown_by(&model, 2, 3000, 0.3)?], ..DataSet::default() };
     let effect = entry("quad_drag", 2.0)?;
     let changed = implant(&data, &model, &effect)?;
     let (before, after) = (&data.flights[0], &changed.flights[0]);
@@ -184,7 +184,7 @@ fn what_is_implanted_is_found_again() -> Result<()> {
 #[test]
 fn an_implanted_lag_is_the_lagged_model() -> Result<()> {
     let model = helicopter();
-    let data = DataSet { flights: vec![flown_by(&model, 1, 800, 0.0)?], notes: Vec::new() };
+    let data = DataSet { flights: vec![flown_by(&model, 1, 800, 0.0)?], ..DataSet::default() };
     let lag = entry("cyclic_lag", 2.0)?;
     let value = |name: &str| lag.parameters.iter().find(|parameter| parameter.name == name).map(|parameter| parameter.value);
     assert_eq!((value("tau_x_s"), value("share")), (Some(0.1), Some(0.7)), "times are scaled, shares are not");

@@ -7,9 +7,10 @@ use super::derived::{Derived, derived};
 use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
 use super::resample::Resampler;
 use super::schema::Schema;
+use super::source::Read;
 use super::table::RawTable;
 use super::taint::tainted;
-use super::timing::{Part, parts};
+use super::timing::{Clock, Part, parts};
 use super::{Column, Flight, Targets, attitude, repair};
 use crate::error::Result;
 use crate::formula::Value;
@@ -31,6 +32,10 @@ pub(super) struct Assembled {
     pub own_notes: Vec<String>,
     /// Sentences that may hold for many files alike.
     pub common_notes: BTreeSet<String>,
+    /// The files behind the flights.
+    pub files: Vec<Read>,
+    /// The attitude came from a quaternion.
+    pub quaternion: bool,
 }
 
 /// Makes the flights of one table.
@@ -45,8 +50,10 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     let Some((time_s, time_name)) = source(&table, schema, 1.0, "t")? else {
         return Err(table.cell_of_header("t", "no such column in the header", "time in s, or under `columns` what gives it"));
     };
-    let parts = parts(&table, &time_name, &time_s, schema.resample_hz.is_some(), cuts.split_at_gaps)?;
-    let mut done = Assembled::default();
+    let unit = schema.stated.get("units.t").map(String::as_str);
+    let clock = Clock { unit, resampled: schema.resample_hz.is_some(), split: cuts.split_at_gaps };
+    let parts = parts(&table, &time_name, &time_s, clock)?;
+    let mut done = Assembled { files: table.read.iter().cloned().collect(), ..Assembled::default() };
     if let [whole] = parts.as_slice() {
         of_part(table, &time_s, whole, Identity { name, manoeuvre, alone: true }, schema, cuts, &mut done)?;
     } else {
@@ -105,11 +112,12 @@ fn of_part(
         done.own_notes.push(format!("`{name}`: {note}"));
     }
     let mut columns = convert(&table, schema, part.step_s)?;
+    done.quaternion = columns.quaternion;
 
     let (mut start_s, mut step_s) = (part.start_s, part.step_s);
     let mut new_times = None;
     if let Some(hz) = schema.resample_hz {
-        let resampler = Resampler::new(time_s, 1.0 / hz).map_err(|error| table.fault(error.to_string(), "a longer flight"))?;
+        let resampler = Resampler::new(time_s, 1.0 / hz).map_err(|error| table.fault(error.to_string(), "a flight and a `resample_hz` that go together"))?;
         resample(&mut columns, &resampler);
         done.common_notes.insert(format!("resampled from {:.2} Hz to {hz} Hz with a local cubic", 1.0 / part.step_s));
         (start_s, step_s) = (time_s.first().copied().unwrap_or(start_s), 1.0 / hz);

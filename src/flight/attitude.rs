@@ -91,6 +91,46 @@ pub fn rotation_to_euler(matrix: &Matrix3) -> [f64; 3] {
     }
 }
 
+/// Order in which a log writes a unit quaternion. The program itself knows [`QuaternionOrder::ScalarLast`] only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum QuaternionOrder {
+    /// x, y, z, w (paper eq. 1; ROS, motion capture).
+    #[default]
+    ScalarLast,
+    /// w, x, y, z (PX4, ArduPilot, Eigen's constructor).
+    ScalarFirst,
+}
+
+impl QuaternionOrder {
+    /// Names as written in `dataset.toml`.
+    pub const NAMES: [(&'static str, Self); 2] = [("xyzw", Self::ScalarLast), ("wxyz", Self::ScalarFirst)];
+
+    /// Four numbers in this order, as a quaternion with the scalar last.
+    pub fn scalar_last(self, [a, b, c, d]: [f64; 4]) -> [f64; 4] {
+        match self {
+            Self::ScalarLast => [a, b, c, d],
+            Self::ScalarFirst => [b, c, d, a],
+        }
+    }
+
+    /// A quaternion with the scalar last, in this order.
+    pub fn written(self, [x, y, z, w]: [f64; 4]) -> [f64; 4] {
+        match self {
+            Self::ScalarLast => [x, y, z, w],
+            Self::ScalarFirst => [w, x, y, z],
+        }
+    }
+
+    /// The other one.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::ScalarLast => Self::ScalarFirst,
+            Self::ScalarFirst => Self::ScalarLast,
+        }
+    }
+}
+
 /// Axes that logs are written in. The program itself knows [`Axes::NedFrd`] only.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Axes {

@@ -18,6 +18,8 @@ pub(super) struct Columns {
     pub canonical: [Option<Vec<f64>>; Column::COUNT],
     /// Further columns, as recorded.
     pub extra: BTreeMap<String, Vec<f64>>,
+    /// The attitude came from a quaternion.
+    pub quaternion: bool,
 }
 
 impl Columns {
@@ -95,7 +97,7 @@ const OPERATORS: [char; 8] = ['+', '*', '/', '^', '(', '<', '>', '-'];
 /// without heading.
 pub(super) fn convert(table: &RawTable, schema: &Schema, step_s: f64) -> Result<Columns> {
     let mut used: BTreeSet<String> = schema.columns.get("t").map_or(vec!["t".into()], Clone::clone).into_iter().collect();
-    let mut columns = Columns { canonical: Default::default(), extra: BTreeMap::new() };
+    let mut columns = Columns { canonical: Default::default(), extra: BTreeMap::new(), quaternion: false };
     for column in Column::ALL {
         if let Some((values, name)) = source(table, schema, step_s, column.name())? {
             columns.canonical[column as usize] = Some(values);
@@ -104,7 +106,9 @@ pub(super) fn convert(table: &RawTable, schema: &Schema, step_s: f64) -> Result<
     }
     attitude_from_quaternion(table, schema, step_s, &mut columns, &mut used)?;
     check_present(table, schema, &columns)?;
-    refuse_degrees(table, schema, &columns, step_s)?;
+    if !columns.quaternion {
+        refuse_degrees(table, schema, &columns, step_s)?;
+    }
     to_ned(schema, &mut columns);
     if schema.velocity == Frame::Inertial && columns.get(Column::Yaw).is_none() {
         return Err(Error::Config {
@@ -145,7 +149,7 @@ fn attitude_from_quaternion(
                 parts.push(values);
             }
             None if parts.is_empty() => return Ok(()),
-            None => return Err(missing(table, name, "the quaternion q1 q2 q3 q4 whole, scalar last")),
+            None => return Err(missing(table, name, "the quaternion q1 q2 q3 q4 whole, scalar last unless `quaternion = \"wxyz\"`")),
         }
     }
     let [a, b, c, d] = parts.as_slice() else { return Ok(()) };
@@ -153,16 +157,17 @@ fn attitude_from_quaternion(
     for (row, (((&a, &b), &c), &d)) in a.iter().zip(b).zip(c).zip(d).enumerate() {
         let norm = (a * a + b * b + c * c + d * d).sqrt();
         if (norm - 1.0).abs() > QUATERNION_TOLERANCE {
-            let expected = format!("a unit quaternion q1 q2 q3 q4, scalar last, norm 1 within {QUATERNION_TOLERANCE}");
+            let expected = format!("a unit quaternion q1 q2 q3 q4, norm 1 within {QUATERNION_TOLERANCE}");
             return Err(table.cell(row, "q1", format!("a quaternion of norm {norm:.6}"), expected));
         }
-        for (values, angle) in euler.iter_mut().zip(quaternion_to_euler([a, b, c, d])) {
+        for (values, angle) in euler.iter_mut().zip(quaternion_to_euler(schema.quaternion.scalar_last([a, b, c, d]))) {
             values.push(angle);
         }
     }
     for (column, values) in angles.into_iter().zip(euler) {
         columns.canonical[column as usize] = Some(values);
     }
+    columns.quaternion = true;
     Ok(())
 }
 

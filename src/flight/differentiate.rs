@@ -6,6 +6,7 @@
 //! one-sided: a parabola over a window up to twice as wide, exact up to degree 2, with more noise. Derivatives are
 //! those of the columns given: for v the *body components* v̇, not the inertial acceleration.
 
+use super::bounds::LOWEST_CUTOFF;
 use super::local_polynomial::{Quantity, weights};
 use crate::error::{Error, Result};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -33,15 +34,19 @@ impl Differentiator {
     /// A differentiator for records sampled every `step_s` seconds whose gain on the derivative is −3 dB at `cutoff_hz`.
     ///
     /// # Errors
-    /// [`Error::Config`] if the cut-off is above 0.3 of the sampling rate (a window of five samples), or not positive.
+    /// [`Error::Config`] if the cut-off is above 0.3 of the sampling rate (a window of five samples) or below 5·10⁻⁵ of it (40 000 samples).
     pub fn new(step_s: f64, cutoff_hz: f64) -> Result<Self> {
         let relative = cutoff_hz * step_s;
-        if !(relative > 0.0 && relative <= HIGHEST_CUTOFF) {
+        if !(LOWEST_CUTOFF..=HIGHEST_CUTOFF).contains(&relative) {
             return Err(Error::Config {
                 place: "differentiator".into(),
                 field: "cutoff_hz".into(),
                 found: cutoff_hz.to_string(),
-                expected: format!("above 0 and at most {} Hz at this sampling step of {step_s} s", HIGHEST_CUTOFF / step_s),
+                expected: format!(
+                    "from {:.3} Hz to {:.3} Hz at this sampling step of {step_s} s",
+                    LOWEST_CUTOFF / step_s,
+                    HIGHEST_CUTOFF / step_s
+                ),
             });
         }
         // The cut-off falls as the window widens, about as 1/h: bracket, then bisect.
@@ -187,6 +192,7 @@ mod tests {
     fn what_cannot_be_done_is_said() {
         assert!(matches!(differentiate(&[1.0, 2.0], STEP_S, 10.0), Err(Error::Undetermined(_))));
         let refused = Differentiator::new(STEP_S, 40.0).map_err(|error| error.to_string());
-        assert!(matches!(refused, Err(text) if text.contains("at most 30 Hz")));
+        assert!(matches!(refused, Err(text) if text.contains("from 0.005 Hz to 30.000 Hz")));
+        assert!(matches!(Differentiator::new(STEP_S, 1e-300), Err(Error::Config { .. })));
     }
 }

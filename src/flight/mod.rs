@@ -6,14 +6,20 @@
 #[cfg(feature = "files")]
 mod assemble;
 pub mod attitude;
+mod bounds;
 mod column;
 #[cfg(feature = "files")]
 mod convert;
 pub mod derived;
 pub mod differentiate;
+#[cfg(feature = "parquet")]
+pub mod guard;
 #[cfg(feature = "files")]
 mod hypotheses;
+#[cfg(feature = "files")]
+mod listing;
 mod local_polynomial;
+pub mod names;
 #[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(feature = "files")]
@@ -24,6 +30,7 @@ mod repair;
 mod resample;
 #[cfg(feature = "files")]
 mod schema;
+mod source;
 pub mod split;
 #[cfg(feature = "files")]
 pub mod stanford;
@@ -41,6 +48,7 @@ pub mod write;
 
 pub use attitude::Axes;
 pub use column::Column;
+pub use source::Source;
 
 use crate::error::{Error, Result};
 use ndarray::Array2;
@@ -64,11 +72,12 @@ pub enum Targets {
 
 /// One flight: 22 canonical columns of equal length at one constant step, plus the log's own further columns.
 ///
-/// Invariants, held by [`Flight::new`]: at least one sample, all columns equally long, every value finite, step > 0.
+/// Invariants, held by [`Flight::new`]: at least one sample, all columns equally long, every value finite, step from 1 µs to 10 000 s.
 /// A canonical column that the log lacks and may lack (position, heading) is all zero and listed in [`Flight::absent`].
 #[derive(Clone, Debug)]
 pub struct Flight {
-    /// Name of the flight, unique in its data set.
+    /// Name of the flight, unique in its data set: for one that was read, the path of its log below the data set without the ending, as
+    /// in `chaos/flight_0` (see [`names`]).
     pub name: String,
     /// Manoeuvre class.
     pub manoeuvre: String,
@@ -108,8 +117,9 @@ impl Flight {
         if samples == 0 {
             return Err(fault("no samples".into(), "at least one sample"));
         }
-        if !(step_s > 0.0 && step_s.is_finite()) {
-            return Err(fault(format!("a step of {step_s} s"), "a positive, finite step"));
+        if !bounds::STEPS_S.contains(&step_s) {
+            let expected = format!("a step from {} s to {} s", bounds::STEPS_S.start(), bounds::STEPS_S.end());
+            return Err(fault(format!("a step of {step_s} s"), &expected));
         }
         let mut canonical = Array2::zeros((Column::COUNT, samples));
         for (column, values) in Column::ALL.into_iter().zip(&columns) {
@@ -259,6 +269,8 @@ pub struct DataSet {
     pub flights: Vec<Flight>,
     /// What the reader did that a person should know (derived accelerations, rows left out by a filter, resampling).
     pub notes: Vec<String>,
+    /// What was read; empty for flights that were made.
+    pub source: Source,
 }
 
 impl DataSet {

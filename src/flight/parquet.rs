@@ -2,6 +2,8 @@
 //!
 //! The column-by-column interface of the `parquet` crate, without Arrow. What the columns mean is not known here.
 
+use super::guard::guarded;
+use super::source::Read;
 use super::table::{RawTable, check_header, fault};
 use super::write::{Table, Values};
 use crate::error::{Error, Result};
@@ -10,7 +12,7 @@ use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType};
 use parquet::errors::{ParquetError, Result as ParquetResult};
 use parquet::file::properties::WriterProperties;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::{ChunkReader, FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 use std::fs::File;
@@ -22,15 +24,30 @@ const BATCH: usize = 1 << 16;
 
 /// Reads a Parquet file. Only columns that `wanted` accepts are read; a null is NaN, a boolean 0 or 1.
 ///
+/// The `parquet` crate (60.1) panics on some damaged files: this is the border behind which that is an error.
+///
 /// # Errors
-/// [`Error::Io`]; [`Error::Log`] for a file that is not Parquet, a compression other than none and Snappy, nested or text
+/// [`Error::Io`]; [`Error::Log`] for a file that is not Parquet or is damaged, a compression other than none and Snappy, nested or text
 /// columns, no rows; [`Error::Cell`] for a doubled column.
 pub(super) fn read_parquet(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<RawTable> {
     let file = File::open(path).map_err(Error::io(path))?;
-    let damaged = |error: ParquetError| {
-        fault(path, format!("unreadable Parquet ({error})"), "a Parquet file, uncompressed or with Snappy compression")
-    };
-    let reader = SerializedFileReader::new(file).map_err(damaged)?;
+    let length = file.metadata().map_err(Error::io(path))?.len();
+    let bytes = usize::try_from(length).map_err(|_| ParquetError::General("too long".into())).and_then(|length| file.get_bytes(0, length));
+    let bytes = bytes.map_err(|error| damaged(path, &error))?;
+    let read = Read::of(path, &bytes);
+    let table = guarded(|| parse(path, bytes, wanted)).unwrap_or_else(|reason| Err(damaged(path, &reason)))?;
+    Ok(RawTable { read: Some(read), ..table })
+}
+
+fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> Error {
+    let expected = "a Parquet file, uncompressed or with Snappy compression; the file is damaged or of another kind, write it again";
+    fault(path, format!("unreadable Parquet ({reason})"), expected)
+}
+
+fn parse(path: &Path, bytes: impl ChunkReader + 'static, wanted: &dyn Fn(&str) -> bool) -> Result<RawTable> {
+    let length = bytes.len();
+    let damaged = |error: ParquetError| damaged(path, &error);
+    let reader = SerializedFileReader::new(bytes).map_err(damaged)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
     check_header(path, &names, wanted)?;
@@ -42,6 +59,12 @@ pub(super) fn read_parquet(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result
             let levels = schema.column(index).max_def_level();
             if schema.column(index).max_rep_level() > 0 || levels > 1 {
                 return Err(fault(path, format!("a nested column, `{}`", names[index]), "flat columns of numbers"));
+            }
+            let chunk = group.metadata().column(index);
+            let (start, size) = chunk.byte_range();
+            if start.checked_add(size).is_none_or(|end| end > length) {
+                let found = format!("the column `{}` at bytes {start} to {}", names[index], start.saturating_add(size));
+                return Err(fault(path, found, format!("a place within the file's {length} bytes; the file is damaged, write it again")));
             }
             let known = read_column(group.get_column_reader(index).map_err(damaged)?, levels == 1, values).map_err(damaged)?;
             if !known {
@@ -58,7 +81,7 @@ pub(super) fn read_parquet(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result
         return Err(fault(path, "columns of different lengths", "columns of one length; the file is damaged, write it again"));
     }
     let names = kept.into_iter().map(|index| names[index].clone()).collect();
-    Ok(RawTable { path: path.into(), names, columns, lines: (2..rows + 2).collect() })
+    Ok(RawTable { path: path.into(), names, columns, lines: (2..rows + 2).collect(), read: None })
 }
 
 /// Appends a chunk to `values`; false if its type is not a number's.

@@ -4,6 +4,7 @@
 //! longer of the two steps: zero-phase, exact on cubics, and band-limiting when the new rate is the lower one (−3 dB near
 //! 0.29 of the new rate, under 6 % from 0.5 on).
 
+use super::bounds::MOST_SAMPLES;
 use super::local_polynomial::{Quantity, weights};
 use crate::error::{Error, Result};
 
@@ -21,7 +22,7 @@ impl Resampler {
     /// From samples at increasing `time_s` to one every `step_s` from the first time on.
     ///
     /// # Errors
-    /// [`Error::Undetermined`] for fewer than four samples.
+    /// [`Error::Undetermined`] for fewer than four samples, or more new ones than a log may have.
     pub fn new(time_s: &[f64], step_s: f64) -> Result<Self> {
         let few = || Error::Undetermined(format!("{} samples are too few to resample; four are needed", time_s.len()));
         let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else { return Err(few()) };
@@ -30,7 +31,12 @@ impl Resampler {
         }
         let old_step_s = (last - first) / (time_s.len() - 1) as f64;
         // Rounding must not lose the last sample.
-        let count = ((last - first) / step_s * (1.0 + 4.0 * f64::EPSILON)) as usize + 1;
+        let steps = (last - first) / step_s * (1.0 + 4.0 * f64::EPSILON);
+        if steps.is_nan() || steps >= MOST_SAMPLES {
+            let says = format!("resampling {:.0} s to {} Hz would make {steps:.1e} samples, more than {MOST_SAMPLES:.0e}", last - first, 1.0 / step_s);
+            return Err(Error::Undetermined(says));
+        }
+        let count = steps as usize + 1;
         let new_s: Vec<f64> = (0..count).map(|sample| first + step_s * sample as f64).collect();
         let taps = new_s.iter().map(|&at| taps(time_s, at, HALF_WIDTH_STEPS * step_s.max(old_step_s)).ok_or_else(few));
         Ok(Self { taps: taps.collect::<Result<_>>()?, time_s: new_s })

@@ -5,6 +5,7 @@
 //! | key | meaning |
 //! | --- | --- |
 //! | `axes` | `"NED/FRD"` (default), `"ENU/FLU"`, `"NWU/FLU"`: axes of position, attitude, velocity, rates and accelerations |
+//! | `quaternion` | order of `q1 q2 q3 q4`: `"xyzw"` (default, scalar last) or `"wxyz"` (scalar first) |
 //! | `velocity` | `"body"` (default) or `"inertial"`: components of `vx vy vz` |
 //! | `targets` | what `vx_dot vy_dot vz_dot` hold: `"derivative"` (default) of the body components; `"specific_force"`, as an accelerometer; `"inertial"`, the derivative of the inertial velocity in inertial axes; `"body_acceleration"`, the same in body axes |
 //! | `target_origin` | `"recorded"` (default) or `"derived"`: accelerations in the file that were computed from `v` and `w` |
@@ -21,13 +22,13 @@
 //! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `max_gap_s`: bad cells to interpolate linearly |
 //! | `notes` | sentences to carry to every reader of the data |
 
-use super::attitude::Axes;
+use super::attitude::{Axes, QuaternionOrder};
+use super::bounds::RATES_HZ;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
-use std::path::Path;
 use toml::{Table, Value};
 
 /// Components the file's velocity is written in.
@@ -92,6 +93,10 @@ pub(super) struct Schema {
     pub extra: Option<Vec<String>>,
     pub repairs: Vec<Repair>,
     pub notes: Vec<String>,
+    /// Order of `q1 q2 q3 q4`.
+    pub quaternion: QuaternionOrder,
+    /// What the file states, key by key; see [`super::Source::stated`].
+    pub stated: BTreeMap<String, String>,
 }
 
 impl Default for Schema {
@@ -114,6 +119,8 @@ impl Default for Schema {
             extra: None,
             repairs: Vec::new(),
             notes: Vec::new(),
+            quaternion: QuaternionOrder::ScalarLast,
+            stated: BTreeMap::new(),
         }
     }
 }
@@ -130,20 +137,15 @@ const TARGETS: [(&str, TargetKind); 4] = [
 const MAY_LACK: [Column; 4] = [Column::X, Column::Y, Column::Z, Column::Yaw];
 
 impl Schema {
-    /// Reads a `dataset.toml`.
+    /// Understands a `dataset.toml`; `place` is named in errors.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::File`] for text that is not TOML; [`Error::Config`] by key; [`Error::Formula`] for a filter.
-    pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
-        Self::parse(&text, &path.display().to_string())
-    }
-
-    fn parse(text: &str, place: &str) -> Result<Self> {
-        let table: Table = text.parse().map_err(|error: toml::de::Error| Error::File {
-            path: place.into(),
-            message: format!("is not TOML: {}", error.to_string().trim_end()),
-        })?;
+    /// [`Error::File`] for bytes that are not TOML; [`Error::Config`] by key; [`Error::Formula`] for a filter.
+    pub fn parse(bytes: &[u8], place: &str) -> Result<Self> {
+        let not_toml = |message: &str| Error::File { path: place.into(), message: format!("is not TOML: {message}") };
+        let text = std::str::from_utf8(bytes).map_err(|error| not_toml(&format!("{error}, so it is not text in UTF-8")))?;
+        let table: Table = text.parse().map_err(|error: toml::de::Error| not_toml(error.to_string().trim_end()))?;
+        let stated = stated(&table);
         let mut keys = Keys::new(place, "", table);
         let mut schema = Self {
             axes: keys.choice("axes", &Axes::NAMES)?.unwrap_or_default(),
@@ -154,6 +156,8 @@ impl Schema {
             minimum_length_s: keys.number("minimum_length_s", 0.0)?.unwrap_or(0.0),
             resample_hz: keys.number("resample_hz", f64::MIN_POSITIVE)?,
             cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?,
+            quaternion: keys.choice("quaternion", &QuaternionOrder::NAMES)?.unwrap_or_default(),
+            stated,
             exclude: keys.texts("exclude")?.unwrap_or_default(),
             ignore: keys.texts("ignore")?.unwrap_or_default(),
             extra: keys.texts("extra")?,
@@ -161,6 +165,10 @@ impl Schema {
             manoeuvre: manoeuvre(&mut keys)?,
             ..Self::default()
         };
+        if let Some(hz) = schema.resample_hz.filter(|hz| !RATES_HZ.contains(hz)) {
+            let expected = format!("a rate from {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
+            return Err(keys.fault("resample_hz", hz.to_string(), expected));
+        }
         for name in keys.texts("missing")?.unwrap_or_default() {
             let allowed = || MAY_LACK.into_iter().chain(Column::TARGETS);
             let Some(column) = allowed().find(|column| column.name() == name) else {
@@ -219,6 +227,32 @@ impl Schema {
             || self.rows.iter().any(names)
             || self.repairs.iter().any(|rule| rule.columns.iter().any(|column| column == name))
     }
+}
+
+/// The texts of a description by dotted key; the unit of a group under each of its columns, where these have none of their own.
+fn stated(table: &Table) -> BTreeMap<String, String> {
+    let mut stated = BTreeMap::new();
+    for (key, value) in table {
+        match value {
+            Value::Table(inside) => {
+                let texts = inside.iter().filter_map(|(name, value)| Some((format!("{key}.{name}"), value.as_str()?.to_owned())));
+                stated.extend(texts);
+            }
+            Value::String(text) => {
+                stated.insert(key.clone(), text.clone());
+            }
+            other => {
+                stated.insert(key.clone(), other.to_string());
+            }
+        }
+    }
+    for group in units::GROUPS {
+        let Some(unit) = stated.get(&format!("units.{}", group.name)).cloned() else { continue };
+        for column in group.columns {
+            stated.entry(format!("units.{column}")).or_insert_with(|| unit.clone());
+        }
+    }
+    stated
 }
 
 fn formulas(texts: Vec<String>) -> Result<Vec<Formula>> {
@@ -368,7 +402,7 @@ mod tests {
     use super::*;
 
     fn message(text: &str) -> String {
-        Schema::parse(text, "dataset.toml").map_or_else(|error| error.to_string(), |_| "accepted".into())
+        Schema::parse(text.as_bytes(), "dataset.toml").map_or_else(|error| error.to_string(), |_| "accepted".into())
     }
 
     #[test]
@@ -377,6 +411,7 @@ mod tests {
             r#"
             axes = "ENU/FLU"
             velocity = "inertial"
+            quaternion = "wxyz"
             targets = "specific_force"
             target_origin = "derived"
             missing = ["x", "y", "z"]
@@ -399,13 +434,18 @@ mod tests {
             columns = ["m1", "m2"]
             valid = ["value > 0", "value < 170000"]
             max_gap_s = 0.1
-            "#,
+            "#
+            .as_bytes(),
             "dataset.toml",
         )?;
         assert_eq!((schema.axes, schema.velocity, schema.targets), (Axes::EnuFlu, Frame::Inertial, TargetKind::SpecificForce));
         assert_eq!((schema.rows.len(), schema.repairs.len(), schema.missing.len()), (2, 1, 3));
         assert_eq!(schema.manoeuvre, Manoeuvre::FilePart { separator: "-".into(), part: 2 });
         assert_eq!((schema.factor("yaw"), schema.factor("roll")), (1.0, std::f64::consts::PI / 180.0));
+        assert_eq!(schema.quaternion, QuaternionOrder::ScalarFirst);
+        let stated = |key: &str| schema.stated.get(key).map(String::as_str);
+        assert_eq!((stated("units.roll"), stated("units.yaw"), stated("units.vx")), (Some("deg"), Some("rad"), None));
+        assert_eq!((stated("quaternion"), stated("columns.u4")), (Some("wxyz"), Some("1e-10 * (m1^2 + m2^2)")));
         assert!(schema.wants("Vbat") && schema.wants("m2") && schema.wants("vn"));
         assert!(!schema.wants("comment") && !schema.wants("gyro_temperature"));
         Ok(())
@@ -421,6 +461,8 @@ mod tests {
             ("[units]\nangles = \"degrees\"", "`units.angles` is `degrees`, expected one of rad, deg"),
             ("missing = [\"vx\"]", "`missing` is `vx`, expected one of x, y, z, yaw"),
             ("resample_hz = 0", "`resample_hz` is 0, expected a number above 0"),
+            ("resample_hz = 1e9", "`resample_hz` is 1000000000, expected a rate from 2 to 100000 Hz"),
+            ("quaternion = \"xyzx\"", "`quaternion` is `xyzx`, expected one of xyzw, wxyz"),
             ("[[repair]]\ncolumns = [\"m1\"]", "an incomplete rule"),
             ("[repair]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nvalid = \"m1 > 0\"", "unknown name `m1`"),
             ("manoeuvre = \"file\"", "`manoeuvre` is \"file\", expected \"folder\""),

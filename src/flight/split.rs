@@ -3,8 +3,9 @@
 //! A split is made before anything else (calibration, scaling, windows), and what follows sees only [`Span`]s. No window
 //! crosses a span, so no window crosses a partition and no time stamp is in two of them (paper section 4.1).
 
-use super::{Flight, Span};
+use super::{Flight, Span, names};
 use crate::error::{Error, Result};
+use crate::suggest::did_you_mean;
 use phyture_kernels::random::permutation;
 use std::fmt;
 use std::str::FromStr;
@@ -111,10 +112,11 @@ pub struct Split {
 
 impl Split {
     /// Divides `flights`. Where `locked` names manoeuvre classes or flights, these are the test part and *all* other flights
-    /// train (the paper's manoeuvre-class protocol, section 4.4); otherwise `protocol` divides each flight, with `seed`.
+    /// train (the paper's manoeuvre-class protocol, section 4.4; a flight by its path, or by the last part of it where only one flight
+    /// has that); otherwise `protocol` divides each flight, with `seed`.
     ///
     /// # Errors
-    /// [`Error::Config`] if a locked name fits neither a class nor a flight; [`Error::Undetermined`] if nothing is left to
+    /// [`Error::Config`] if a locked name fits neither a class nor a flight, or several flights; [`Error::Undetermined`] if nothing is left to
     /// train on or to test on.
     pub fn new(flights: &[Flight], locked: &[String], protocol: &Protocol, seed: u64) -> Result<Self> {
         let split = if locked.is_empty() { by_protocol(flights, protocol, seed) } else { by_name(flights, locked)? };
@@ -174,18 +176,40 @@ fn whole(flights: &[Flight]) -> impl Iterator<Item = Span> {
 }
 
 fn by_name(flights: &[Flight], locked: &[String]) -> Result<Split> {
-    let names = |flight: &Flight| [flight.manoeuvre.clone(), flight.name.clone()];
-    if let Some(unknown) = locked.iter().find(|name| !flights.iter().any(|flight| names(flight).contains(name))) {
-        let mut classes: Vec<&str> = flights.iter().map(|flight| flight.manoeuvre.as_str()).collect();
-        classes.dedup();
-        return Err(Error::Config {
+    let mut kept = vec![false; flights.len()];
+    for name in locked {
+        let fault = |found: String, expected: String| Error::Config {
             place: "model file".into(),
             field: "data.locked".into(),
-            found: format!("`{unknown}`, which is no manoeuvre class and no flight of this data set"),
-            expected: format!("one of the classes {} or a flight's name", classes.join(", ")),
-        });
+            found,
+            expected,
+        };
+        let class = flights.iter().any(|flight| flight.manoeuvre == *name);
+        let meant = names::find(flights, name);
+        match meant.as_slice() {
+            [] if !class => {
+                let mut classes: Vec<&str> = flights.iter().map(|flight| flight.manoeuvre.as_str()).collect();
+                classes.sort_unstable();
+                classes.dedup();
+                let known = classes.iter().copied().chain(flights.iter().map(|flight| flight.name.as_str()));
+                let hint = did_you_mean(name, known);
+                return Err(fault(
+                    format!("`{name}`, which is no manoeuvre class and no flight of this data set"),
+                    format!("one of the classes {} or a flight's name{hint}", classes.join(", ")),
+                ));
+            }
+            [_, _, ..] if !class => {
+                let candidates = names::listed(meant.iter().map(|&flight| flights[flight].name.as_str()));
+                return Err(fault(
+                    format!("`{name}`, which is the name of {} flights", meant.len()),
+                    format!("one of them by its path: {candidates}"),
+                ));
+            }
+            _ => meant.iter().filter(|_| meant.len() == 1).for_each(|&flight| kept[flight] = true),
+        }
+        kept.iter_mut().zip(flights).for_each(|(kept, flight)| *kept |= flight.manoeuvre == *name);
     }
-    let (test, training) = whole(flights).partition(|span| names(&flights[span.flight]).iter().any(|name| locked.contains(name)));
+    let (test, training) = whole(flights).partition(|span| kept[span.flight]);
     Ok(Split { training, validation: Vec::new(), test, tested: Part::Locked })
 }
 
@@ -293,6 +317,24 @@ mod tests {
         };
         assert!(half.training.iter().all(inside));
         assert_eq!((&half.test, &half.validation), (&whole.test, &whole.validation));
+        Ok(())
+    }
+
+    #[test]
+    fn a_flight_is_locked_by_its_path_or_by_a_name_that_is_its_alone() -> Result<()> {
+        let named = |name: &str, manoeuvre: &str| {
+            Flight::new(name, manoeuvre, 0.0, 0.01, std::array::from_fn(|_| vec![0.0; 10]), Targets::Recorded)
+        };
+        let logs = [named("chaos/f0", "chaos")?, named("hover/f0", "hover")?, named("hover/f1", "hover")?];
+        let locked = |name: &str| -> Result<Vec<usize>> {
+            let split = Split::new(&logs, &[name.to_owned()], &Protocol::Segments, 1)?;
+            Ok(split.test.iter().map(|span| span.flight).collect())
+        };
+        assert_eq!((locked("hover/f0")?, locked("f1")?, locked("hover")?), (vec![1], vec![2], vec![1, 2]));
+        let ambiguous = locked("f0").map_err(|error| error.to_string());
+        assert!(matches!(ambiguous, Err(text) if text.contains("the name of 2 flights") && text.contains("`chaos/f0`, `hover/f0`")));
+        let unknown = locked("hover/f2").map_err(|error| error.to_string());
+        assert!(matches!(unknown, Err(text) if text.contains("did you mean")));
         Ok(())
     }
 

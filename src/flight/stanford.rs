@@ -11,8 +11,10 @@ use super::attitude::{cross, rotate, rotate_back, rotation_body_to_inertial};
 use super::convert::check_finite;
 use super::hypotheses::{Decided, Smoother, control_scale, decide};
 use super::schema::Schema;
+use super::source::Read;
 use super::table::RawTable;
-use super::timing::parts;
+use super::timing::{Clock, parts};
+use super::names::own_name;
 use super::write::check_names;
 use super::{Column, Flight, attitude};
 use crate::error::{Error, Result};
@@ -70,7 +72,7 @@ pub(super) fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Re
     let smoother = read_table(&folder.join(SMOOTHER), &SMOOTHER_COLUMNS)?;
     let controls = read_table(&folder.join(CONTROLS), &CONTROL_COLUMNS)?;
     let times = column(&smoother, "time");
-    let parts = parts(&smoother, "time", times, false, cuts.split_at_gaps)?;
+    let parts = parts(&smoother, "time", times, Clock { split: cuts.split_at_gaps, ..Clock::default() })?;
     parts_of_controls(&controls)?;
 
     let idle = idle_rows(&smoother, times);
@@ -87,6 +89,7 @@ pub(super) fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Re
     let (first, last) = overlap(&smoother, &controls, idle)?;
     let table = canonical(&smoother.slice(first..last), &controls, &decided, scale.1);
     let mut done = assemble(table, name, manoeuvre, &Schema::default(), cuts)?;
+    done.files.extend(controls.read);
     if idle > 0 {
         let idle_s = times[idle] - times[0];
         done.own_notes.push(format!("`{name}`: {idle_s:.2} s motionless on the ground at the start are left out"));
@@ -104,13 +107,14 @@ fn column<'a>(table: &'a RawTable, name: &str) -> &'a [f64] {
 }
 
 fn read_table(path: &Path, names: &[&str]) -> Result<RawTable> {
-    let text = std::fs::read(path).map_err(Error::io(path))?;
-    let text = String::from_utf8_lossy(&text);
+    let bytes = std::fs::read(path).map_err(Error::io(path))?;
+    let text = String::from_utf8_lossy(&bytes);
     let mut table = RawTable {
         path: path.into(),
         names: names.iter().map(|name| (*name).to_owned()).collect(),
         columns: vec![Vec::new(); names.len()],
         lines: Vec::new(),
+        read: Some(Read::of(path, &bytes)),
     };
     for (line, row) in (1..).zip(text.lines()).filter(|(_, row)| !row.trim().is_empty()) {
         let cells: Vec<&str> = row.split_ascii_whitespace().collect();
@@ -201,10 +205,10 @@ fn canonical(smoother: &RawTable, controls: &RawTable, decided: &Decided, scale:
         let values = std::iter::once(time).chain(position).chain(euler).chain(v).chain(w).chain(u).chain(v_dot).chain(w_dot);
         columns.iter_mut().zip(values).for_each(|(column, value)| column.push(value));
     }
-    RawTable { path: smoother.path.clone(), names, columns, lines: smoother.lines.clone() }
+    RawTable { path: smoother.path.clone(), names, columns, lines: smoother.lines.clone(), read: smoother.read.clone() }
 }
 
-/// Writes flights in this layout, `folder/<flight>/`: quaternion from body to NED, rates and their derivatives in body axes, velocity and its
+/// Writes flights in this layout, `folder/<flight>/`, or `folder/<manoeuvre>/<flight>/` for flights that were read from folders: quaternion from body to NED, rates and their derivatives in body axes, velocity and its
 /// derivative (gravity included) in NED, controls on the same stamps. Further columns are not written.
 ///
 /// # Errors
@@ -219,7 +223,8 @@ pub fn write(folder: &Path, flights: &[Flight]) -> Result<()> {
                 expected: "every canonical column; this layout has no way to say that one is missing".into(),
             });
         }
-        let inside = folder.join(&flight.name);
+        let own = own_name(&flight.name);
+        let inside = if own == flight.name { folder.join(own) } else { folder.join(&flight.manoeuvre).join(own) };
         std::fs::create_dir_all(&inside).map_err(Error::io(&inside))?;
         let triple = |first: Column, row: usize| -> [f64; 3] {
             std::array::from_fn(|axis| flight.column(Column::ALL[first as usize + axis])[row])

@@ -3,7 +3,10 @@
 //! Nothing is converted, checked against physics, or repaired here. A cell without a number is NaN and is judged later, when
 //! it is known whether a repair rule covers it; text in a number is refused at once.
 
+use super::bounds::MOST_COLUMNS;
+use super::source::Read;
 use crate::error::{Error, Result};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// Columns of one file, equally long.
@@ -17,6 +20,8 @@ pub(super) struct RawTable {
     pub columns: Vec<Vec<f64>>,
     /// Line of each row, the header being line 1. For Parquet, which has no lines, row number + 1, as if it were CSV.
     pub lines: Vec<usize>,
+    /// The file as it was read.
+    pub read: Option<Read>,
 }
 
 impl RawTable {
@@ -63,6 +68,7 @@ impl RawTable {
             names: self.names.clone(),
             columns: self.columns.iter().map(|values| values[range.clone()].to_vec()).collect(),
             lines: self.lines[range].to_vec(),
+            read: self.read.clone(),
         }
     }
 }
@@ -75,12 +81,16 @@ const NOT_A_NUMBER: &str = "a number; a column that holds something else can be 
 
 /// Refuses a header that cannot be read unambiguously; `wanted` says which names matter.
 pub(super) fn check_header(path: &Path, names: &[String], wanted: &dyn Fn(&str) -> bool) -> Result<()> {
+    if names.len() > MOST_COLUMNS {
+        return Err(fault(path, format!("{} columns", names.len()), format!("at most {MOST_COLUMNS}; write those that are needed")));
+    }
+    let mut seen = BTreeSet::new();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| wanted(name)) {
         if name.is_empty() {
             let found = format!("a column without a name, number {} in the header", index + 1);
             return Err(fault(path, found, "a name for each column; `ignore = [\"\"]` in dataset.toml leaves it out"));
         }
-        if names[..index].contains(name) {
+        if !seen.insert(name) {
             let expected = "each column once; rename or remove one of the two";
             let found = "the same name twice in the header".to_owned();
             return Err(Error::Cell { path: path.into(), line: 1, column: name.clone(), found, expected: expected.into() });
@@ -137,7 +147,7 @@ pub(super) fn read_csv(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Raw
         return Err(fault(path, "a header and no rows", "at least one row; remove the file if the flight is void"));
     }
     let names = kept.into_iter().map(|index| names[index].clone()).collect();
-    Ok(RawTable { path: path.into(), names, columns, lines })
+    Ok(RawTable { path: path.into(), names, columns, lines, read: Some(Read::of(path, &bytes)) })
 }
 
 /// An empty cell is "no number", NaN; so is the word NaN. Text is none.

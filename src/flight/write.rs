@@ -3,12 +3,13 @@
 //! Numbers are printed in the shortest form that reads back to the same bits; each file appears in one step (see
 //! [`crate::disk`]). What stands in a prediction table is the caller's business.
 
+use super::names::own_name;
 use super::{Column, Flight, Targets};
 use crate::disk::write_atomically;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::io::{self, Write};
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 pub use super::stanford::write as stanford;
 
@@ -124,6 +125,11 @@ fn with_table<T>(flight: &Flight, without: &[Column], then: impl FnOnce(&Table) 
     then(&table)
 }
 
+/// Where [`data_set_csv`] writes a flight: `folder/<manoeuvre>/<flight>.csv`, the flight by the last part of its name.
+pub fn csv_path(folder: &Path, flight: &Flight) -> PathBuf {
+    folder.join(&flight.manoeuvre).join(format!("{}.csv", own_name(&flight.name)))
+}
+
 /// Writes flights as `folder/<manoeuvre>/<flight>.csv`, making the folders.
 ///
 /// What plain columns cannot say goes to a `dataset.toml`: columns that are absent, and accelerations that were derived and
@@ -143,7 +149,7 @@ pub fn data_set_csv(folder: &Path, flights: &[Flight]) -> Result<()> {
         if flight.targets == Targets::Derived && !all_derived {
             without.extend(Column::TARGETS);
         }
-        let path = class.join(format!("{}.csv", flight.name));
+        let path = csv_path(folder, flight);
         with_table(flight, &without, |table| table_csv(&path, table))?;
     }
     let mut description = String::new();
@@ -165,14 +171,16 @@ pub(super) fn check_names(folder: &Path, flights: &[Flight]) -> Result<()> {
     let fault = |found: String, expected: &str| Error::Log { path: folder.into(), found, expected: expected.into() };
     let mut seen = BTreeSet::new();
     for flight in flights {
-        for name in [&flight.name, &flight.manoeuvre] {
+        let own = own_name(&flight.name);
+        for name in [own, flight.manoeuvre.as_str()] {
             let mut parts = Path::new(name).components();
             if !matches!((parts.next(), parts.next()), (Some(Component::Normal(_)), None)) || name.ends_with('/') {
                 return Err(fault(format!("the name `{name}`"), "a name that can be a file's: not empty, no slash, not `..`"));
             }
         }
-        if !seen.insert(&flight.name) {
-            return Err(fault(format!("two flights named `{}`", flight.name), "names that occur once"));
+        if !seen.insert((&flight.manoeuvre, own)) {
+            let found = format!("two flights that would be written as {}/{own}.csv", flight.manoeuvre);
+            return Err(fault(found, "names of files that occur once in a manoeuvre; rename one"));
         }
     }
     Ok(())
@@ -196,12 +204,17 @@ mod tests {
 
     #[test]
     fn a_name_cannot_leave_the_folder() -> Result<()> {
-        for name in ["../a", "a/b", "", ".."] {
+        for name in ["..", "a/..", "", "a/", "../.."] {
             let columns = std::array::from_fn(|_| vec![0.0]);
             let flight = Flight::new(name, "hover", 0.0, 0.01, columns, Targets::Recorded)?;
             let refused = data_set_csv(Path::new("no_such_folder"), &[flight]);
             assert!(matches!(refused, Err(Error::Log { .. })), "{name}");
         }
+        let columns = || std::array::from_fn(|_| vec![0.0]);
+        let flight = |name: &str, manoeuvre: &str| Flight::new(name, manoeuvre, 0.0, 0.01, columns(), Targets::Recorded);
+        assert_eq!(csv_path(Path::new("out"), &flight("../up/a", "hover")?), Path::new("out/hover/a.csv"));
+        let twice = data_set_csv(Path::new("no_such_folder"), &[flight("day1/a", "hover")?, flight("day2/a", "hover")?]);
+        assert!(matches!(twice, Err(error) if error.to_string().contains("two flights that would be written as hover/a.csv")));
         Ok(())
     }
 }

@@ -3,6 +3,7 @@
 use super::evaluate::standard_names;
 use crate::error::{Error, Result};
 use crate::flight::Column;
+use crate::flight::names::matching;
 use crate::formula::Formula;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -38,14 +39,20 @@ pub struct Coefficient {
     pub ci95: Option<[f64; 2]>,
     /// What it stands for, in a few words.
     pub meaning: String,
-    /// For a property of each flight (wind, bias): its value by name of the flight; `value` is then what other flights get.
+    /// For a property of each flight (wind, bias): its value by name of the flight, or the last part of that where only one flight has it;
+    /// `value` is then what other flights get.
     pub by_flight: Option<BTreeMap<String, f64>>,
 }
 
 impl Coefficient {
-    /// The value in a flight.
+    /// The value in a flight. [`Model::check_flights`](super::Model::check_flights) refuses names that could mean several.
     pub fn in_flight(&self, flight: &str) -> f64 {
-        self.by_flight.as_ref().and_then(|values| values.get(flight)).copied().unwrap_or(self.value)
+        let Some(values) = &self.by_flight else { return self.value };
+        let of_one = || match matching(flight, values.keys().map(String::as_str)).as_slice() {
+            [name] => values.get(*name),
+            _ => None,
+        };
+        values.get(flight).or_else(of_one).copied().unwrap_or(self.value)
     }
 }
 

@@ -90,5 +90,5 @@ pub fn implant(data: &DataSet, model: &Model, effect: &Effect) -> Result<DataSet
     }
     let mut notes = data.notes.clone();
     notes.push(format!("effect `{}` is implanted", effect.name));
-    Ok(DataSet { flights, notes })
+    Ok(DataSet { flights, notes, ..DataSet::default() })
 }

@@ -8,7 +8,7 @@ use super::evaluate::{self, StreamingModel};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
-use crate::flight::{Accelerations, Column, Flight};
+use crate::flight::{Accelerations, Column, Flight, names};
 use crate::formula::Formula;
 use std::collections::BTreeMap;
 
@@ -105,6 +105,37 @@ impl Model {
     /// the flight, [`Error::Undetermined`] where a formula gives no finite number, [`Error::Config`] if the model is not whole.
     pub fn predict(&self, flight: &Flight) -> Result<Accelerations> {
         evaluate::predict(self, flight)
+    }
+
+    /// Refuses numbers by flight whose names could mean several of these flights: a model file may name a flight by the last part of its
+    /// path, where only one flight has that.
+    ///
+    /// # Errors
+    /// [`Error::Config`] with the flights that could be meant.
+    pub fn check_flights(&self, flights: &[Flight]) -> Result<()> {
+        let coefficients = self.effects.iter().flat_map(|effect| effect.coefficients.iter().map(move |found| (effect, found)));
+        for (effect, values) in coefficients.filter_map(|(effect, found)| Some((effect, found.by_flight.as_ref()?))) {
+            let keys = || values.keys().map(String::as_str);
+            let fault = |name: &str, meant: Vec<&str>| Error::Config {
+                place: format!("model `{}`, effect `{}`", self.name, effect.name),
+                field: format!("flights.{name}"),
+                found: format!("a name that could mean {}", names::listed(meant.into_iter())),
+                expected: "the path of one flight below the data, as in `hover/flight_0`; calibrate anew, or write the paths".into(),
+            };
+            for key in keys() {
+                let meant = names::find(flights, key);
+                if meant.len() > 1 {
+                    return Err(fault(key, meant.into_iter().map(|flight| flights[flight].name.as_str()).collect()));
+                }
+            }
+            for flight in flights {
+                let meant = names::matching(&flight.name, keys());
+                if meant.len() > 1 {
+                    return Err(fault(&flight.name, meant));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.

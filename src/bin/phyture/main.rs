@@ -10,6 +10,7 @@ mod output;
 mod style;
 
 use clap::Parser;
+use phyture::flight::guard;
 use std::process::ExitCode;
 
 /// Bad usage or bad input.
@@ -18,6 +19,7 @@ const BAD_INPUT: u8 = 2;
 const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
+    quiet_behind_the_border();
     let arguments = match arguments::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return usage(&error),
@@ -27,10 +29,10 @@ fn main() -> ExitCode {
         Err(error) => error,
     };
     let code = if matches!(error, phyture::Error::Interrupted { .. }) {
-        eprintln!("{}", style::for_error(&error.to_string()));
+        output::complain(&error);
         INTERRUPTED
     } else {
-        eprintln!("{}", style::for_error(&format!("error: {error}")));
+        output::complain(format_args!("error: {error}"));
         BAD_INPUT
     };
     output::failure(arguments.common.json.as_deref(), arguments.common.force, error.kind(), error.to_string(), code);
@@ -54,4 +56,14 @@ fn usage(error: &clap::Error) -> ExitCode {
     let force = words.iter().any(|word| word == "--force");
     output::failure(file.as_deref().map(std::path::Path::new), force, "usage", error.render().to_string(), BAD_INPUT);
     ExitCode::from(BAD_INPUT)
+}
+
+/// A panic that becomes an error (see [`guard`]) is told once, as that error; all others are reported as ever.
+fn quiet_behind_the_border() {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !guard::inside() {
+            report(panic);
+        }
+    }));
 }

@@ -55,7 +55,7 @@ pub fn failure(target: Option<&Path>, force: bool, kind: &str, message: String, 
 
 /// Text for a person: on standard output, unless that carries the JSON; then on standard error.
 pub fn say(json: Option<&Path>, text: impl std::fmt::Display) {
-    let text = text.to_string();
+    let text = printable(&text.to_string());
     if json == Some(Path::new("-")) {
         eprintln!("{}", style::for_error(&text));
     } else {
@@ -66,7 +66,7 @@ pub fn say(json: Option<&Path>, text: impl std::fmt::Display) {
 
 /// A warning: on standard error, whatever becomes of the rest.
 pub fn warn(text: &str) {
-    eprintln!("{}", style::for_error(&wrapped("warning: ", text)));
+    eprintln!("{}", style::for_error(&printable(&wrapped("warning: ", text))));
 }
 
 /// Whether progress is shown; `--quiet` turns it off for the whole run.
@@ -75,6 +75,20 @@ static QUIET: AtomicBool = AtomicBool::new(false);
 /// No progress from here on.
 pub fn be_quiet() {
     QUIET.store(true, Ordering::Relaxed);
+}
+
+/// An error for a person, on standard error.
+pub fn complain(text: impl std::fmt::Display) {
+    eprintln!("{}", style::for_error(&printable(&text.to_string())));
+}
+
+/// Names of files, flights and columns come from outside: whatever in them would command the terminal (control characters but for newline
+/// and tab, and those that turn the direction of writing) is shown as an escape.
+pub fn printable(text: &str) -> String {
+    let commands = |c: char| {
+        (c.is_control() && c != '\n' && c != '\t') || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    text.chars().map(|c| if commands(c) { format!("\\u{{{:x}}}", u32::from(c)) } else { c.to_string() }).collect()
 }
 
 /// Progress of long work: a bar with time left on a terminal, a plain line now and then otherwise.
@@ -127,5 +141,16 @@ impl Progress {
 impl Drop for Progress {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::printable;
+
+    #[test]
+    fn what_commands_a_terminal_is_shown_and_the_rest_is_kept() {
+        assert_eq!(printable("v\u{307}, m/s\u{b2}\tok\n"), "v\u{307}, m/s\u{b2}\tok\n");
+        assert_eq!(printable("a\u{1b}[2J\u{9b}1m\u{202e}b\r\u{7}"), "a\\u{1b}[2J\\u{9b}1m\\u{202e}b\\u{d}\\u{7}");
     }
 }

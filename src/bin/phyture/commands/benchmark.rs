@@ -146,7 +146,7 @@ fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &
         return Err(Error::Undetermined("table 3 holds manoeuvre classes out, and these flights are of one class".into()));
     }
     let plan = Plan {
-        data_sha256: data_sha256(data)?,
+        data_sha256: data_sha256(set),
         data: data.data.display().to_string(),
         model: model.to_toml()?,
         step_s: set.flights.first().map_or(f64::NAN, |flight| flight.step_s),

@@ -30,7 +30,7 @@ pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, 
     calibrated.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
     calibrated.data.split = division.split.clone().unwrap_or(calibrated.data.split);
     let mut note = |key: &str, text: String| calibrated.provenance.insert(key.into(), Entry::Text(text));
-    note("data_sha256", data_sha256(data)?);
+    note("data_sha256", data_sha256(&set));
     note("seed", context.seed().to_string());
     note("version", env!("CARGO_PKG_VERSION").into());
     note("calibrated_on", format!("{} of {} s", spans_s(&set, &split.training), set.duration_s().round()));

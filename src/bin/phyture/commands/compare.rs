@@ -47,6 +47,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let models = wanted.models.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
     let set = context.flights(data, history)?;
+    let of_networks = networks.iter().map(|(_, hybrid)| &hybrid.description().model);
+    models.iter().map(|(_, model)| model).chain(of_networks).try_for_each(|model| model.check_flights(&set.flights))?;
     let first = models.first().map(|(_, model)| model).or_else(|| networks.first().map(|(_, hybrid)| &hybrid.description().model));
     let Some(first) = first else {
         return Err(Error::Config {
@@ -94,7 +96,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     if let Some(target) = page {
         let own = [
             ("data".to_owned(), data.data.display().to_string()),
-            ("SHA-256 of the data".to_owned(), data_sha256(data)?),
+            ("SHA-256 of the data".to_owned(), data_sha256(&set)),
             ("seed".to_owned(), context.seed().to_string()),
         ];
         let notes = set.notes.iter().map(|note| (DATA_NOTE.to_owned(), note.clone()));

@@ -119,7 +119,7 @@ fn prepare(
 ) -> Result<Option<(DataSet, Split, String)>> {
     let set = context.flights(data, 1)?;
     paper.iter_mut().for_each(|paper| paper.note(&set.notes));
-    let sha = data_sha256(data)?;
+    let sha = data_sha256(&set);
     let report = check::check(&set, Some(model));
     if report.fault {
         context.say(format!("\n{report}"));

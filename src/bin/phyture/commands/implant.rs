@@ -9,7 +9,8 @@ use phyture::physics::{Effect, Model, calibrate, implant, spread_over_flights, t
 use phyture::suggest::did_you_mean;
 use phyture::{Error, Result};
 use serde_json::{Map, Value, json};
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Name of an effect that was given as a formula.
@@ -32,8 +33,13 @@ pub struct Wanted<'a> {
 /// Implants, writes the flights and `truth.json`.
 pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Result<ExitCode> {
     let set = context.flights(data, 1)?;
+    refuse_recorded(&set, &data.data, folder)?;
     let model = match wanted.model {
-        Some(path) => Model::read(path)?,
+        Some(path) => {
+            let model = Model::read(path)?;
+            model.check_flights(&set.flights)?;
+            model
+        }
         None => {
             let whole = |(flight, log): (usize, &phyture::flight::Flight)| Span { flight, start: 0, end: log.len() };
             let spans: Vec<Span> = set.flights.iter().enumerate().map(whole).collect();
@@ -59,7 +65,7 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
         "coefficients": effect.coefficients,
         "parameters": effect.parameters,
         "rms": rms,
-        "data_sha256": data_sha256(data)?,
+        "data_sha256": data_sha256(&set),
         "version": env!("CARGO_PKG_VERSION"),
     });
     let text = serde_json::to_string_pretty(&truth).map_err(|error| Error::Undetermined(error.to_string()))?;
@@ -72,6 +78,26 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
     context.say(format!("{} flights written to {} with truth.json", changed.flights.len(), folder.display()));
     context.json(&truth)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Refuses a folder in which a recorded flight would be overwritten, whatever was forced: what is recorded cannot be had again.
+fn refuse_recorded(set: &DataSet, data: &Path, folder: &Path) -> Result<()> {
+    let recorded: BTreeSet<PathBuf> = set.source.files.iter().filter_map(|file| file.canonicalize().ok()).collect();
+    let whole = |path: &Path| path.canonicalize().ok();
+    let same = data.is_dir() && whole(data).is_some() && whole(data) == whole(folder);
+    let written = set.flights.iter().map(|flight| write::csv_path(folder, flight));
+    let hit = written.chain([folder.join("dataset.toml")]).find(|path| whole(path).is_some_and(|path| recorded.contains(&path)));
+    let found = match (same, hit) {
+        (true, _) => "the folder of the recorded flights".to_owned(),
+        (false, Some(path)) => format!("a folder in which {} is a recorded flight or describes one", path.display()),
+        (false, None) => return Ok(()),
+    };
+    Err(Error::Config {
+        place: "command line".into(),
+        field: "DIR".into(),
+        found: format!("`{}`, {found}", folder.display()),
+        expected: "another folder; implanted flights never take the place of the recorded ones, and no option changes that".into(),
+    })
 }
 
 fn fault(field: &str, found: String, expected: &str) -> Error {

@@ -29,8 +29,7 @@ use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::tape::Threads;
 use phyture::{Error, Result};
-use sha2::{Digest, Sha256};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -289,6 +288,7 @@ impl<'a> Context<'a> {
 
     /// Divides the flights as the command line and the model file say.
     pub fn split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
+        model.check_flights(flights)?;
         let mut locked = model.data.locked.clone();
         locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
         let protocol = division.split.clone().unwrap_or_else(|| model.data.split.clone());
@@ -307,40 +307,16 @@ impl<'a> Context<'a> {
     /// sees it; of fewer than ten flights the last fifth of each.
     pub fn search_split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
         if model.data.locked.is_empty() && division.lock.is_empty() && division.split.is_none() {
+            model.check_flights(flights)?;
             return Ok(Split::for_search(flights, self.seed()));
         }
         self.split(flights, model, division)
     }
 }
 
-/// SHA-256 of the names and contents of all files of a data set, and of the description they are read by.
-pub fn data_sha256(data: &Data) -> Result<String> {
-    let mut files = Vec::new();
-    list(&data.data, &mut files)?;
-    files.extend(data.dataset.iter().cloned());
-    files.sort();
-    let mut digest = Sha256::new();
-    for file in files {
-        let bytes = std::fs::read(&file).map_err(Error::io(&file))?;
-        digest.update(file.strip_prefix(&data.data).unwrap_or(Path::new("")).to_string_lossy().as_bytes());
-        digest.update((bytes.len() as u64).to_le_bytes());
-        digest.update(&bytes);
-    }
-    Ok(digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
-}
-
-fn list(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
-    if !path.is_dir() {
-        files.push(path.into());
-        return Ok(());
-    }
-    for entry in std::fs::read_dir(path).map_err(Error::io(path))? {
-        let entry = entry.map_err(Error::io(path))?.path();
-        if !entry.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.')) {
-            list(&entry, files)?;
-        }
-    }
-    Ok(())
+/// SHA-256 of the names and contents of the files that a data set was read from, the description in force among them.
+pub fn data_sha256(set: &DataSet) -> String {
+    set.source.sha256.clone()
 }
 
 /// A flag that Ctrl-C (and a polite kill) raises. Installed once.

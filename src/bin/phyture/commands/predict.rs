@@ -99,6 +99,13 @@ impl Predictor {
         }
     }
 
+    const fn model(&self) -> &Model {
+        match self {
+            Self::Hybrid(hybrid) => &hybrid.description().model,
+            Self::Physics(model) => model,
+        }
+    }
+
     /// Samples that a prediction needs.
     fn history(&self) -> usize {
         match self {
@@ -130,6 +137,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
     let predictor = Predictor::new(wanted)?;
     let history = predictor.history();
     let set = context.flights(data, history)?;
+    predictor.model().check_flights(&set.flights)?;
     let whole = |flight: usize| Span { flight, start: 0, end: set.flights[flight].len() };
     let all = windows(&(0..set.flights.len()).map(whole).collect::<Vec<_>>(), history, wanted.stride);
     let mut predicted = Vec::with_capacity(all.len());

@@ -89,7 +89,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let set = context.flights(data, config.network.history())?;
     let model = Model::read(wanted.model)?;
     let split = context.split(&set.flights, &model, division)?;
-    let identity = format!("{}\n{}\n{split:?}", data_sha256(data)?, model.to_toml()?);
+    let identity = format!("{}\n{}\n{split:?}", data_sha256(&set), model.to_toml()?);
     let interrupted = interruption()?;
     let task = Task { set: &set, split: &split, model: &model, config: &config, identity: &identity, folder: &folder };
     let output = task.run(context, wanted.resume, &interrupted)?;
