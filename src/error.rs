@@ -135,7 +135,7 @@ impl Error {
         move |source| {
             let source = match missing_folder(&path) {
                 Some(folder) if source.kind() == io::ErrorKind::NotFound && source.get_ref().is_none() => {
-                    let says = format!("the folder {} does not exist; make it first", folder.display());
+                    let says = format!("the folder {} does not exist", folder.display());
                     io::Error::new(source.kind(), says)
                 }
                 _ => source,
@@ -199,7 +199,7 @@ mod tests {
         assert_eq!(message(io::ErrorKind::NotFound), "a.csv: there is no such file or folder");
         assert_eq!(message(io::ErrorKind::IsADirectory), "a.csv: is a folder, where a file was expected");
         let far = Error::io("no_such/folder/a.csv")(io::ErrorKind::NotFound.into()).to_string();
-        assert_eq!(far, "no_such/folder/a.csv: the folder no_such does not exist; make it first");
+        assert_eq!(far, "no_such/folder/a.csv: the folder no_such does not exist");
         // ELOOP has no kind of its own that is stable.
         let loops = Error::io("a.csv")(io::Error::from_raw_os_error(40)).to_string();
         assert!(!loops.contains("os error") && loops.len() > "a.csv: ".len(), "{loops}");

@@ -1,7 +1,10 @@
 //! The check of conventions and timing: flights with one thing wrong each are named, clean ones pass.
 
 use phyture::critique::check::{CheckReport, Finding, Verdict, check};
-use phyture::flight::attitude::{cross, euler_rates, gravity_body, rotate, rotation_body_to_inertial};
+use phyture::flight::attitude::{
+    Axes, QuaternionOrder, cross, euler_rates, euler_to_quaternion, gravity_body, quaternion_to_euler, rotate,
+    rotation_body_to_inertial,
+};
 use phyture::flight::{Column, DataSet, Flight, GRAVITY_M_S2, Targets};
 use proptest::prelude::*;
 
@@ -286,6 +289,89 @@ fn signs_and_units_are_named() {
         }
     });
     assert_fault(&up, "lateral_force", "z points up");
+}
+
+#[test]
+fn a_quaternion_in_the_other_order_is_named_in_both_directions_and_in_other_axes() {
+    for (order, axes, advice) in [
+        (QuaternionOrder::ScalarLast, Axes::NedFrd, "quaternion = \"wxyz\""),
+        (QuaternionOrder::ScalarLast, Axes::EnuFlu, "quaternion = \"wxyz\""),
+        (QuaternionOrder::ScalarFirst, Axes::NwuFlu, "quaternion = \"xyzw\""),
+    ] {
+        // What the reader makes of four numbers that stand in the order it does not expect.
+        let mut data = data(2, 0, Targets::Recorded, |columns| {
+            each(columns, ANGLES, |_, angles| {
+                let [roll, pitch, yaw] = axes.euler_to_ned(angles);
+                let written = order.other().written(euler_to_quaternion(roll, pitch, yaw));
+                axes.euler_to_ned(quaternion_to_euler(order.scalar_last(written)))
+            });
+        });
+        (data.source.quaternion, data.source.axes) = (Some(order), axes);
+        let report = check(&data, None);
+        assert_fault(&report, "attitude_rate", "scalar stands at its other end");
+        assert_fault(&report, "position_rate", "scalar stands at its other end");
+        assert!(finding(&report, "attitude_rate").set.as_ref().is_some_and(|set| set.starts_with(advice)), "{report}");
+    }
+    let mut right = data(2, 0, Targets::Recorded, |_| ());
+    right.source.quaternion = Some(QuaternionOrder::ScalarLast);
+    let report = check(&right, None);
+    assert!(!report.fault && finding(&report, "lateral_force").verdict == Verdict::Ok, "{report}");
+}
+
+#[test]
+fn columns_that_are_off_by_a_unit_are_told_which() {
+    let times = |of: &'static [Column], factor: f64| {
+        move |columns: &mut [Vec<f64>; Column::COUNT]| {
+            of.iter().for_each(|column| columns[*column as usize].iter_mut().for_each(|value| *value *= factor));
+        }
+    };
+    const P: [Column; 3] = [Column::X, Column::Y, Column::Z];
+    for (of, factor, name, advice) in [
+        (&P[..], 1e3, "position_rate_x", "[units] position = \"mm\""),
+        (&P[..], 1e2, "position_rate_y", "[units] position = \"cm\""),
+        (&V[..], 1e2, "position_rate_x", "[units] velocity = \"cm/s\""),
+        (&V_DOT[..], 1e3, "velocity_targets_x", "[units] acceleration = \"mm/s^2\""),
+    ] {
+        let report = planted(Targets::Recorded, times(of, factor));
+        let found = finding(&report, name);
+        assert!(found.verdict == Verdict::Fault && found.set.as_deref() == Some(advice), "{advice}\n{report}");
+    }
+    let percent = planted(Targets::Recorded, times(&[Column::U1, Column::U2, Column::U3, Column::U4], 100.0));
+    assert_eq!(finding(&percent, "control_range").set.as_deref(), Some("[units] controls = \"%\""), "{percent}");
+}
+
+#[test]
+fn what_the_description_states_is_not_advised_again() {
+    let mut data = data(2, 0, Targets::Derived, |columns| each(columns, ANGLES, |_, values| values.map(f64::to_degrees)));
+    assert_eq!(finding(&check(&data, None), "attitude_rate").set.as_deref(), Some("[units] angles = \"deg\""));
+    data.source.stated.insert("units.roll".into(), "deg".into());
+    let report = check(&data, None);
+    let found = finding(&report, "attitude_rate");
+    assert!(
+        report.fault && found.set.is_none() && found.message.contains("dataset.toml states [units] angles = \"deg\" already"),
+        "{report}"
+    );
+}
+
+#[test]
+fn shifts_are_as_many_at_ten_times_the_rate() {
+    let slow = planted(Targets::Recorded, |columns| columns[Column::Wx as usize].rotate_right(2));
+    let mut fast = data(2, 0, Targets::Recorded, |columns| columns[Column::Wx as usize].rotate_right(2));
+    for flight in &mut fast.flights {
+        let between = |values: &[f64]| -> Vec<f64> {
+            let pairs = values.windows(2).flat_map(|pair| (0..10).map(move |k| pair[0] + 0.1 * f64::from(k) * (pair[1] - pair[0])));
+            pairs.collect()
+        };
+        let columns = Column::ALL.map(|column| between(flight.column(column)));
+        *flight = Flight::new(flight.name.clone(), "test", 0.0, 0.1 * STEP_S, columns, Targets::Recorded).unwrap();
+    }
+    let fast = check(&fast, None);
+    let shifts = |report: &CheckReport| report.control_delay.as_ref().map_or(0, |profile| profile.delay_s.len());
+    // 10 ms apart at 100 Hz, 5 ms at 1000 Hz, where whole samples would be 121.
+    assert_eq!((shifts(&slow), shifts(&fast)), (13, 25));
+    let (of_slow, of_fast) = (finding(&slow, "rates_offset"), finding(&fast, "rates_offset"));
+    let apart = of_slow.measured.zip(of_fast.measured).map(|(slow, fast)| (slow - fast).abs());
+    assert!(apart.is_some_and(|apart| apart < 0.1 * STEP_S), "{slow}\n{fast}");
 }
 
 #[test]

@@ -41,7 +41,7 @@ fn a_canonical_log_is_taken_bit_by_bit() -> Outcome {
     let data = read_one(&sheet.csv(), "")?;
     let flight = only(&data);
     assert_same(flight, &sheet, Tolerance::Exact.relative_f64());
-    assert_eq!((flight.name.as_str(), flight.manoeuvre.as_str(), flight.targets), ("a", "hover", Targets::Recorded));
+    assert_eq!((flight.name.as_str(), flight.manoeuvre.as_str(), flight.targets), ("hover/a", "hover", Targets::Recorded));
     assert_eq!((flight.step_s.to_bits(), flight.absent.len()), (STEP_S.to_bits(), 0));
     assert_eq!(flight.named("rotor_rpm"), Some(sheet.get("rotor_rpm")));
     assert_eq!(data.notes, Vec::<String>::new());
@@ -111,7 +111,7 @@ fn gaps_split_on_request_and_short_pieces_are_left_out_aloud() -> Outcome {
     let options = ReadOptions { split_at_gaps: true, minimum_rows: 50, ..ReadOptions::default() };
     let data = read_with(&sheet.csv(), "", &options)?;
     let lengths: Vec<(&str, usize)> = data.flights.iter().map(|flight| (flight.name.as_str(), flight.len())).collect();
-    assert_eq!(lengths, [("a[1]", 100), ("a[2]", 150)]);
+    assert_eq!(lengths, [("hover/a[1]", 100), ("hover/a[2]", 150)]);
     assert_eq!(data.flights[1].start_s.to_bits(), sheet.get("t")[110].to_bits());
     let notes = data.notes.join("\n");
     assert_says(
@@ -259,12 +259,12 @@ fn a_row_filter_keeps_pieces_and_says_what_it_kept() -> Outcome {
     // Height is 10 + 2 sin(0.9 t): above 11 twice in 7 s, the second time only shortly.
     let data = read_one(&sheet.csv(), "use = [\"height > 11\", \"airspeed > 0\"]\nminimum_length_s = 0.1")?;
     let flight = only(&data);
-    assert_eq!(flight.name, "a");
+    assert_eq!(flight.name, "hover/a");
     assert!(flight.column(Column::Z).iter().all(|&z| z < -11.0));
-    assert_says(&data.notes.join("\n"), &["`a`: `use` keeps", "of 700 samples"]);
+    assert_says(&data.notes.join("\n"), &["`hover/a`: `use` keeps", "of 700 samples"]);
 
     let two = read_one(&sheet.csv(), "use = \"abs(height - 10) > 1\"\nminimum_length_s = 0.5")?;
-    assert_eq!(two.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["a[1]", "a[2]"]);
+    assert_eq!(two.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["hover/a[1]", "hover/a[2]"]);
     let whole = two.flights.iter().map(phyture::flight::Flight::len).sum::<usize>();
     assert_eq!(whole, sheet.get("z").iter().filter(|z| (-**z - 10.0).abs() > 1.0).count());
 
@@ -280,7 +280,7 @@ fn cells_are_repaired_only_by_a_stated_rule_and_counted() -> Outcome {
     let rule = "[[repair]]\ncolumns = [\"m1\"]\nvalid = \"value < 1000\"\nmax_gap_s = ";
     let data = read_one(&bad.csv(), &format!("{rule}0.05"))?;
     assert_eq!(only(&data).named("m1").map(|values| values[9..13].to_vec()), Some(vec![9.0, 10.0, 11.0, 12.0]));
-    assert_says(&data.notes.join("\n"), &["`a`: bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`"]);
+    assert_says(&data.notes.join("\n"), &["`hover/a`: bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`"]);
     // A run that is too long stays bad: refused where it is in use, harmless where the filter leaves it out.
     assert_says(&refusal(read_one(&bad.csv(), &format!("{rule}0.01"))), &["line 12, column `m1`", "`use` keeps"]);
     let cut = read_one(&bad.csv(), &format!("use = \"m1 >= 20\"\n{rule}0.01"))?;
@@ -334,19 +334,23 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     let folder = tempfile::tempdir()?;
     let (csv, root) = (Sheet::canonical(50).csv(), folder.path());
     let names = |path: &std::path::Path, options: &ReadOptions| -> phyture::Result<Vec<String>> {
-        Ok(data_set(path, options)?.flights.iter().map(|flight| format!("{}/{}", flight.manoeuvre, flight.name)).collect())
+        Ok(data_set(path, options)?.flights.iter().map(|flight| format!("{}: {}", flight.manoeuvre, flight.name)).collect())
     };
     put(root, "turn/b.csv", &csv)?;
     put(root, "hover/a10.csv", &csv)?;
     put(root, "hover/a9.csv", &csv)?;
     put(root, "hover/notes.txt", "windy")?;
     let plain = ReadOptions::default();
-    assert_eq!(names(root, &plain)?, ["hover/a9", "hover/a10", "turn/b"]);
-    assert_eq!(names(&root.join("hover"), &plain)?, ["hover/a9", "hover/a10"]);
-    assert_eq!(names(&root.join("turn/b.csv"), &plain)?, ["turn/b"]);
+    assert_eq!(names(root, &plain)?, ["hover: hover/a9", "hover: hover/a10", "turn: turn/b"]);
+    assert_says(&data_set(root, &plain)?.notes.join("\n"), &["1 file that is no log was not read: hover/notes.txt"]);
+    assert_eq!(names(&root.join("hover"), &plain)?, ["hover: a9", "hover: a10"]);
+    assert_eq!(names(&root.join("turn/b.csv"), &plain)?, ["turn: b"]);
 
     put(root, "turn/a9.csv", &csv)?;
-    assert_says(&refusal(data_set(root, &plain)), &["two flights named `a9`", "hover", "turn", "rename one"]);
+    assert_eq!(names(root, &plain)?, ["hover: hover/a9", "hover: hover/a10", "turn: turn/b", "turn: turn/a9"]);
+    put(root, "turn/a9.CSV", &csv)?;
+    assert_says(&refusal(data_set(root, &plain)), &["two flights named `turn/a9`", "a9.CSV", "a9.csv", "rename one"]);
+    std::fs::remove_file(root.join("turn/a9.CSV"))?;
     put(root, "dataset.toml", "exclude = [\"turn\"]\nmanoeuvre = { separator = \"9\", part = 1 }")?;
     let data = data_set(root, &plain)?;
     assert_eq!(data.flights.iter().map(|flight| flight.manoeuvre.as_str()).collect::<Vec<_>>(), ["a", "a10"]);

@@ -117,7 +117,8 @@ fn of_part(
     let (mut start_s, mut step_s) = (part.start_s, part.step_s);
     let mut new_times = None;
     if let Some(hz) = schema.resample_hz {
-        let resampler = Resampler::new(time_s, 1.0 / hz).map_err(|error| table.fault(error.to_string(), "a flight and a `resample_hz` that go together"))?;
+        let resampler = Resampler::new(time_s, 1.0 / hz)
+            .map_err(|error| table.fault(error.to_string(), "a flight and a `resample_hz` that go together"))?;
         resample(&mut columns, &resampler);
         done.common_notes.insert(format!("resampled from {:.2} Hz to {hz} Hz with a local cubic", 1.0 / part.step_s));
         (start_s, step_s) = (time_s.first().copied().unwrap_or(start_s), 1.0 / hz);

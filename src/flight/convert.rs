@@ -149,7 +149,9 @@ fn attitude_from_quaternion(
                 parts.push(values);
             }
             None if parts.is_empty() => return Ok(()),
-            None => return Err(missing(table, name, "the quaternion q1 q2 q3 q4 whole, scalar last unless `quaternion = \"wxyz\"`")),
+            None => {
+                return Err(missing(table, name, "the quaternion q1 q2 q3 q4 whole, scalar last unless `quaternion = \"wxyz\"`"));
+            }
         }
     }
     let [a, b, c, d] = parts.as_slice() else { return Ok(()) };

@@ -44,8 +44,14 @@ const COMPANIONS: [&str; 3] = [DESCRIPTION, "model.toml", "truth.json"];
 
 /// What other programs' files are, and how they become logs.
 const CONVERTERS: [(&str, &str); 7] = [
-    ("ulg", "a PX4 log: `ulog2csv FILE` (Python package pyulog) writes its topics as CSV; join those that are needed into one table"),
-    ("bin", "an ArduPilot log: `mavlogdump.py --format csv --types ATT FILE` (Python package pymavlink) writes a message type as CSV"),
+    (
+        "ulg",
+        "a PX4 log: `ulog2csv FILE` (Python package pyulog) writes its topics as CSV; join those that are needed into one table",
+    ),
+    (
+        "bin",
+        "an ArduPilot log: `mavlogdump.py --format csv --types ATT FILE` (Python package pymavlink) writes a message type as CSV",
+    ),
     ("gz", "compressed: `gunzip FILE` first"),
     ("zip", "compressed: unpack it first"),
     ("mat", "a MATLAB file: `writetable` writes CSV"),
@@ -191,8 +197,7 @@ fn of_class(data: &Path, class: &Path, schema: &Schema, logs: &mut Vec<Log>, unr
 
 /// Whether a symbolic link leads to the data set itself or to a folder that it is in.
 fn leads_back(data: &Path, class: &Path) -> bool {
-    class.is_symlink()
-        && matches!((data.canonicalize(), class.canonicalize()), (Ok(data), Ok(class)) if data.starts_with(&class))
+    class.is_symlink() && matches!((data.canonicalize(), class.canonicalize()), (Ok(data), Ok(class)) if data.starts_with(&class))
 }
 
 /// The first few names of many.
@@ -216,7 +221,8 @@ impl Unread {
         notes.extend(counted(&self.empty, "folder without logs", "folders without logs"));
         let deep = counted(&self.deep, "folder inside the folder of a manoeuvre", "folders inside folders of manoeuvres");
         notes.extend(deep.map(|note| format!("{note}; logs lie in DATA/<manoeuvre>/")));
-        let loops = counted(&self.loops, "symbolic link that leads back to the data set", "symbolic links that lead back to the data set");
+        let loops =
+            counted(&self.loops, "symbolic link that leads back to the data set", "symbolic links that lead back to the data set");
         notes.extend(loops);
         notes
     }

@@ -32,7 +32,8 @@ const BATCH: usize = 1 << 16;
 pub(super) fn read_parquet(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<RawTable> {
     let file = File::open(path).map_err(Error::io(path))?;
     let length = file.metadata().map_err(Error::io(path))?.len();
-    let bytes = usize::try_from(length).map_err(|_| ParquetError::General("too long".into())).and_then(|length| file.get_bytes(0, length));
+    let bytes =
+        usize::try_from(length).map_err(|_| ParquetError::General("too long".into())).and_then(|length| file.get_bytes(0, length));
     let bytes = bytes.map_err(|error| damaged(path, &error))?;
     let read = Read::of(path, &bytes);
     let table = guarded(|| parse(path, bytes, wanted)).unwrap_or_else(|reason| Err(damaged(path, &reason)))?;
@@ -40,7 +41,8 @@ pub(super) fn read_parquet(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result
 }
 
 fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> Error {
-    let expected = "a Parquet file, uncompressed or with Snappy compression; the file is damaged or of another kind, write it again";
+    let expected =
+        "a Parquet file, uncompressed or with Snappy compression; the file is damaged or of another kind, write it again";
     fault(path, format!("unreadable Parquet ({reason})"), expected)
 }
 
@@ -64,7 +66,11 @@ fn parse(path: &Path, bytes: impl ChunkReader + 'static, wanted: &dyn Fn(&str) -
             let (start, size) = chunk.byte_range();
             if start.checked_add(size).is_none_or(|end| end > length) {
                 let found = format!("the column `{}` at bytes {start} to {}", names[index], start.saturating_add(size));
-                return Err(fault(path, found, format!("a place within the file's {length} bytes; the file is damaged, write it again")));
+                return Err(fault(
+                    path,
+                    found,
+                    format!("a place within the file's {length} bytes; the file is damaged, write it again"),
+                ));
             }
             let known = read_column(group.get_column_reader(index).map_err(damaged)?, levels == 1, values).map_err(damaged)?;
             if !known {

@@ -33,7 +33,11 @@ impl Resampler {
         // Rounding must not lose the last sample.
         let steps = (last - first) / step_s * (1.0 + 4.0 * f64::EPSILON);
         if steps.is_nan() || steps >= MOST_SAMPLES {
-            let says = format!("resampling {:.0} s to {} Hz would make {steps:.1e} samples, more than {MOST_SAMPLES:.0e}", last - first, 1.0 / step_s);
+            let says = format!(
+                "resampling {:.0} s to {} Hz would make {steps:.1e} samples, more than {MOST_SAMPLES:.0e}",
+                last - first,
+                1.0 / step_s
+            );
             return Err(Error::Undetermined(says));
         }
         let count = steps as usize + 1;

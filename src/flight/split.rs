@@ -332,7 +332,9 @@ mod tests {
         };
         assert_eq!((locked("hover/f0")?, locked("f1")?, locked("hover")?), (vec![1], vec![2], vec![1, 2]));
         let ambiguous = locked("f0").map_err(|error| error.to_string());
-        assert!(matches!(ambiguous, Err(text) if text.contains("the name of 2 flights") && text.contains("`chaos/f0`, `hover/f0`")));
+        assert!(
+            matches!(ambiguous, Err(text) if text.contains("the name of 2 flights") && text.contains("`chaos/f0`, `hover/f0`"))
+        );
         let unknown = locked("hover/f2").map_err(|error| error.to_string());
         assert!(matches!(unknown, Err(text) if text.contains("did you mean")));
         Ok(())

@@ -82,7 +82,11 @@ const NOT_A_NUMBER: &str = "a number; a column that holds something else can be 
 /// Refuses a header that cannot be read unambiguously; `wanted` says which names matter.
 pub(super) fn check_header(path: &Path, names: &[String], wanted: &dyn Fn(&str) -> bool) -> Result<()> {
     if names.len() > MOST_COLUMNS {
-        return Err(fault(path, format!("{} columns", names.len()), format!("at most {MOST_COLUMNS}; write those that are needed")));
+        return Err(fault(
+            path,
+            format!("{} columns", names.len()),
+            format!("at most {MOST_COLUMNS}; write those that are needed"),
+        ));
     }
     let mut seen = BTreeSet::new();
     for (index, name) in names.iter().enumerate().filter(|(_, name)| wanted(name)) {

@@ -62,6 +62,11 @@ pub(super) fn parts(table: &RawTable, column: &str, time_s: &[f64], clock: Clock
     let tolerance = relative * step_s + rounding_s;
     let uneven = steps.iter().filter(|&&step| (step - step_s).abs() > tolerance).count();
     let jitters = uneven as f64 > JITTERS * steps.len() as f64;
+    let (sum_s, count) = steps
+        .iter()
+        .filter(|&&step| step <= (1.0 + JITTER_TOLERANCE) * step_s)
+        .fold((0.0, 0.0), |(sum, count), step| (sum + step, count + 1.0));
+    let mean_s = sum_s / count;
 
     let mut parts = Vec::new();
     let (mut start, mut gap_before_s) = (0, 0.0);
@@ -72,7 +77,8 @@ pub(super) fn parts(table: &RawTable, column: &str, time_s: &[f64], clock: Clock
         }
         let late = deviation > JITTER_TOLERANCE * step_s + rounding_s;
         if deviation < 0.0 || !clock.split || (jitters && !late) {
-            return Err(Uneven { step_s, uneven, of: steps.len(), jitters, late, resampled: clock.resampled }.fault(table, column, row, pair));
+            return Err(Uneven { step_s, mean_s, uneven, of: steps.len(), jitters, late, resampled: clock.resampled }
+                .fault(table, column, row, pair));
         }
         parts.push(part(time_s, start..row, step_s, gap_before_s));
         (start, gap_before_s) = (row, pair[1] - pair[0]);
@@ -105,6 +111,8 @@ const USUAL_RATES_HZ: RangeInclusive<f64> = 10.0..=1e4;
 /// A step that is not the flight's.
 struct Uneven {
     step_s: f64,
+    /// Mean of the steps without gaps, s.
+    mean_s: f64,
     /// How many there are, of how many steps.
     uneven: usize,
     of: usize,
@@ -126,7 +134,7 @@ impl Uneven {
             let expected = format!("{}; --split-at-gaps makes a flight of each part", constant(JITTER_TOLERANCE));
             return table.cell(row, column, found, if self.late { expected } else { constant(JITTER_TOLERANCE) });
         }
-        let resample = format!("`resample_hz = {}` in dataset.toml reads stamps that jitter", round_rate(step_s));
+        let resample = format!("`resample_hz = {}` in dataset.toml reads stamps that jitter", round_rate(self.mean_s));
         let gaps = "--split-at-gaps makes a flight of each part between gaps";
         let advice = match (self.jitters, self.late) {
             (true, true) => format!("{resample}; {gaps}"),

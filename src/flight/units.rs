@@ -14,8 +14,15 @@ const LENGTH: Units = &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("km", 1e3), ("f
 const ANGLE: Units = &[("rad", 1.0), ("deg", DEGREE_RAD)];
 const VELOCITY: Units = &[("m/s", 1.0), ("cm/s", 1e-2), ("mm/s", 1e-3), ("km/h", 1.0 / 3.6), ("ft/s", FOOT_M), ("kt", KNOT_M_S)];
 const RATE: Units = &[("rad/s", 1.0), ("deg/s", DEGREE_RAD), ("rpm", PI / 30.0)];
-const ACCELERATION: Units =
-    &[("m/s^2", 1.0), ("m/s²", 1.0), ("g", super::GRAVITY_M_S2), ("mg", super::GRAVITY_M_S2 * 1e-3), ("cm/s^2", 1e-2), ("mm/s^2", 1e-3), ("ft/s^2", FOOT_M)];
+const ACCELERATION: Units = &[
+    ("m/s^2", 1.0),
+    ("m/s²", 1.0),
+    ("g", super::GRAVITY_M_S2),
+    ("mg", super::GRAVITY_M_S2 * 1e-3),
+    ("cm/s^2", 1e-2),
+    ("mm/s^2", 1e-3),
+    ("ft/s^2", FOOT_M),
+];
 const ANGULAR_ACCELERATION: Units = &[("rad/s^2", 1.0), ("rad/s²", 1.0), ("deg/s^2", DEGREE_RAD)];
 const CONTROL: Units = &[("1", 1.0), ("%", 1e-2)];
 const NONE: Units = &[("1", 1.0)];

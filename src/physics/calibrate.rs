@@ -6,7 +6,7 @@
 use super::by_flight;
 use super::catalogue;
 use super::layout::Layout;
-use super::least_squares::{Cluster, solve};
+use super::least_squares::{Cluster, Failure, solve};
 use super::model::Model;
 use super::sign::{SignDoubt, SignFinding};
 use crate::error::{Error, Result};
@@ -212,16 +212,7 @@ fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Cali
     if total == 0 {
         return Err(Error::Undetermined("no rows to calibrate on: the spans are empty; give at least one flight".into()));
     }
-    let used = rows.iter().filter(|rows| **rows > 0).count();
-    let jobs: Vec<(usize, usize)> = (0..flights.len())
-        .filter(|&flight| rows[flight] > 0)
-        .map(|flight| {
-            let shortest = (SHORTEST_CLUSTER_S / flights[flight].step_s) as usize;
-            let length = (total / CLUSTERS).max(shortest).max(1);
-            let fewest = if used == 1 { 2 } else { 1 };
-            (flight, ((rows[flight] + length / 2) / length).max(fewest).min(rows[flight]))
-        })
-        .collect();
+    let jobs = cut(flights, &rows)?;
     let reduce = |&(flight, clusters): &(usize, usize)| layout.reduce(model, flight, &flights[flight], &ranges[flight], clusters);
     #[cfg(feature = "rayon")]
     let reduced: Result<Vec<Vec<Cluster>>> = {
@@ -253,6 +244,9 @@ fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Cali
     for (members, problem) in layout.problems() {
         let solution = solve(&problem, &mut clusters).map_err(|failure| layout.explain(model, &members, &failure))?;
         condition_number = condition_number.max(solution.condition_number);
+        if let Some(vague) = (0..members.len()).find(|&at| !solution.ci95[at].iter().all(|end| end.is_finite())) {
+            return Err(layout.explain(model, &members, &Failure::OneCluster(vague)));
+        }
         for ((&(effect, index), value), ci95) in members.iter().zip(&solution.values).zip(&solution.ci95) {
             let coefficient = calibrated.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
             if let Some(coefficient) = coefficient {
@@ -265,6 +259,31 @@ fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Cali
     let calibration =
         Calibration { coefficients, condition_number, rows: total, clusters: clusters.len(), rounds: 1, last_change: 0.0, signs };
     Ok((calibrated, calibration))
+}
+
+/// How many clusters each flight with rows is cut into.
+///
+/// # Errors
+/// [`Error::Undetermined`] where intervals would rest on nothing: they need two clusters of twice the length.
+fn cut(flights: &[Flight], rows: &[usize]) -> Result<Vec<(usize, usize)>> {
+    let total: usize = rows.iter().sum();
+    let jobs: Vec<(usize, usize)> = (0..flights.len())
+        .filter(|&flight| rows[flight] > 0)
+        .map(|flight| {
+            let shortest = (SHORTEST_CLUSTER_S / flights[flight].step_s) as usize;
+            let length = (total / CLUSTERS).max(shortest).max(1);
+            (flight, ((rows[flight] + length / 2) / length).max(1).min(rows[flight]))
+        })
+        .collect();
+    if jobs.iter().map(|(_, clusters)| clusters.div_ceil(2)).sum::<usize>() < 2 {
+        let length_s: f64 = jobs.iter().map(|&(flight, _)| rows[flight] as f64 * flights[flight].step_s).sum();
+        return Err(Error::Undetermined(format!(
+            "the training part is {length_s:.2} s of one flight, too little to tell how certain a coefficient is; give at least \
+             {:.1} s, or a second flight",
+            2.5 * SHORTEST_CLUSTER_S
+        )));
+    }
+    Ok(jobs)
 }
 
 fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {

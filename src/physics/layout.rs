@@ -207,6 +207,12 @@ impl Layout {
                 let (name, regressor) = describe(*index);
                 format!("the regressor {regressor} behind {name} reaches numbers too large to square; scale the formula down")
             }
+            Failure::OneCluster(index) => {
+                let (name, _) = describe(*index);
+                format!(
+                    "all that is known of {name} comes from one short stretch, so there is no telling how certain it is; {advice}"
+                )
+            }
             Failure::TooFewRows(rows) => {
                 format!("{rows} rows cannot determine {} coefficients; give longer flights", members.len())
             }

@@ -114,6 +114,8 @@ pub(super) enum Failure {
     Overflow(usize),
     /// Fewer rows than coefficients, or no more.
     TooFewRows(usize),
+    /// One cluster holds all that is known of this coefficient.
+    OneCluster(usize),
 }
 
 /// Every coefficient's column next to each other, and the regressand, for one channel's triangle.

@@ -120,7 +120,8 @@ impl Model {
                 place: format!("model `{}`, effect `{}`", self.name, effect.name),
                 field: format!("flights.{name}"),
                 found: format!("a name that could mean {}", names::listed(meant.into_iter())),
-                expected: "the path of one flight below the data, as in `hover/flight_0`; calibrate anew, or write the paths".into(),
+                expected: "the path of one flight below the data, as in `hover/flight_0`; calibrate anew, or write the paths"
+                    .into(),
             };
             for key in keys() {
                 let meant = names::find(flights, key);

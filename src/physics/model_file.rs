@@ -131,10 +131,12 @@ impl Model {
     /// The model as the text of a model file, every effect written out.
     ///
     /// # Errors
-    /// [`Error::Config`] if the model would not read back the same: an effect that is neither built in nor a single formula.
+    /// [`Error::Config`] if the model would not read back the same: an effect that is neither built in nor a single formula, or
+    /// a value or interval that is no finite number.
     pub fn to_toml(&self) -> Result<String> {
         let mut text = String::new();
         let [ix, iy, iz] = self.inertia;
+        self.check_numbers()?;
         // Writing to a String does not fail.
         let _ = writeln!(text, "[model]\nname = {}", quoted(&self.name));
         // A number that nobody gave stays a comment, so that whoever reads the file asks for it, too.
@@ -166,6 +168,25 @@ impl Model {
             return Err(Error::Config { place: format!("model `{}`", self.name), field, found: "another form".into(), expected });
         }
         Ok(text)
+    }
+
+    /// Refuses what is no number, which no model file holds.
+    fn check_numbers(&self) -> Result<()> {
+        for effect in &self.effects {
+            for coefficient in &effect.coefficients {
+                let of_flights = coefficient.by_flight.iter().flatten().map(|(_, value)| *value);
+                let mut values = std::iter::once(coefficient.value).chain(coefficient.ci95.into_iter().flatten()).chain(of_flights);
+                if let Some(value) = values.find(|value| !value.is_finite()) {
+                    return Err(Error::Config {
+                        place: format!("model `{}`", self.name),
+                        field: format!("{}.{}", effect.name, coefficient.name),
+                        found: format!("{value} as its value or an end of its interval"),
+                        expected: "finite numbers; calibrate on longer flights".into(),
+                    });
+                }
+            }
+        }
+        Ok(())
     }
 }
 

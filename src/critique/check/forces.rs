@@ -8,6 +8,7 @@ use super::increments::{Instant, Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Subject, Verdict};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{cross, gravity_body, rotate_back};
 
 /// A coefficient of which 95 % certainly lies nearer to another convention's value (0, 2, −1) than to 1.
@@ -40,12 +41,13 @@ pub(super) struct Forces {
 
 impl Forces {
     #[rustfmt::skip]
-    pub fn new() -> Self {
+    /// `quaternion` is how to say the other order, where the attitude is one.
+    pub fn new(quaternion: Option<&'static str>) -> Self {
         const V: fn(&Instant) -> Vector = |i| i.velocity;
         const G: fn(&Instant) -> Vector = |i| i.gravity;
         const DEGREE: f64 = std::f64::consts::PI / 180.0;
         let read = |says, set, velocity, gravity| Reading { says, set, velocity, gravity, lateral: [BlockRegression::new(), BlockRegression::new()] };
-        let readings = vec![
+        let mut readings = vec![
             read("", "", V, G),
             read("the velocity is written in inertial axes", "velocity = \"inertial\"", |i| rotate_back(&i.rotation, i.velocity), G),
             read("roll has the other sign", "[columns] roll = \"-roll\", with the file's name", V, |i| gravity_body(-i.angles[0], i.angles[1])),
@@ -55,6 +57,8 @@ impl Forces {
                 V, |i| gravity_body(-i.angles[0], -i.angles[1])),
             read("the angles are in degrees", "[units] angles = \"deg\"", V, |i| gravity_body(i.angles[0] * DEGREE, i.angles[1] * DEGREE)),
         ];
+        let third: fn(&Instant) -> Vector = |i| i.reordered[2].map(|part| GRAVITY_M_S2 * part);
+        readings.extend(quaternion.map(|set| read("the quaternion's scalar stands at its other end", set, V, third)));
         Self { readings, free: std::array::from_fn(|_| BlockRegression::new()) }
     }
 

@@ -110,15 +110,18 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;
     if beyond(FAULT_MARGIN) {
         finding.verdict = Verdict::Fault;
-        let known = KNOWN_GAINS.iter().find(|(gain, _)| (value / gain - 1.0).abs() < WARNING_MARGIN);
+        let off = |gain: f64| (value / gain).ln().abs();
+        let known = of_units(relation).iter().filter(|unit| value > 0.0 && off(unit.0) < WARNING_MARGIN);
+        let known = known.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
         finding.message = match known {
-            Some((_, says)) => format!("the gain of this axis is that of {says}"),
+            _ if (value + 1.0).abs() < WARNING_MARGIN => "the gain of this axis is that of the other sign".into(),
+            Some((_, says, _)) => format!("the gain of this axis is that of {says}"),
             None => "the gain of this axis is far from 1".into(),
         };
-        finding.set = Some(if value < 0.0 {
-            format!("[columns] {column} = \"-{column}\", with the file's name")
-        } else {
-            format!("[units] {units}; or the columns of this axis are others")
+        finding.set = Some(match known {
+            _ if value < 0.0 => format!("[columns] {column} = \"-{column}\", with the file's name"),
+            Some((_, _, unit)) => format!("[units] {unit}"),
+            None => format!("[units] {units}; or the columns of this axis are others"),
         });
     } else if high - low > 4.0 * FAULT_MARGIN || (low <= 0.0 && high >= 1.0) {
         finding.message = "these flights move too little about this axis to say".into();
@@ -132,14 +135,44 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     finding
 }
 
-/// Gains that common unit and sign mistakes give.
-const KNOWN_GAINS: [(f64, &str); 8] = [
-    (-1.0, "the other sign"),
-    (0.3048, "velocity in feet a second"),
-    (1.0 / 0.3048, "position in feet"),
-    (1.0 / 3.6, "velocity in km/h"),
-    (std::f64::consts::PI / 180.0, "rates in degrees a second"),
-    (180.0 / std::f64::consts::PI, "states in degrees"),
-    (crate::flight::GRAVITY_M_S2, "accelerations in units of g"),
-    (1e-3, "one stream in thousandths"),
+/// Gains that a wrong unit gives: the gain, the mistake, and what mends it under `[units]`.
+type Units = [(f64, &'static str, &'static str)];
+
+const FOOT_M: f64 = 0.3048;
+const DEGREE: f64 = std::f64::consts::PI / 180.0;
+
+const POSITION: &Units = &[
+    (FOOT_M, "velocity in feet a second", "velocity = \"ft/s\""),
+    (1.0 / 3.6, "velocity in km/h", "velocity = \"km/h\""),
+    (1.852 / 3.6, "velocity in knots", "velocity = \"kt\""),
+    (1e-2, "velocity in cm/s", "velocity = \"cm/s\""),
+    (1e-3, "velocity in mm/s", "velocity = \"mm/s\""),
+    (1.0 / FOOT_M, "position in feet", "position = \"ft\""),
+    (1e2, "position in cm", "position = \"cm\""),
+    (1e3, "position in mm", "position = \"mm\""),
 ];
+const ATTITUDE: &Units =
+    &[(DEGREE, "rates in degrees a second", "rates = \"deg/s\""), (1.0 / DEGREE, "angles in degrees", "angles = \"deg\"")];
+const LINEAR: &Units = &[
+    (crate::flight::GRAVITY_M_S2, "accelerations in units of g", "acceleration = \"g\""),
+    (crate::flight::GRAVITY_M_S2 * 1e-3, "accelerations in thousandths of g", "acceleration = \"mg\""),
+    (FOOT_M, "accelerations in ft/s²", "acceleration = \"ft/s^2\""),
+    (1e-2, "accelerations in cm/s²", "acceleration = \"cm/s^2\""),
+    (1e-3, "accelerations in mm/s²", "acceleration = \"mm/s^2\""),
+    (1.0 / FOOT_M, "velocity in feet a second", "velocity = \"ft/s\""),
+    (1e2, "velocity in cm/s", "velocity = \"cm/s\""),
+    (1e3, "velocity in mm/s", "velocity = \"mm/s\""),
+];
+const ANGULAR: &Units = &[
+    (DEGREE, "angular accelerations in degrees", "angular_acceleration = \"deg/s^2\""),
+    (1.0 / DEGREE, "rates in degrees a second", "rates = \"deg/s\""),
+];
+
+fn of_units(relation: &str) -> &'static Units {
+    match relation {
+        "position_rate" => POSITION,
+        "velocity_targets" => LINEAR,
+        "rate_targets" => ANGULAR,
+        _ => ATTITUDE,
+    }
+}

@@ -4,8 +4,10 @@
 //! differentiator, and noise enters at the two ends only. No verdicts here.
 
 use crate::blocks::BLOCK_S;
-use crate::flight::attitude::{Matrix3, gravity_body, rotation_body_to_inertial};
-use crate::flight::{Column, Flight, Targets};
+use crate::flight::attitude::{
+    Axes, Matrix3, QuaternionOrder, euler_to_quaternion, gravity_body, quaternion_to_euler, rotation_body_to_inertial,
+};
+use crate::flight::{Column, Flight, Source, Targets};
 use std::ops::Range;
 
 /// Three components.
@@ -23,6 +25,8 @@ pub(super) struct Instant {
     pub angles: Vector,
     /// R_b^in of the angles.
     pub rotation: Matrix3,
+    /// R_b^in of a quaternion written in the other order; of a log without quaternions the same as [`Instant::rotation`].
+    pub reordered: Matrix3,
     /// R_in^b g, m/s².
     pub gravity: Vector,
     /// Velocity in body axes, m/s.
@@ -50,14 +54,16 @@ pub(super) struct Motion {
 }
 
 impl Motion {
-    pub fn new(flight: &Flight) -> Self {
+    pub fn new(flight: &Flight, source: &Source) -> Self {
         let at = |columns: [Column; 3], sample: usize| columns.map(|column| flight.column(column)[sample]);
         let instant = |sample: usize| {
             let angles = at([Column::Roll, Column::Pitch, Column::Yaw], sample);
+            let rotation = rotation_body_to_inertial(angles[0], angles[1], angles[2]);
             Instant {
                 position: at([Column::X, Column::Y, Column::Z], sample),
                 angles,
-                rotation: rotation_body_to_inertial(angles[0], angles[1], angles[2]),
+                rotation,
+                reordered: source.quaternion.map_or(rotation, |order| reordered(angles, source.axes, order)),
                 gravity: gravity_body(angles[0], angles[1]),
                 velocity: at([Column::Vx, Column::Vy, Column::Vz], sample),
                 rates: at([Column::Wx, Column::Wy, Column::Wz], sample),
@@ -100,6 +106,14 @@ impl Motion {
         }
         sum
     }
+}
+
+/// R_b^in as it would be had the log's quaternion been read in the other order. A change of axes is its own inverse.
+fn reordered(angles: Vector, axes: Axes, order: QuaternionOrder) -> Matrix3 {
+    let [roll, pitch, yaw] = axes.euler_to_ned(angles);
+    let written = order.written(euler_to_quaternion(roll, pitch, yaw));
+    let [roll, pitch, yaw] = axes.euler_to_ned(quaternion_to_euler(order.other().scalar_last(written)));
+    rotation_body_to_inertial(roll, pitch, yaw)
 }
 
 /// Length of a piece of this flight, s.

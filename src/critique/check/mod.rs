@@ -4,6 +4,7 @@
 //! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
 //! little (`forces`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
+mod advice;
 mod excitation;
 mod forces;
 mod gains;
@@ -17,6 +18,7 @@ pub use excitation::{Collinearity, Excitation};
 pub use report::{CheckReport, Finding, Subject, Verdict};
 pub use timing::DelayProfile;
 
+use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Targets};
 use crate::physics::Model;
 
@@ -32,16 +34,17 @@ const RARE_SHARE: f64 = 0.01;
 /// 10 s. A fault is named only where another convention explains the log better by a wide margin; a modelling error alone
 /// does not make one.
 pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
+    let quaternion = data.source.quaternion.map(other_order);
     let mut relations = [
-        relations::Relation::position(),
-        relations::Relation::attitude(true),
-        relations::Relation::attitude(false),
+        relations::Relation::position(quaternion),
+        relations::Relation::attitude(true, quaternion),
+        relations::Relation::attitude(false, quaternion),
         relations::Relation::linear_targets(),
         relations::Relation::angular_targets(),
     ];
-    let (mut gains, mut forces, mut timing) = (gains::Gains::new(), forces::Forces::new(), timing::Timing::new());
+    let (mut gains, mut forces, mut timing) = (gains::Gains::new(), forces::Forces::new(quaternion), timing::Timing::new());
     for (index, flight) in data.flights.iter().enumerate() {
-        let motion = increments::Motion::new(flight);
+        let motion = increments::Motion::new(flight, &data.source);
         relations.iter_mut().for_each(|relation| relation.add(index, &motion));
         gains.add(index, &motion);
         forces.add(index, &motion);
@@ -66,6 +69,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     findings.push(delay);
     let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
     findings.extend(excitation::findings(&excitation, &collinearity));
+    findings.iter_mut().for_each(|finding| advice::heed(finding, &data.source));
 
     CheckReport {
         fault: findings.iter().any(|finding| finding.verdict == Verdict::Fault),
@@ -82,6 +86,14 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         excitation,
         collinearity,
         notes: data.notes.clone(),
+    }
+}
+
+/// How the description says the order that a quaternion is not read in.
+const fn other_order(order: QuaternionOrder) -> &'static str {
+    match order {
+        QuaternionOrder::ScalarLast => "quaternion = \"wxyz\"",
+        QuaternionOrder::ScalarFirst => "quaternion = \"xyzw\", or leave `quaternion` out",
     }
 }
 
@@ -136,7 +148,15 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
             "controls reach {:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]",
             largest(&controls)
         );
-        let set = "[columns] u1 = \"u1 / 1000\" or the like, with the file's names";
+        let least =
+            flights.iter().flat_map(|flight| flight.column(Column::U4)).fold(f64::INFINITY, |least, value| least.min(*value));
+        let set = match largest(&controls) {
+            percent if percent <= 150.0 && percent > 15.0 => "[units] controls = \"%\"",
+            pulses if pulses <= 2300.0 && least >= 700.0 => {
+                "[columns] u1 = \"(u1 - 1500) / 500\" and so on for pulses in us, with the file's names"
+            }
+            _ => "[columns] u1 = \"u1 / 1000\" or the like, with the file's names",
+        };
         findings.push(finding("control_range", Verdict::Warning, message, Some(set)));
     }
     let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();

@@ -15,6 +15,7 @@ use std::ops::Range;
 type Stack = [f64; 9];
 
 /// One reading of the log: the state s and its rate f at a sample.
+#[derive(Clone, Copy)]
 pub(super) struct Hypothesis {
     /// What the log would be, as a clause.
     says: &'static str,
@@ -45,6 +46,7 @@ const POOR_SHARE: f64 = 0.5;
 
 const TRANSPOSED: &str =
     "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
+const REORDERED: &str = "the quaternion's scalar stands at its other end";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
@@ -95,10 +97,11 @@ impl Relation {
 
     /// ṗ = R v.
     #[rustfmt::skip]
-    pub fn position() -> Self {
+    pub fn position(quaternion: Option<&'static str>) -> Self {
         let at = |i: &Instant| stack(i.position);
         let read = |says, set, state, rate| Hypothesis { says, set, state, rate };
-        Self::new("position_rate", "p' = R v", |motion| motion.position && motion.heading, vec![
+        let order = quaternion.map(|set| read(REORDERED, set, at, |i| stack(rotate(&i.reordered, i.velocity))));
+        Self::new("position_rate", "p' = R v", |motion| motion.position && motion.heading, [vec![
             read("", "", at, |i| stack(rotate(&i.rotation, i.velocity))),
             read("the velocity is written in inertial axes", "velocity = \"inertial\"", at, |i| stack(i.velocity)),
             read("the attitude is that of the inertial frame seen from the body (transposed)", TRANSPOSED, at, |i| stack(rotate_back(&i.rotation, i.velocity))),
@@ -111,12 +114,14 @@ impl Relation {
             read("pitch has the other sign", PITCH_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.velocity))),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.velocity))),
             read("the angles are in degrees", ANGLES_DEGREES, at, |i| stack(rotate(&turned(i.angles.map(|angle| angle * DEGREE)), i.velocity))),
-        ])
+        ], order.into_iter().collect()].concat())
     }
 
+    /// `quaternion` is how to say the other order, where the attitude is one.
+    ///
     /// ṙ = r × ω for the inertial axes r in body components, or of them the vertical alone where there is no heading.
     #[rustfmt::skip]
-    pub fn attitude(heading: bool) -> Self {
+    pub fn attitude(heading: bool, quaternion: Option<&'static str>) -> Self {
         let read = |says, set, state, rate| Hypothesis { says, set, state, rate };
         if !heading {
             const DOWN: fn(&Instant) -> Stack = |i| stack(i.rotation[2]);
@@ -133,7 +138,8 @@ impl Relation {
                 read("the angles are in degrees", ANGLES_DEGREES, |i| stack(turned(i.angles.map(|angle| angle * DEGREE))[2]), |i| stack(cross(turned(i.angles.map(|angle| angle * DEGREE))[2], i.rates))),
             ]);
         }
-        Self::new("attitude_rate", "dR'/dt = R' x w", |motion| motion.heading, vec![
+        let order = quaternion.map(|set| read(REORDERED, set, |i| axes(&i.reordered), |i| turning(&i.reordered, i.rates)));
+        Self::new("attitude_rate", "dR'/dt = R' x w", |motion| motion.heading, [vec![
             read("", "", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates)),
             read("the attitude is that of the inertial frame seen from the body (transposed)", TRANSPOSED, |i| axes(&transposed(&i.rotation)), |i| turning(&transposed(&i.rotation), i.rates)),
             read("the rates are written in inertial axes", "[columns] wx, wy, wz as body rates: the log has inertial ones", |i| axes(&i.rotation), |i| turning(&i.rotation, rotate_back(&i.rotation, i.rates))),
@@ -147,7 +153,7 @@ impl Relation {
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
             read("the rates are in degrees a second", "[units] rates = \"deg/s\"", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates.map(|rate| rate * DEGREE))),
             read("the angles are in degrees", ANGLES_DEGREES, |i| axes(&turned(i.angles.map(|angle| angle * DEGREE))), |i| turning(&turned(i.angles.map(|angle| angle * DEGREE)), i.rates)),
-        ])
+        ], order.into_iter().collect()].concat())
     }
 
     /// The recorded v̇ is the derivative of the body components of v.

@@ -1,7 +1,8 @@
 //! Streams of a log against each other in time: which comes late, and by how much; and how late the controls act.
 //!
-//! An error is profiled over shifts of one stream by whole samples; the minimum is refined by a parabola, and its interval is from
-//! leaving out one block at a time (jackknife). A flight whose step differs from the first's is left out.
+//! An error is profiled over shifts of one stream by whole samples, of a log faster than 200 Hz by 5 ms, so that the work grows with the
+//! rate and not with its square; the minimum is refined by a parabola, and its interval is from leaving out one block at a time
+//! (jackknife). A flight whose step differs from the first's is left out.
 
 use super::increments::Motion;
 use super::regression::BlockRegression;
@@ -13,6 +14,8 @@ use serde::{Deserialize, Serialize};
 
 /// Streams are compared up to this shift to either side, s.
 const LARGEST_SHIFT_S: f64 = 0.1;
+/// Shifts are no closer than this, s, unless the samples are further apart.
+const CLOSEST_SHIFTS_S: f64 = 0.005;
 /// Delays of the controls that are tried, s.
 const CONTROL_DELAYS_S: [f64; 2] = [-0.02, 0.1];
 /// Fall of the summed log error over the profile below which its minimum means nothing.
@@ -30,6 +33,8 @@ pub struct DelayProfile {
 /// Squared errors by channel, shift and block.
 struct Profile {
     shifts: Vec<isize>,
+    /// Samples from one shift to the next.
+    grid: f64,
     /// `[channel][shift][block]`.
     errors: Vec<Vec<Vec<f64>>>,
 }
@@ -57,7 +62,7 @@ impl Profile {
             return Some(at);
         }
         let (before, after) = (curve[lowest - 1] - curve[lowest], curve[lowest + 1] - curve[lowest]);
-        Some(if before + after > 0.0 { at + 0.5 * (before - after) / (before + after) } else { at })
+        Some(if before + after > 0.0 { at + self.grid * 0.5 * (before - after) / (before + after) } else { at })
     }
 
     fn totals(&self) -> Vec<Vec<f64>> {
@@ -147,6 +152,8 @@ const PAIRS: [Pair; 3] = [
 /// Accumulates all profiles over flights.
 pub(super) struct Timing {
     step_s: Option<f64>,
+    /// Samples from one shift to the next.
+    grid: usize,
     pairs: Vec<(Pair, Profile)>,
     delays: Vec<isize>,
     /// `[channel][delay]`: ω̇x, ω̇y, ω̇z, v̇z on their own state, their control and 1.
@@ -156,19 +163,26 @@ pub(super) struct Timing {
 
 impl Timing {
     pub fn new() -> Self {
-        Self { step_s: None, pairs: Vec::new(), delays: Vec::new(), controls: Vec::new(), blocks: 0 }
+        Self { step_s: None, grid: 1, pairs: Vec::new(), delays: Vec::new(), controls: Vec::new(), blocks: 0 }
     }
 
     fn start(&mut self, step_s: f64) {
-        let samples = |time_s: f64| (time_s / step_s).round() as isize;
-        let largest = samples(LARGEST_SHIFT_S).max(2);
-        let shifts: Vec<isize> = (-largest..=largest).collect();
+        // Rounding of the quotient must not make the grid a sample finer.
+        self.grid = ((CLOSEST_SHIFTS_S / step_s * (1.0 + 1e-9)) as usize).max(1);
+        let grid = self.grid as isize;
+        let steps = |time_s: f64| (time_s / (step_s * self.grid as f64)).round() as isize;
+        let largest = steps(LARGEST_SHIFT_S).max(2);
+        let shifts: Vec<isize> = (-largest..=largest).map(|shift| shift * grid).collect();
+        let delays = steps(CONTROL_DELAYS_S[0]).min(-1)..=steps(CONTROL_DELAYS_S[1]).max(2);
+        self.delays = delays.map(|delay| delay * grid).collect();
         self.step_s = Some(step_s);
         self.pairs = PAIRS
             .into_iter()
-            .map(|pair| (pair, Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone() }))
+            .map(|pair| {
+                let errors = vec![vec![Vec::new(); shifts.len()]];
+                (pair, Profile { errors, shifts: shifts.clone(), grid: self.grid as f64 })
+            })
             .collect();
-        self.delays = (samples(CONTROL_DELAYS_S[0]).min(-1)..=samples(CONTROL_DELAYS_S[1]).max(2)).collect();
         self.controls = vec![vec![BlockRegression::new(); self.delays.len()]; 4];
     }
 
@@ -183,7 +197,7 @@ impl Timing {
             return;
         }
         self.blocks += motion.instants.len() / motion.block_samples();
-        let margin = self.pairs.first().map_or(0, |(_, profile)| profile.shifts.len() / 2);
+        let margin = self.pairs.first().map_or(0, |(_, profile)| profile.shifts.len() / 2 * self.grid);
         for (pair, profile) in self.pairs.iter_mut().filter(|(pair, _)| (pair.applies)(motion)) {
             for (index, shift) in profile.shifts.iter().enumerate() {
                 let mut open = None;
@@ -248,7 +262,8 @@ impl Timing {
         if errors.is_empty() {
             return (finding, None);
         }
-        let profile = Profile { shifts: self.delays.clone(), errors };
+        let profile = Profile { shifts: self.delays.clone(), errors, grid: self.grid as f64 };
+        let grid_s = step_s * self.grid as f64;
         let totals = profile.totals();
         let curve: Vec<f64> = (0..profile.shifts.len()).map(|shift| profile.objective(shift, None, &totals)).collect();
         let least = curve.iter().copied().fold(f64::INFINITY, f64::min);
@@ -262,7 +277,7 @@ impl Timing {
         let delay_s = minimum.at * step_s;
         (finding.measured, finding.interval, finding.verdict) = (Some(delay_s), Some([low, high]), Verdict::Ok);
         let at_end = [profile.shifts.first(), profile.shifts.last()].into_iter().flatten().any(|end| *end as f64 == minimum.at);
-        if high < -step_s {
+        if high < -grid_s {
             finding.verdict = Verdict::Warning;
             finding.message =
                 "the controls are recorded after they act, or a feedback loop drives them; look at the log's time stamps".into();
@@ -271,7 +286,7 @@ impl Timing {
                 format!("controls act this late{}", if at_end { ", or later: the end of the range tried" } else { "" });
             let written = delay_s.max(0.0);
             finding.set = Some(format!("control_delay_s = {written:.3} under [data] in the model file"));
-            if of_model_s.is_some_and(|model_s| model_s < low - step_s || model_s > high + step_s) {
+            if of_model_s.is_some_and(|model_s| model_s < low - grid_s || model_s > high + grid_s) {
                 finding.verdict = Verdict::Warning;
                 finding.message.push_str(", which is not what the model says");
             } else if at_end {
@@ -298,8 +313,8 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
     finding.measured = Some(minimum.at * step_s);
     finding.interval = Some(minimum.interval.map(|samples| samples * step_s));
     let [low, high] = minimum.interval;
-    // Half a sample is what sampling itself leaves open.
-    if minimum.at.abs() > 1.0 && (low > 0.5 || high < -0.5) {
+    // Half a sample (half a shift, where these are further apart) is what sampling itself leaves open.
+    if minimum.at.abs() > profile.grid && (low > 0.5 * profile.grid || high < -0.5 * profile.grid) {
         finding.verdict = Verdict::Warning;
         let late = minimum.at > 0.0;
         finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());
