@@ -138,7 +138,21 @@ fn a_comparison_judges_every_sample_and_gives_stars_only_beyond_chance() -> Resu
         assert!(parts.values().all(|part| part["n"].as_u64() != Some(1) || part["rmse"]["vx_dot"].is_null()), "{parts:?}");
     }
     // Further apart: said in text, JSON and page, where no line joins what is 0.3 s apart.
-    let pages = ["compare", "data", "-m", "model.toml", "-n", "run", "--stride", "30", "--json", "few.json", "--report", "pages", "--force"];
+    let pages = [
+        "compare",
+        "data",
+        "-m",
+        "model.toml",
+        "-n",
+        "run",
+        "--stride",
+        "30",
+        "--json",
+        "few.json",
+        "--report",
+        "pages",
+        "--force",
+    ];
     let said = run(place.path(), &pages)?;
     let few = json(place.path(), "few.json")?;
     assert!(said.contains("every 30th sample") && few["stride"] == 30, "{said}");

@@ -107,6 +107,9 @@ fn clear_best(statistics: &[Statistic], counts: &[f64]) -> Option<usize> {
     others.all(beyond).then_some(best)
 }
 
+/// A measure for a channel, or for the mean of all; `None` where it cannot be had.
+type Choose<'a> = &'a dyn Fn(Option<usize>) -> Option<Measure>;
+
 /// The best models on some blocks: by measure, by channel. `variances` are those of the measured channels; where one is missing there is no
 /// best R² of the mean.
 pub(super) fn best(counts: &[f64], rows: &[RowSums], variances: &[Option<f64>; 6]) -> Best {
@@ -117,12 +120,12 @@ pub(super) fn best(counts: &[f64], rows: &[RowSums], variances: &[Option<f64>; 6
         Some(Measure::Unexplained(of))
     };
     let whole = all.and_then(|all| Some(Measure::Unexplained(all.try_into().ok()?)));
-    let measures: [(&str, &dyn Fn(Option<usize>) -> Option<Measure>); 3] = [
+    let measures: [(&str, Choose<'_>); 3] = [
         ("rmse", &|_| Some(Measure::Rmse)),
         ("mae", &|_| Some(Measure::Mae)),
         ("r2", &|channel| channel.map_or(whole, unexplained)),
     ];
-    let of_measure = |(name, measure): &(&str, &dyn Fn(Option<usize>) -> Option<Measure>)| {
+    let of_measure = |(name, measure): &(&str, Choose<'_>)| {
         let column = |channel: Option<usize>| {
             let measure = measure(channel)?;
             let channels = channel.map_or(ALL.to_vec(), |channel| vec![channel]);

@@ -173,7 +173,7 @@ impl Comparison {
     /// Mean RMSE by manoeuvre or regime; parts with one window have no figures.
     fn part_table(&self, f: &mut fmt::Formatter<'_>, what: &str) -> fmt::Result {
         let Some(first) = self.models.first() else { return Ok(()) };
-        let (parts, best): (fn(&ModelError) -> &BTreeMap<String, PartError>, _) = match what {
+        let (parts, best): (Parts, _) = match what {
             "regime" => (|model| &model.by_regime, &self.best_by_regime),
             _ => (|model| &model.by_manoeuvre, &self.best_by_manoeuvre),
         };
@@ -209,6 +209,9 @@ impl Comparison {
         Ok(())
     }
 }
+
+/// The parts of a model's windows: manoeuvres or regimes.
+type Parts = fn(&ModelError) -> &BTreeMap<String, PartError>;
 
 /// Widest name of a model in a table.
 const NAME: usize = 26;
