@@ -139,7 +139,7 @@ fn a_comparison_with_a_network_says_who_explains_what() -> Result<()> {
     for (models, reference) in
         [(&["-m", "model.toml", "-m", "amended.toml"][..], "model"), (&["-m", "amended.toml"], "mean of the measurements")]
     {
-        let asked = ["-n", "run", "--stride", "20", "--uncertainty", "--report", "report", "--json", "-"];
+        let asked = ["-n", "run", "--stride", "20", "--uncertainty", "--report", "report", "--force", "--json", "-"];
         let output = run(&[&["compare", "data"], models, &asked].concat())?;
         let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         let shares = &found["shares"][0];

@@ -11,6 +11,7 @@
 use super::Row;
 use super::compare::{check_row, measured, variation};
 use super::table::{aligned, significant};
+use super::wrap::wrapped;
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;
 use crate::flight::{Column, Flight, Window};
@@ -266,9 +267,9 @@ impl fmt::Display for Shares {
         });
         let rows: Vec<_> = rows.filter(|(_, cells)| cells.iter().any(|cell| !cell.is_empty())).collect();
         if let Some(sentence) = self.sentence() {
-            writeln!(f, "{sentence}")?;
+            writeln!(f, "{}", wrapped("", &sentence))?;
         }
-        writeln!(f, "Who explains what, %: {}", self.basis())?;
+        writeln!(f, "{}", wrapped("", &format!("Who explains what, %: {}", self.basis())))?;
         aligned(f, &heads, &rows)?;
         let few = if self.blocks < FEW_BLOCKS { " (few: a rough guide)" } else { "" };
         write!(f, "  95 % intervals from {} blocks of ten seconds{few}; mean: channels over their variance", self.blocks)

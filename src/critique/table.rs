@@ -42,6 +42,8 @@ impl Kind {
         match (self, value) {
             (_, None) => "–".to_owned(),
             (Self::Error, Some(value)) => significant(value, DIGITS),
+            // Far from any share: what is predicted has nothing to do with the measurements.
+            (Self::Share, Some(value)) if value.abs() >= 1000.0 => format!("{value:.1e}"),
             (Self::Share, Some(value)) => format!("{value:.3}"),
         }
     }
@@ -163,9 +165,10 @@ impl Comparison {
         }
         writeln!(f)?;
         let title = format!(
-            "RMSE less that of `{}`, with half of the 95 % interval, paired over {} blocks of ten seconds",
+            "RMSE less that of `{}`, with half of the 95 % interval, paired over {} block{} of ten seconds",
             clipped(to, NAME),
-            self.blocks
+            self.blocks,
+            if self.blocks == 1 { "" } else { "s" }
         );
         grid(f, &title, &columns, &rows)
     }
@@ -324,11 +327,14 @@ fn grid(
         cells.chain([wide(&columns[column].0), wide(&columns[column].1)]).max().unwrap_or(0)
     };
     let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+    // Two blanks between columns where there is room.
+    let roomy = self::wide(columns, rows) + columns.len() <= WIDTH;
+    let gap = if roomy { "  " } else { " " };
     writeln!(f, "{}", wrapped("", title))?;
     let header = |f: &mut fmt::Formatter<'_>, pick: fn(&(String, String)) -> &str| {
         let mut line = " ".repeat(first + 2);
         for (column, width) in columns.iter().zip(&widths) {
-            line.push_str(&format!(" {:>width$} ", pick(column)));
+            line.push_str(&format!("{gap}{:>width$} ", pick(column)));
         }
         writeln!(f, "{}", line.trim_end())
     };
@@ -339,7 +345,7 @@ fn grid(
     for (name, cells) in rows.iter().filter(|(_, cells)| cells.iter().any(|(cell, _)| !cell.is_empty())) {
         let mut line = format!("  {name:<first$}");
         for ((cell, mark), width) in cells.iter().zip(&widths) {
-            line.push_str(&format!(" {cell:>width$}{}", if *mark { "*" } else { " " }));
+            line.push_str(&format!("{gap}{cell:>width$}{}", if *mark { "*" } else { " " }));
         }
         writeln!(f, "{}", line.trim_end())?;
     }
@@ -374,7 +380,10 @@ mod tests {
         assert!(rmse.first().is_some_and(|line| line.matches('*').count() == 7), "{text}");
         assert!(rmse.get(1).is_some_and(|line| line.matches('…').count() == 6), "an interval below each RMSE: {text}");
         assert!(rmse.get(2).is_some_and(|line| line.contains("zero") && !line.contains('*')), "{text}");
-        assert!(text.contains("RMSE less that of `mean of the data`, paired over 10 blocks"), "{text}");
+        assert!(
+            text.contains("RMSE less that of `mean of the data`, with half of the 95 % interval, paired over 10 blocks"),
+            "{text}"
+        );
         assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
         Ok(())
     }

@@ -56,7 +56,7 @@ pub struct Model {
     #[serde(default)]
     pub vehicle: Vehicle,
     /// Which of these numbers nobody gave: they are then those of the paper's aircraft.
-    #[serde(default, skip_serializing_if = "Assumed::is_nothing")]
+    #[serde(default)]
     pub assumed: Assumed,
     /// Effects, in the order in which they are summed.
     pub effects: Vec<Effect>,

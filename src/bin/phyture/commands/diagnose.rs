@@ -122,7 +122,8 @@ fn prepare(
     let sha = data_sha256(&set);
     let report = check::check(&set, Some(model));
     if report.fault {
-        context.say(format!("\n{report}"));
+        // The notes on the data have been said, and folded.
+        context.say(format!("\n{}", check::CheckReport { notes: Vec::new(), ..report.clone() }));
         let faults = report.findings.iter().filter(|finding| finding.verdict == check::Verdict::Fault);
         let notes = faults.map(|finding| match &finding.set {
             Some(set) => format!("{}; set {set}", finding.message),
@@ -136,7 +137,7 @@ fn prepare(
         context.json(&diagnosis)?;
         return Ok(None);
     }
-    context.say(format!("check: {}", report.summary));
+    context.say(wrapped("check: ", &report.summary));
     let split = context.search_split(&set.flights, model, division)?;
     Ok(Some((set, split, sha)))
 }
