@@ -189,6 +189,10 @@ fn undetermined_coefficients_are_named_with_the_reason() -> Result<()> {
     assert_eq!(calibrate(&model, &flights, &whole(&flights))?.1.coefficients.len(), 14);
 
     let text = message(calibrate(&paper(), &flights, &[Span { flight: 0, start: 10, end: 12 }]))?;
+    assert!(text.contains("the training part is 0.02 s of one flight, too little"), "{text}");
+    let two = [random(4, 200)?, random(5, 200)?];
+    let few = [0, 1].map(|flight| Span { flight, start: 10, end: 11 });
+    let text = message(calibrate(&paper(), &two, &few))?;
     assert!(text.contains("2 rows cannot determine 3 coefficients") || text.contains("rows cannot determine 1"), "{text}");
     assert!(message(calibrate(&paper(), &flights, &[]))?.contains("spans are empty"));
     assert!(message(calibrate(&paper(), &flights, &[Span { flight: 3, start: 0, end: 1 }]))?.contains("an index of the 1 flights"));
