@@ -157,7 +157,7 @@ fn accelerations_and_what_gives_them_away_are_no_inputs() -> Result<()> {
     // The same data with another name for an acceleration, which the description knows.
     let set = data_set(&at.join("data"), &ReadOptions::default())?;
     for flight in &set.flights {
-        let path = at.join("data").join(&flight.manoeuvre).join(format!("{}.csv", flight.name));
+        let path = at.join("data").join(format!("{}.csv", flight.name));
         let text = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
         std::fs::write(&path, text.replacen("vx_dot", "ax", 1)).map_err(Error::io(&path))?;
     }

@@ -165,6 +165,9 @@ pub struct Comparison {
     /// The same by regime.
     #[serde(default)]
     pub best_by_regime: BTreeMap<String, usize>,
+    /// RMSE that no model can go below, where the explainable part of the flights is known (see [`super::floor()`]); added by whoever has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<PerChannel>,
     /// Who explains what, one entry a trained network; added by whoever has the network (see [`mod@super::shares`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<Shares>,
@@ -210,6 +213,7 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
         split,
         stride: 1,
         blocks: groups.blocks.len(),
+        floor: None,
         shares: Vec::new(),
         uncertainty: Vec::new(),
     })

@@ -4,6 +4,7 @@ pub mod check;
 pub mod compare;
 pub mod contest;
 pub mod diagnose;
+mod floor;
 pub mod locate;
 pub mod regime;
 pub mod residual_views;
@@ -16,6 +17,7 @@ pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare, paired};
 pub use contest::{Best, Difference};
+pub use floor::floor;
 pub use regime::Regime;
 pub use shares::{Shares, shares};
 pub use uncertainty::{Uncertainty, uncertainty};

@@ -135,6 +135,10 @@ impl Comparison {
                 rows.push((String::new(), intervals.map(|interval| (interval_text(interval), false)).collect()));
             }
         }
+        if let Some(floor) = self.floor.filter(|_| title == "RMSE") {
+            let values = floor.channels().into_iter().chain([floor.mean]);
+            rows.push(("floor".to_owned(), values.map(|value| (kind.text(value), false)).collect()));
+        }
         if wide(&columns, &rows) > WIDTH {
             // Very small numbers; the intervals are in the JSON and on the page.
             rows.retain(|(name, _)| !name.is_empty());
@@ -253,6 +257,10 @@ pub fn ordinal(number: usize) -> &'static str {
 pub const LEGEND: &str = "* best of the column (of the row, by manoeuvre and regime), where the paired 95 % interval of its difference to every \
                           other model lies beyond zero; below each RMSE its own 95 % interval, from blocks of ten seconds.";
 
+/// What the row `floor` means.
+pub const FLOOR: &str = "Floor: what is left of the recorded accelerations without their explainable part, gusts, turbulence and noise; no model can \
+                         remove it.";
+
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", wrapped("", &self.basis()))?;
@@ -275,6 +283,9 @@ impl fmt::Display for Comparison {
             writeln!(f, "\n{}", wrapped("", &format!("`{}`: {} {text}", model.name, model.not_finite)))?;
         }
         writeln!(f, "\n{}", wrapped("", LEGEND))?;
+        if self.floor.is_some() {
+            writeln!(f, "{}", wrapped("", FLOOR))?;
+        }
         self.shares.iter().try_for_each(|shares| writeln!(f, "\n{shares}"))?;
         self.uncertainty.iter().try_for_each(|uncertainty| writeln!(f, "\n{uncertainty}"))?;
         Ok(())

@@ -28,6 +28,11 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Most seeds of a network.
+    pub const MOST_SEEDS: usize = 1000;
+    /// Most parts that the manoeuvre classes are cut into.
+    pub const MOST_FOLDS: usize = 1000;
+
     /// The paper's sizes; where it states none, our reading: 100 epochs, a training window every 0.5 s, a test window every 0.1 s.
     pub fn paper() -> Self {
         let training = TrainConfig::default();
@@ -71,9 +76,14 @@ impl Settings {
     pub fn check(&self) -> Result<()> {
         self.phyture()?;
         self.training.check()?;
-        let counts = [("seeds", self.seeds), ("test_stride", self.test_stride), ("folds", self.folds)];
-        counts.into_iter().find(|(_, count)| *count == 0).map_or(Ok(()), |(field, _)| {
-            Err(Error::Config { place: "benchmark".into(), field: field.into(), found: "0".into(), expected: "at least 1".into() })
+        let counts = [
+            ("seeds", self.seeds, Self::MOST_SEEDS),
+            ("test_stride", self.test_stride, TrainConfig::MOST_STRIDE),
+            ("folds", self.folds, Self::MOST_FOLDS),
+        ];
+        counts.into_iter().find(|(_, count, most)| !(1..=*most).contains(count)).map_or(Ok(()), |(field, count, most)| {
+            let (place, expected) = ("benchmark".into(), format!("1 to {most}"));
+            Err(Error::Config { place, field: field.into(), found: count.to_string(), expected })
         })
     }
 

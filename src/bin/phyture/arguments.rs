@@ -5,7 +5,7 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use phyture::flight::split::Protocol;
 use phyture::hybrid::linear::LinearConfig;
-use phyture::protocol::TableId;
+use phyture::protocol::{Settings, TableId};
 use phyture::tape::Threads;
 use phyture::train::TrainConfig;
 use std::ops::RangeInclusive;
@@ -14,8 +14,7 @@ use std::path::PathBuf;
 /// Longest simulated flight time, minutes: a day, 2 GB of memory.
 const MOST_MINUTES: f64 = 1440.0;
 
-/// Most runs of a network in a benchmark, tasks of its job array, and effects that a search names.
-const MOST_SEEDS: usize = 1000;
+/// Most tasks of a job array, and effects that a search names.
 const MOST_SHARDS: usize = 10_000;
 const MOST_EFFECTS: usize = 100;
 
@@ -212,6 +211,9 @@ pub enum Command {
         /// Show how far each network's prediction moves with the intervals of its model's coefficients
         #[arg(long, requires = "network")]
         uncertainty: bool,
+        /// Explainable part of simulated flights, as `simulate --explainable` writes it: adds the floor that no model can go below
+        #[arg(long, value_name = "DIR")]
+        explainable: Option<PathBuf>,
         /// What trains and what tests.
         #[command(flatten)]
         division: Division,
@@ -377,7 +379,7 @@ pub enum Command {
         #[arg(long, value_name = "METHOD")]
         method: Vec<String>,
         /// Seeds of each network, at most 1000 [default: the plan's]
-        #[arg(long, allow_negative_numbers = true, value_parser = count(1..=MOST_SEEDS))]
+        #[arg(long, allow_negative_numbers = true, value_parser = count(1..=Settings::MOST_SEEDS))]
         seeds: Option<usize>,
         /// Budget: the paper's (days), an hour's for table 1, or one that only shows that it works
         #[arg(long, value_enum, default_value_t = Plans::Paper)]

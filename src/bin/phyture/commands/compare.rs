@@ -7,8 +7,9 @@ use phyture::critique::shares::{self, shares};
 use phyture::critique::table::ordinal;
 use phyture::critique::uncertainty::{Effort, uncertainty};
 use phyture::critique::wrap::wrapped;
-use phyture::critique::{Comparison, Row, compare, finite_difference, ridge};
+use phyture::critique::{Comparison, Row, compare, finite_difference, floor, ridge};
 use phyture::disk::{Target, write_atomically};
+use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::windows;
 use phyture::flight::{DataSet, Span, Window};
@@ -38,6 +39,8 @@ pub struct Wanted<'a> {
     pub ridge: Option<usize>,
     /// How far the networks' predictions move with the intervals of their models' coefficients.
     pub uncertainty: bool,
+    /// Folder of the explainable part of the flights.
+    pub explainable: Option<&'a Path>,
 }
 
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
@@ -72,14 +75,6 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let split = split?;
     let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
     let stride = match wanted.stride {
-        Some(0) => {
-            return Err(Error::Config {
-                place: "command line".into(),
-                field: "--stride".into(),
-                found: "0".into(),
-                expected: "1 (every sample) or more".into(),
-            });
-        }
         Some(stride) => stride,
         None => affordable(context, &set, &windows(&split.test, rows_needed, 1), &networks)?,
     };
@@ -91,7 +86,11 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
         stride,
         uncertainty: wanted.uncertainty,
     };
-    let result = contest.run(context, &set, &split)?;
+    let mut result = contest.run(context, &set, &split)?;
+    if let Some(folder) = wanted.explainable {
+        let explainable = data_set(folder, &ReadOptions::default())?;
+        result.comparison.floor = Some(floor(&set.flights, &result.windows, &explainable.flights)?);
+    }
     context.say(format!("\n{}", result.comparison));
     if let Some(target) = page {
         let own = [

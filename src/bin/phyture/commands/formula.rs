@@ -17,6 +17,9 @@ const OPERATORS: [(&str, &str); 5] = [
     ("a^b", "power; a^b^c is a^(b^c)"),
 ];
 
+/// A usual step of a log, s, to try a formula at.
+const STEP_S: f64 = 0.01;
+
 /// The language as a text of at most 100 columns.
 pub fn grammar() -> String {
     let mut text = String::from("Operators, loosest first:\n");
@@ -49,6 +52,8 @@ pub fn run(context: &Context, formula: Option<&str>) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     };
     let formula = Formula::parse(text)?;
+    // Names that no log has of itself may be parameters; whether the times of lags and delays are numbers is seen when it is bound.
+    formula.stream_with(STEP_S, &|name| (!standard_names().contains(&name)).then_some(1.0))?;
     context.say(&formula);
     let (known, own): (Vec<&str>, Vec<&str>) = formula.names().into_iter().partition(|name| standard_names().contains(name));
     if !known.is_empty() {

@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         }
         Command::Check { data, model } => check::run(&context, data, model.as_deref()),
         Command::Calibrate { data, model, output, division } => calibrate::run(&context, data, model.as_deref(), output, division),
-        Command::Compare { data, model, network, report, stride, all, ridge, uncertainty, division } => {
+        Command::Compare { data, model, network, report, stride, all, ridge, uncertainty, explainable, division } => {
             let wanted = compare::Wanted {
                 models: model,
                 networks: network,
@@ -66,6 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 all: *all,
                 ridge: *ridge,
                 uncertainty: *uncertainty,
+                explainable: explainable.as_deref(),
             };
             compare::run(&context, data, &wanted, division)
         }

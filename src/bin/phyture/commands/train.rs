@@ -84,7 +84,6 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     let folder = RunFolder::create(wanted.output)?;
     if !wanted.resume && folder.is_begun() {
         context.existing().refuse(wanted.output, "a training run (which --resume goes on with)")?;
-        folder.clear()?;
     }
     let set = context.flights(data, config.network.history())?;
     let model = Model::read(wanted.model)?;
@@ -175,6 +174,10 @@ impl Task<'_> {
                 windows => format!("{windows} windows validate"),
             }
         ));
+        if !resume {
+            // Only now does the old run go, if there is one: everything that the new one needs has been read.
+            folder.clear()?;
+        }
         let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
         let mut epoch = Epoch::default();
         let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
