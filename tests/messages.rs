@@ -1,7 +1,8 @@
 //! Mistakes and what the program says to them: `docs/messages.md` is run as it stands.
 //!
 //! Lines that begin with `    $ ` are given to a shell, one after the other, in a fresh folder. A command with nothing under it has to
-//! succeed. One with text under it is a mistake: it has to fail, with exactly this text. `PHYTURE_WRITE_DOCS=1` writes the
+//! succeed. One with text under it is a mistake: it has to fail, with exactly this text but
+//! for empty lines. `PHYTURE_WRITE_DOCS=1` writes the
 //! texts of today into the page, to be read by a person before they are kept.
 #![cfg(all(feature = "cli", unix))]
 
@@ -43,9 +44,9 @@ fn every_mistake_of_the_page_is_answered_as_the_page_says() -> Result<()> {
         if expected {
             mistakes += 1;
             assert!(code.is_some_and(|code| code != 0), "{command}: no mistake\n{said}");
-            said.trim_end()
-                .lines()
-                .for_each(|line| writeln!(today, "{}", format!("{INDENT}{line}").trim_end()).unwrap_or_default());
+            // An empty line would end the block.
+            let lines = said.lines().filter(|line| !line.trim().is_empty());
+            lines.for_each(|line| writeln!(today, "{INDENT}{}", line.trim_end()).unwrap_or_default());
         } else {
             assert_eq!(code, Some(0), "{command}: {said}");
         }

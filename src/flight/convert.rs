@@ -84,7 +84,7 @@ pub(super) fn source(table: &RawTable, schema: &Schema, step_s: f64, name: &str)
     }
     let found =
         format!("no column {} in the header", alternatives.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(" or "));
-    let hint = alternatives.first().map_or(String::new(), |name| did_you_mean(name, table.names.iter().map(String::as_str)));
+    let hint = alternatives.first().map_or(String::new(), |name| did_you_mean(name, unused(table)));
     Err(table.cell_of_header(name, found, format!("one as `columns` in dataset.toml says{hint}")))
 }
 
@@ -177,8 +177,18 @@ fn attitude_from_quaternion(
 const QUATERNION_TOLERANCE: f64 = 0.01;
 
 fn missing(table: &RawTable, name: &str, expected: &str) -> Error {
-    let hint = did_you_mean(name, table.names.iter().map(String::as_str));
+    const SHOWN: usize = 5;
+    let mut hint = did_you_mean(name, unused(table));
+    let others: Vec<String> = unused(table).take(SHOWN).map(|name| format!("`{name}`")).collect();
+    if hint.is_empty() && !others.is_empty() {
+        hint = format!("; the header has {} besides", others.join(", "));
+    }
     table.cell_of_header(name, "no such column in the header", format!("{expected}{hint}"))
+}
+
+/// Names of the header that no canonical column has: one of them may be what is missing.
+fn unused(table: &RawTable) -> impl Iterator<Item = &str> {
+    table.names.iter().map(String::as_str).filter(|name| Column::from_name(name).is_none() && *name != "t")
 }
 
 /// Refuses a log without a column that it must have.

@@ -124,7 +124,9 @@ struct Uneven {
 
 impl Uneven {
     fn fault(&self, table: &RawTable, column: &str, row: usize, pair: &[f64]) -> Error {
-        let (step_s, now_s) = (self.step_s, pair[1] - pair[0]);
+        // Stamps are rounded; the digits behind a microsecond are of the subtraction.
+        let (step_s, now_s) = ((self.step_s * 1e6).round() / 1e6, pair[1] - pair[0]);
+        let step_s = if step_s > 0.0 { step_s } else { self.step_s };
         let constant = |relative: f64| format!("one constant step within {} %", relative * 100.0);
         let found = match self.late {
             true => format!("a jump of {now_s:.6} s after {} s, where the flight's step is {step_s} s", pair[0]),

@@ -223,8 +223,10 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
         let mut effect =
             catalogue::definition(kind).map(|definition| definition.effect(mass_kg, rotor_radius_m)).ok_or_else(|| {
                 let known: Vec<&str> = catalogue::kinds().chain([FORMULA_KIND]).collect();
-                let found = format!("`{kind}`{}", did_you_mean(kind, known.iter().copied()));
-                section.fault("kind", found, format!("one of `{}`", known.join("`, `")))
+                let hint = did_you_mean(kind, known.iter().copied());
+                let all = || format!("one of `{}`", known.join("`, `"));
+                let expected = if hint.is_empty() { all() } else { "an effect of `phyture effect list`, or `formula`".into() };
+                section.fault("kind", format!("`{kind}`{hint}"), expected)
             })?;
         section.allow(&[&common[..], &["coefficients"]].concat())?;
         if let Some(name) = section.text("name")? {
@@ -281,7 +283,11 @@ fn names(effect: &Effect) -> Vec<&str> {
 fn located(section: &Section<'_>, effect: &str, error: Error) -> Error {
     let Error::Formula { message, formula, at } = error else { return error };
     match section.fault("formula", "", "") {
-        Error::Config { place, .. } => Error::Formula { message: format!("{place}, effect `{effect}`: {message}"), formula, at },
+        Error::Config { place, .. } => {
+            let own = format!("effect `{effect}`: ");
+            let message = message.strip_prefix(&own).unwrap_or(&message);
+            Error::Formula { message: format!("{place}, {own}{message}"), formula, at }
+        }
         other => other,
     }
 }

@@ -79,13 +79,18 @@ impl Mechanism {
     /// The mechanism of this identifier.
     ///
     /// # Errors
-    /// [`Error::Config`] listing all identifiers if there is none.
+    /// [`Error::Config`] naming the nearest identifier, or all, if there is none.
     pub fn from_id(id: &str) -> Result<Self> {
-        Self::ALL.iter().copied().find(|mechanism| mechanism.id() == id).ok_or_else(|| Error::Config {
-            place: "simulation".into(),
-            field: "mechanism".into(),
-            found: format!("`{id}`{}", did_you_mean(id, Self::ALL.iter().map(|mechanism| mechanism.id()))),
-            expected: format!("one of {}", Self::ALL.iter().map(|mechanism| mechanism.id()).collect::<Vec<_>>().join(", ")),
+        Self::ALL.iter().copied().find(|mechanism| mechanism.id() == id).ok_or_else(|| {
+            let ids = || Self::ALL.iter().map(|mechanism| mechanism.id());
+            let hint = did_you_mean(id, ids());
+            let all = || format!("one of {}", ids().collect::<Vec<_>>().join(", "));
+            Error::Config {
+                place: "simulation".into(),
+                field: "mechanism".into(),
+                expected: if hint.is_empty() { all() } else { "a mechanism of the built-in helicopter".into() },
+                found: format!("`{id}`{hint}"),
+            }
         })
     }
 }

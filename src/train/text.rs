@@ -81,7 +81,12 @@ impl TrainConfig {
         let mut merged = table(base)?;
         overlay(&mut merged, given);
         let config: Self = merged.try_into().map_err(|error: toml::de::Error| fault(&error))?;
-        config.check()?;
+        config.check().map_err(|error| match error {
+            Error::Config { field, found, expected, .. } => {
+                Error::Config { place: path.display().to_string(), field, found, expected }
+            }
+            other => other,
+        })?;
         Ok(config)
     }
 

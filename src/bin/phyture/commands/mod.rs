@@ -301,7 +301,13 @@ impl<'a> Context<'a> {
                 expected: "one or the other: locked flights are the test part and all others train".into(),
             });
         }
-        Split::new(flights, &locked, &protocol, self.seed())
+        let of_the_line = |found: &str| division.lock.iter().any(|name| found.starts_with(&format!("`{name}`")));
+        Split::new(flights, &locked, &protocol, self.seed()).map_err(|error| match error {
+            Error::Config { found, expected, field, .. } if field == "data.locked" && of_the_line(&found) => {
+                Error::Config { place: "command line".into(), field: "--lock".into(), found, expected }
+            }
+            other => other,
+        })
     }
 
     /// Divides the flights for a search. Where nothing is locked and no split is asked for, every fifth flight confirms and no search
