@@ -64,6 +64,7 @@ fn a_model_beside_the_flights_is_taken_and_said_and_a_guess_is_a_warning() -> Re
     for command in [&["check", "data"][..], &["diagnose", "data"], &["loop", "data", "-o", "loop.toml"]] {
         let said = run(place.path(), command)?;
         assert!(said.contains("model: data/model.toml"), "{command:?}: {said}");
+        fits(&said);
     }
     // The model of another folder is not taken, and with none the guess is said where it cannot be missed.
     std::fs::rename(place.path().join("data/model.toml"), place.path().join("model.toml")).map_err(Error::io("model.toml"))?;

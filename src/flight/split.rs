@@ -125,7 +125,7 @@ impl Split {
                 let rule =
                     if locked.is_empty() { format!("the split `{protocol}`") } else { format!("locking {}", locked.join(", ")) };
                 return Err(Error::Undetermined(format!(
-                    "{rule} leaves no samples to {part} on, of {} flights and {:.0} s; give more or longer flights, or another split",
+                    "{rule} leaves no samples to {part} on, of {} flight(s) and {:.0} s; give more or longer flights, or another split",
                     flights.len(),
                     flights.iter().map(Flight::duration_s).sum::<f64>()
                 )));

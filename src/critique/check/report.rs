@@ -2,6 +2,7 @@
 
 use super::excitation::{Collinearity, Excitation};
 use super::timing::DelayProfile;
+use crate::critique::wrap::{WIDTH, wrapped};
 use crate::flight::Targets;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -92,6 +93,9 @@ impl Verdict {
     }
 }
 
+/// Columns of a finding's verdict and name.
+const PLACE: usize = 34;
+
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:<8}{:<26}", self.verdict.word(), self.name)?;
@@ -99,7 +103,12 @@ impl fmt::Display for Finding {
         let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
         let measured = self.measured.map(|value| format!("{value:.3}{interval}{unit}")).unwrap_or_default();
         let expected = self.expected.map(|value| format!("expected {value}")).unwrap_or_default();
-        write!(f, "{measured:<32}{expected:<14}{}", self.message)?;
+        let figures = format!("{measured:<32}{expected:<14}");
+        if PLACE + figures.chars().count() + self.message.chars().count() <= WIDTH {
+            write!(f, "{figures}{}", self.message)?;
+        } else {
+            write!(f, "{}\n{}", figures.trim_end(), wrapped(&" ".repeat(8), &self.message))?;
+        }
         self.set.iter().try_for_each(|set| write!(f, "\n{:>8}set: {}", "", set.replace('\n', "; ")))
     }
 }
@@ -110,9 +119,9 @@ impl fmt::Display for CheckReport {
             Targets::Recorded => "recorded",
             Targets::Derived => "derived from v and w by a zero-phase differentiator",
         };
-        writeln!(f, "{}", self.summary)?;
+        writeln!(f, "{}", wrapped("", &self.summary))?;
         writeln!(f, "{} flights, {:.0} s; accelerations {targets}", self.flights, self.duration_s)?;
-        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "{}", wrapped("note: ", note)))?;
         for (subject, title) in
             [(Subject::Conventions, "Conventions"), (Subject::Timing, "Timing"), (Subject::Excitation, "Excitation")]
         {
@@ -130,7 +139,8 @@ impl fmt::Display for CheckReport {
         writeln!(f, "\n{:<8}{:>18}  variance inflation", "channel", "condition number")?;
         self.collinearity.iter().try_for_each(|row| {
             let inflation: Vec<String> = row.variance_inflation.iter().map(|(name, value)| format!("{name} {value:.1}")).collect();
-            writeln!(f, "{:<8}{:>18.1}  {}", row.channel, row.condition_number, inflation.join(", "))
+            let place = format!("{:<8}{:>18.1}  ", row.channel, row.condition_number);
+            writeln!(f, "{}", wrapped(&place, &inflation.join(", ")))
         })
     }
 }
