@@ -197,3 +197,46 @@ fn an_interrupted_training_saves_and_exits_with_130() -> Result<()> {
     assert!(text.contains("saved after step"), "{text}");
     Ok(())
 }
+
+#[test]
+fn completions_manual_pages_and_the_language_of_formulas_come_from_the_program_itself() -> Result<()> {
+    let place = folder()?;
+    let said = |arguments: &[&str]| -> Result<String> {
+        let output = phyture(place.path(), arguments)?;
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = said(&["completions", shell])?;
+        assert!(script.contains("phyture") && script.contains("explainable"), "{shell}");
+    }
+    said(&["man", "pages"])?;
+    let page = |name: &str| std::fs::read_to_string(place.path().join("pages").join(name)).map_err(Error::io(name.to_owned()));
+    assert!(page("phyture.1")?.contains("Exit codes") && page("phyture-train.1")?.contains("print"));
+    for name in ["check", "calibrate", "compare", "diagnose", "loop", "train", "predict", "benchmark"] {
+        assert!(!page(&format!("phyture-{name}.1"))?.is_empty());
+    }
+    let grammar = said(&["help", "formula"])?;
+    for form in ["slew(x, per_s)", "atan2(y, x)", "a^b", "airspeed", "g_z"] {
+        assert!(grammar.contains(form), "{form} in\n{grammar}");
+    }
+    assert!(said(&["formula", "vy*hypot( vx,vy )+k"])?.starts_with("vy * hypot(vx, vy) + k\nreads vy, vx\nand k:"));
+    Ok(())
+}
+
+#[test]
+fn a_failure_is_json_where_json_was_asked_for() -> Result<()> {
+    let place = folder()?;
+    for (arguments, kind) in [
+        (&["check", "nowhere", "--json", "-"][..], "io"),
+        (&["check", "--json=-"], "usage"),
+        (&["formula", "vx +", "--json", "-"], "formula"),
+    ] {
+        let output = phyture(place.path(), arguments)?;
+        let found: serde_json::Value =
+            serde_json::from_slice(&output.stdout).map_err(|error| Error::Undetermined(error.to_string()))?;
+        assert_eq!((output.status.code(), &found["schema"], &found["exit_code"]), (Some(2), &1.into(), &2.into()), "{found}");
+        assert_eq!(found["error"]["kind"], kind, "{found}");
+    }
+    Ok(())
+}
