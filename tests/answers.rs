@@ -2,36 +2,24 @@
 //! deny, and that output is short where nobody asked for more.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::critique::diagnose::{Options, Status, diagnose};
 use phyture::flight::split::Split;
 use phyture::flight::{DataSet, Targets};
 use phyture::physics::{Effect, Model, SignFinding, implant};
 use phyture::sim::{INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::{Error, Result};
+use program::{folder, phyture, succeed as run};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 
 /// Widest line of text.
 const WIDTH: usize = 120;
 
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    Command::new(env!("CARGO_BIN_EXE_phyture")).args(arguments).current_dir(folder).output().map_err(Error::io("phyture"))
-}
-
-/// Standard output of a run that must succeed.
-fn run(folder: &Path, arguments: &[&str]) -> Result<String> {
-    let output = phyture(folder, arguments)?;
-    assert!(output.status.success(), "{arguments:?}: {}", errors(&output));
-    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
 fn errors(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn folder() -> Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(Error::io("temporary folder"))
 }
 
 fn json(folder: &Path, name: &str) -> Result<Value> {

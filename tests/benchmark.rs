@@ -2,35 +2,22 @@
 //! same bytes.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::{Error, Result};
+use program::{command, folder, phyture, succeed};
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Stdio;
 use std::time::Duration;
 
 /// Little enough that a run takes a fraction of a second; every method is in it.
 const CONFIG: &str =
     "epochs = 2\nstride = 250\ncheckpoint_s = 0.0\n\n[network]\nhistory = 64\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\n";
 
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
-    command.args(arguments).current_dir(folder);
-    command
-}
-
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    command(folder, arguments).output().map_err(Error::io("phyture"))
-}
-
-fn succeed(folder: &Path, arguments: &[&str]) -> Result<String> {
-    let output = phyture(folder, arguments)?;
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
 /// Flights of four classes and the configuration.
 fn place() -> Result<tempfile::TempDir> {
-    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let place = folder()?;
     succeed(place.path(), &["simulate", "flights", "--minutes", "3", "--seed", "51"])?;
     std::fs::write(place.path().join("train.toml"), CONFIG).map_err(Error::io("train.toml"))?;
     Ok(place)

@@ -1,19 +1,12 @@
 //! The program as a shell sees it: exit codes, messages on standard error, JSON on standard output, Ctrl-C.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::{Error, Result};
-use std::path::Path;
+use program::{folder, phyture};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
-
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
-    command.args(arguments).current_dir(folder).output().map_err(Error::io("phyture"))
-}
-
-fn folder() -> Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(Error::io("temporary folder"))
-}
 
 #[test]
 fn bad_usage_and_bad_input_exit_with_2_and_say_what_is_wrong() -> Result<()> {

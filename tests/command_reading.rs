@@ -1,18 +1,11 @@
 //! Reading as the command line shows it: names of flights, what is never overwritten, what is said and how it looks on a terminal.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::{Error, Result};
+use program::{folder, phyture};
 use std::path::Path;
-use std::process::{Command, Output};
-
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
-    command.args(arguments).current_dir(folder).output().map_err(Error::io("phyture"))
-}
-
-fn folder() -> Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(Error::io("temporary folder"))
-}
 
 /// Standard output and standard error of a command, and whether it ended well.
 fn told(folder: &Path, arguments: &[&str]) -> Result<(bool, String)> {

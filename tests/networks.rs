@@ -1,36 +1,18 @@
 //! `train` and `predict` as typed into a shell: configuration, losses, what may be an input, files by their ending, bounds of counts.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::flight::Column;
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::physics::Model;
 use phyture::{Error, Result};
+use program::{folder, phyture, refused, succeed};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
 
 const SMALL: &str =
     "epochs = 3\nstride = 40\n[network]\nhistory = 16\nd_model = 8\nheads = 2\nlevels = 2\nstacks = 1\nmoving_average = 5\n";
-
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
-    command.args(arguments).current_dir(folder).output().map_err(Error::io("phyture"))
-}
-
-/// What it says on standard output.
-fn succeed(folder: &Path, arguments: &[&str]) -> Result<String> {
-    let output = phyture(folder, arguments)?;
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
-}
-
-/// What it says on standard error, refusing bad usage or input.
-fn refused(folder: &Path, arguments: &[&str]) -> Result<String> {
-    let output = phyture(folder, arguments)?;
-    let text = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(2), "{arguments:?}: {text}");
-    Ok(text)
-}
 
 fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
     std::fs::write(folder.join(name), text).map_err(Error::io(name))
@@ -38,7 +20,7 @@ fn write(folder: &Path, name: &str, text: &str) -> Result<()> {
 
 /// Flights of two minutes, a calibrated model and a small configuration.
 fn place() -> Result<tempfile::TempDir> {
-    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let place = folder()?;
     let at = place.path();
     succeed(at, &["simulate", "data", "--minutes", "2", "--seed", "7310"])?;
     succeed(at, &["calibrate", "data", "-m", "data/model.toml", "-o", "model.toml"])?;
@@ -48,7 +30,7 @@ fn place() -> Result<tempfile::TempDir> {
 
 #[test]
 fn the_configuration_in_force_is_printed_and_read_back() -> Result<()> {
-    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let place = folder()?;
     let at = place.path();
     let usual = succeed(at, &["train", "--print-config"])?;
     for line in ["epochs = 20", "stride = 12", "history = 128", "d_model = 32", "# [linear]", "# Peak learning rate."] {
@@ -184,7 +166,7 @@ fn accelerations_and_what_gives_them_away_are_no_inputs() -> Result<()> {
 
 #[test]
 fn counts_out_of_their_range_are_refused_before_anything_is_done() -> Result<()> {
-    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let place = folder()?;
     let at = place.path();
     let benchmark = |option: &'static str, value: &'static str| vec!["benchmark", "data", "-o", "out", option, value];
     let cases = [

@@ -1,25 +1,17 @@
 //! Nothing that exists is overwritten unasked, nothing is lost by a second run, and two programs do not write one thing.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::{Error, Result};
-use std::collections::BTreeMap;
+use program::{command, contents, folder, phyture};
 use std::fs;
 use std::os::unix::fs::{FileTypeExt, symlink};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 /// A network of seconds.
 const SMALL: &str = "epochs = 1\nstride = 50\nbatch = 8\n[network]\nhistory = 32\nd_model = 8\nheads = 2\n";
-
-fn command(folder: &Path, arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_phyture"));
-    command.args(arguments).current_dir(folder);
-    command
-}
-
-fn phyture(folder: &Path, arguments: &[&str]) -> Result<Output> {
-    command(folder, arguments).output().map_err(Error::io("phyture"))
-}
 
 fn done(folder: &Path, arguments: &[&str]) -> Result<()> {
     let output = phyture(folder, arguments)?;
@@ -35,29 +27,9 @@ fn refused(folder: &Path, arguments: &[&str], part: &str) -> Result<()> {
     Ok(())
 }
 
-fn place() -> Result<tempfile::TempDir> {
-    tempfile::tempdir().map_err(Error::io("temporary folder"))
-}
-
-/// Every file below a folder with its content.
-fn contents(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
-    let (mut found, mut open) = (BTreeMap::new(), vec![folder.to_path_buf()]);
-    while let Some(inside) = open.pop() {
-        for entry in fs::read_dir(&inside).map_err(Error::io(&inside))? {
-            let path = entry.map_err(Error::io(&inside))?.path();
-            if path.is_dir() {
-                open.push(path);
-            } else {
-                found.insert(path.clone(), fs::read(&path).map_err(Error::io(path))?);
-            }
-        }
-    }
-    Ok(found)
-}
-
 #[test]
 fn every_command_refuses_what_is_there_and_leaves_it_to_the_byte() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     let at = place.path();
     fs::write(at.join("small.toml"), SMALL).map_err(Error::io("small.toml"))?;
     let commands = [
@@ -90,7 +62,7 @@ fn every_command_refuses_what_is_there_and_leaves_it_to_the_byte() -> Result<()>
 
 #[test]
 fn flights_of_two_simulations_do_not_mix_and_the_users_own_are_never_removed() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     let at = place.path();
     done(at, &["simulate", "flights", "--minutes", "10", "--baseline"])?;
     let many = contents(&at.join("flights"))?.len();
@@ -108,7 +80,7 @@ fn flights_of_two_simulations_do_not_mix_and_the_users_own_are_never_removed() -
 
 #[test]
 fn a_model_written_over_itself_is_kept_with_the_date() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     let at = place.path();
     done(at, &["simulate", "flights", "--minutes", "2", "--baseline", "--seed", "7311"])?;
     fs::write(at.join("n9.toml"), "[model]\nbaseline = \"paper\"\n").map_err(Error::io("n9.toml"))?;
@@ -121,7 +93,7 @@ fn a_model_written_over_itself_is_kept_with_the_date() -> Result<()> {
 
 #[test]
 fn pipes_links_and_devices_stay_what_they_are() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     let at = place.path();
     done(at, &["simulate", "flights", "--minutes", "2", "--baseline", "--seed", "7312"])?;
     let pipe = at.join("pipe");
@@ -144,7 +116,7 @@ fn pipes_links_and_devices_stay_what_they_are() -> Result<()> {
 
 #[test]
 fn a_missing_folder_is_said_before_the_work() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     // The flights are missing too: the output comes first.
     for arguments in [
         &["calibrate", "nowhere", "-o", "no/model.toml"][..],
@@ -159,7 +131,7 @@ fn a_missing_folder_is_said_before_the_work() -> Result<()> {
 
 #[test]
 fn two_programs_do_not_train_in_one_folder() -> Result<()> {
-    let place = place()?;
+    let place = folder()?;
     let at = place.path();
     fs::write(at.join("small.toml"), SMALL.replace("epochs = 1", "epochs = 1000")).map_err(Error::io("small.toml"))?;
     done(at, &["simulate", "flights", "--minutes", "4", "--baseline", "--seed", "7313"])?;

@@ -2,11 +2,13 @@
 //! that the first left is lost.
 #![cfg(all(feature = "cli", unix))]
 
+mod program;
+
 use phyture::{Error, Result};
-use std::collections::BTreeMap;
+use program::{contents, folder, phyture};
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 
 /// The commands of the first indented block after `heading`, without their comments. Training is cut to an epoch.
 fn commands(heading: &str) -> Result<Vec<String>> {
@@ -23,31 +25,16 @@ fn commands(heading: &str) -> Result<Vec<String>> {
 }
 
 fn run(folder: &Path, command: &str) -> Result<Output> {
-    let mut words = command.split_whitespace();
-    assert_eq!(words.next(), Some("phyture"), "{command}");
-    Command::new(env!("CARGO_BIN_EXE_phyture")).args(words).current_dir(folder).output().map_err(Error::io("phyture"))
-}
-
-fn contents(folder: &Path) -> Result<BTreeMap<PathBuf, Vec<u8>>> {
-    let (mut found, mut open) = (BTreeMap::new(), vec![folder.to_path_buf()]);
-    while let Some(inside) = open.pop() {
-        for entry in fs::read_dir(&inside).map_err(Error::io(&inside))? {
-            let path = entry.map_err(Error::io(&inside))?.path();
-            if path.is_dir() {
-                open.push(path);
-            } else {
-                found.insert(path.clone(), fs::read(&path).map_err(Error::io(path))?);
-            }
-        }
-    }
-    Ok(found)
+    let words: Vec<&str> = command.split_whitespace().collect();
+    assert_eq!(words.first(), Some(&"phyture"), "{command}");
+    phyture(folder, &words[1..])
 }
 
 #[test]
 fn the_sequence_for_one_s_own_flights_works_and_loses_nothing_the_second_time() -> Result<()> {
     let commands = commands("On your own flights")?;
     assert!(commands.len() >= 7 && commands.iter().any(|command| command.contains(" train ")), "{commands:#?}");
-    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let place = folder()?;
     // Ten minutes hold a flight of each class, the locked one among them.
     let flights = run(place.path(), "phyture simulate flights --minutes 10 --baseline --hide weathercock=2 --seed 7600")?;
     assert!(flights.status.success(), "{}", String::from_utf8_lossy(&flights.stderr));
