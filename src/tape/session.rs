@@ -604,8 +604,10 @@ mod tests {
             let mut lean = Session::train(&graph, loss, &[], Threads(1))?;
             lean.step(&parameters, 3, None, &fill)?;
             prop_assert_eq!(lean.gradients(), plain.gradients());
-            // A parameter whose value nothing reads on has no gradient; that the others have the right one is checked.
-            let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(|value| *value == 0.0);
+            // A parameter whose value nothing reads on has no gradient, and behind many saturated operations it is as good as none (to
+            // the check's own measure); that the others have the right one is checked.
+            let tiny = |value: &f64| value.abs() < Tolerance::Close.relative_f64();
+            let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(tiny);
             let zero = |name: &str| graph.parameters().iter().any(|parameter| parameter.name == name && still(parameter));
             if !graph.parameters().iter().all(still) {
                 let checked = gradcheck::graph(&graph, loss, &parameters, 2, None, &fill, &zero, 5);
