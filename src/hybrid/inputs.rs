@@ -7,10 +7,10 @@ use crate::formula::Formula;
 use crate::physics::evaluate;
 
 /// Parses inputs and refuses each that names an acceleration, however deep in the formula. What can only be told from a flight (further
-/// columns that a description makes accelerations of) is refused by [`values`].
+/// columns that a description makes accelerations of) is refused where its values are taken.
 ///
 /// # Errors
-/// [`Error::Formula`] pointing at the character.
+/// [`crate::Error::Formula`] pointing at the character.
 pub fn parse(inputs: &[String]) -> Result<Vec<Formula>> {
     let is_target = |name: &str| Column::TARGETS.iter().any(|target| target.name() == name).then(|| TARGET.to_owned());
     let one = |text: &String| {
@@ -23,7 +23,7 @@ pub fn parse(inputs: &[String]) -> Result<Vec<Formula>> {
 /// An input on a whole flight.
 ///
 /// # Errors
-/// [`Error::Formula`] pointing at a name that the flight lacks, or that gives an acceleration away.
+/// [`crate::Error::Formula`] pointing at a name that the flight lacks, or that gives an acceleration away.
 pub(super) fn values(formula: &Formula, flight: &Flight) -> Result<Vec<f64>> {
     match formula.refused_name(&|name| flight.gives_target_away(name)) {
         Some(error) => Err(error),
