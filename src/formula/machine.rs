@@ -1,14 +1,193 @@
-//! Evaluation: a formula bound to a step and to its constants, with its hidden state. Whole columns and single samples go
-//! through the same code, block by block or one by one, so that both give the same bits.
+//! Evaluation: a graph of formulas bound to its numbers, with its hidden state. Whole columns and single samples go through the same
+//! code, block by block or one by one, so that both give the same bits.
 
-use super::memory::{MAX_DELAY_S, MAX_DELAY_SAMPLES, Memory};
-use super::operation::{History, Operation};
-use super::{Formula, Instruction, Value};
+use super::graph::{Graph, Kind, Node, Recall, whole_power};
+use super::memory::Memory;
+use super::operation::Operation;
+use super::{Formula, Value};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
+use std::collections::HashMap;
 
-/// Samples evaluated at once: a few operands of this length stay in the first-level cache.
-const BLOCK: usize = 512;
+/// Longest run of samples that is evaluated at once …
+const LONGEST_BLOCK: usize = 512;
+/// … and shortest: what a step costs beside its samples is then small.
+const SHORTEST_BLOCK: usize = 64;
+/// Numbers that all columns of a block hold together, about: they stay in the second-level cache.
+const NUMBERS_AT_ONCE: usize = 64 * 1024;
+
+/// A column of the block at hand.
+type Slot = u32;
+
+/// One operation: where its operands lie, and where its result goes.
+#[derive(Clone, Copy, Debug)]
+enum Step {
+    Input { input: u32, out: Slot },
+    One { operation: Operation, x: Slot, out: Slot },
+    Two { operation: Operation, x: Slot, y: Slot, out: Slot },
+    PowerInteger { x: Slot, exponent: i32, out: Slot },
+    Recall { memory: u32, x: Slot, tangents: [Slot; 2], out: Slot },
+}
+
+/// Some values of a [`Graph`] ready to be evaluated, with the hidden state of what remembers. Samples come in order; the first one after
+/// [`Machine::new`] or [`Machine::reset`] is taken to follow a long rest at its own value.
+#[derive(Clone, Debug)]
+pub struct Machine {
+    steps: Vec<Step>,
+    memory: Vec<Memory>,
+    /// One column a slot; those of constants are filled once.
+    columns: Vec<Vec<f64>>,
+    roots: Vec<Slot>,
+    /// Index in the graph's inputs of each column that is read.
+    inputs: Vec<usize>,
+    block: usize,
+}
+
+/// Gives out columns, and takes back those that are no longer read.
+struct Slots {
+    count: usize,
+    free: Vec<Slot>,
+    of: HashMap<Node, Slot>,
+}
+
+impl Slots {
+    fn take(&mut self, node: Node) -> Slot {
+        let slot = self.free.pop().unwrap_or_else(|| {
+            self.count += 1;
+            self.count as Slot - 1
+        });
+        self.of.insert(node, slot);
+        slot
+    }
+}
+
+impl Machine {
+    /// Binds the values at `roots`; `number` gives the value of each symbol that varies, by its node, where it is not the symbol's own.
+    pub fn new(graph: &Graph, roots: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> Self {
+        let behind = graph.behind(roots);
+        let uniform = uniform(graph, &behind, number);
+        let mut last_use: HashMap<Node, usize> = HashMap::new();
+        for (place, &node) in behind.iter().enumerate() {
+            graph.operands(node).for_each(|operand| {
+                last_use.insert(operand, place);
+            });
+        }
+        roots.iter().for_each(|&root| {
+            last_use.insert(root, usize::MAX);
+        });
+        let mut machine =
+            Self { steps: Vec::new(), memory: Vec::new(), columns: Vec::new(), roots: Vec::new(), inputs: Vec::new(), block: 0 };
+        let mut slots = Slots { count: 0, free: Vec::new(), of: HashMap::new() };
+        // Columns of constants are filled once, so they are never given to anything else.
+        let constants: Vec<(Slot, f64)> =
+            behind.iter().filter_map(|node| Some((slots.take(*node), *uniform.get(node)?))).collect();
+        for (place, &node) in behind.iter().enumerate().filter(|(_, node)| !uniform.contains_key(node)) {
+            machine.step(graph, node, &uniform, &mut slots);
+            let mut ended: Vec<Node> = graph.operands(node).filter(|operand| last_use.get(operand) == Some(&place)).collect();
+            ended.sort_unstable();
+            ended.dedup();
+            slots.free.extend(ended.iter().filter(|node| !uniform.contains_key(node)).map(|node| slots.of[node]));
+        }
+        machine.roots = roots.iter().map(|root| slots.of[root]).collect();
+        machine.block = (NUMBERS_AT_ONCE / slots.count.max(1)).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
+        machine.columns = vec![vec![0.0; machine.block]; slots.count];
+        constants.iter().for_each(|&(slot, value)| machine.columns[slot as usize].fill(value));
+        machine
+    }
+
+    /// Adds what computes one node.
+    fn step(&mut self, graph: &Graph, node: Node, uniform: &HashMap<Node, f64>, slots: &mut Slots) {
+        let of = |slots: &Slots, node: Node| slots.of[&node];
+        let step = match graph.nodes[node.0 as usize] {
+            Kind::Number(_) | Kind::Symbol(_) => unreachable!("a number is the same at all samples"),
+            Kind::Input(input) => {
+                let known = self.inputs.iter().position(|known| *known == input as usize);
+                let place = known.unwrap_or_else(|| {
+                    self.inputs.push(input as usize);
+                    self.inputs.len() - 1
+                });
+                Step::Input { input: place as u32, out: slots.take(node) }
+            }
+            Kind::One(operation, x) => Step::One { operation, x: of(slots, x), out: slots.take(node) },
+            Kind::Two(operation, x, y) => {
+                let (left, right) = (of(slots, x), of(slots, y));
+                match whole_power(operation, uniform.get(&y).copied()) {
+                    Some(exponent) => Step::PowerInteger { x: left, exponent, out: slots.take(node) },
+                    None => Step::Two { operation, x: left, y: right, out: slots.take(node) },
+                }
+            }
+            Kind::Recall(recall, [x, number, tangent, limit]) => {
+                let number = if recall == Recall::History(super::operation::History::Rate) { 0.0 } else { uniform[&number] };
+                self.memory.push(Memory::new(recall, number, graph.step_s));
+                let (x, tangents) = (of(slots, x), [of(slots, tangent), of(slots, limit)]);
+                Step::Recall { memory: self.memory.len() as u32 - 1, x, tangents, out: slots.take(node) }
+            }
+        };
+        self.steps.push(step);
+    }
+
+    /// For each column that is read, its index in [`Graph::inputs`]; [`Machine::advance`] asks for them in this order.
+    pub fn inputs(&self) -> &[usize] {
+        &self.inputs
+    }
+
+    /// Most samples that are taken at once.
+    pub fn block(&self) -> usize {
+        self.block
+    }
+
+    /// Forgets the past.
+    pub fn reset(&mut self) {
+        self.memory.iter_mut().for_each(Memory::reset);
+    }
+
+    /// Takes the next samples, at most [`Machine::block`] of them; `input` gives their columns in the order of [`Machine::inputs`].
+    pub fn advance<'a>(&mut self, samples: usize, input: &dyn Fn(usize) -> &'a [f64]) {
+        assert!(samples <= self.block, "{samples} samples at once, at most {}", self.block);
+        let Self { steps, memory, columns, .. } = self;
+        for step in steps {
+            let (Step::Input { out, .. }
+            | Step::One { out, .. }
+            | Step::Two { out, .. }
+            | Step::PowerInteger { out, .. }
+            | Step::Recall { out, .. }) = *step;
+            let mut result = std::mem::take(&mut columns[out as usize]);
+            let values = &mut result[..samples];
+            let column = |slot: Slot| &columns[slot as usize][..samples];
+            match *step {
+                Step::Input { input: index, .. } => values.copy_from_slice(input(index as usize)),
+                Step::One { operation, x, .. } => operation.of_column(column(x), values),
+                Step::Two { operation, x, y, .. } => operation.of_columns(column(x), column(y), values),
+                Step::PowerInteger { x, exponent, .. } => {
+                    values.iter_mut().zip(column(x)).for_each(|(value, x)| *value = x.powi(exponent));
+                }
+                Step::Recall { memory: index, x, tangents, .. } => {
+                    memory[index as usize].run(column(x), tangents.map(column), values);
+                }
+            }
+            columns[out as usize] = result;
+        }
+    }
+
+    /// Values of a root at the samples last taken, in front.
+    pub fn root(&self, index: usize) -> &[f64] {
+        &self.columns[self.roots[index] as usize]
+    }
+}
+
+/// The values that are the same at all samples, with the symbols that vary at the values of this evaluation.
+fn uniform(graph: &Graph, behind: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> HashMap<Node, f64> {
+    let mut known: HashMap<Node, f64> = HashMap::new();
+    for &node in behind.iter().filter(|node| graph.uniform[node.0 as usize].is_some()) {
+        let symbol = |index: usize| {
+            let symbol = graph.symbols[index];
+            if symbol.varies { number(node).unwrap_or(symbol.value) } else { symbol.value }
+        };
+        let value = graph.value_of(graph.nodes[node.0 as usize], &|operand| known.get(&operand).copied(), &symbol);
+        known.insert(node, value.expect("what is the same at all samples has operands that are"));
+    }
+    known
+}
 
 /// A formula ready to run: constants folded in, hidden state of its `lag`, `delay`, `rate` and `slew` inside.
 ///
@@ -17,144 +196,17 @@ const BLOCK: usize = 512;
 #[derive(Clone, Debug)]
 pub struct StreamingFormula {
     inputs: Vec<String>,
-    program: Vec<Step>,
-    memory: Vec<Memory>,
-    depth: usize,
-    scratch: Vec<f64>,
-}
-
-#[derive(Clone, Copy, Debug)]
-enum Step {
-    Number(f64),
-    Input(usize),
-    Apply(Operation, usize),
-    PowerInteger(i32),
-    Recall(usize),
-}
-
-/// The program while it is put together: constant operands are known by value.
-struct Builder<'a> {
-    formula: &'a Formula,
-    step_s: f64,
-    program: Vec<Step>,
-    memory: Vec<Memory>,
-    /// One entry an operand on the stack: where its steps begin, and its value if it never changes.
-    operands: Vec<(usize, Option<f64>)>,
-}
-
-impl Builder<'_> {
-    fn fault(&self, message: String, at: usize) -> Error {
-        Error::Formula { message, formula: self.formula.text.clone(), at }
-    }
-
-    fn push(&mut self, step: Step, constant: Option<f64>) {
-        self.operands.push((self.program.len(), constant));
-        self.program.push(step);
-    }
-
-    fn apply(&mut self, operation: Operation, count: usize) {
-        let first = self.operands.len().saturating_sub(count);
-        let operands = self.operands.split_off(first);
-        let start = operands.first().map_or(0, |operand| operand.0);
-        if let Some(mut values) = operands.iter().map(|operand| operand.1).collect::<Option<Vec<f64>>>() {
-            operation.apply(count, 1, &mut values);
-            let value = values.first().copied().unwrap_or(f64::NAN);
-            self.program.truncate(start);
-            self.push(Step::Number(value), Some(value));
-            return;
-        }
-        self.operands.push((start, None));
-        match (operation, operands.last()) {
-            (Operation::Power, Some(&(exponent_start, Some(exponent)))) if exponent.fract() == 0.0 && exponent.abs() <= 16.0 => {
-                self.program.truncate(exponent_start);
-                self.program.push(Step::PowerInteger(exponent as i32));
-            }
-            _ => self.program.push(Step::Apply(operation, count)),
-        }
-    }
-
-    fn recall(&mut self, history: History, at: usize) -> Result<()> {
-        let memory = match history {
-            History::Rate => Memory::rate(self.step_s),
-            History::Slew => {
-                let (start, constant) = self.operands.pop().unwrap_or((0, None));
-                let Some(per_s) = constant.filter(|per_s| *per_s > 0.0) else {
-                    let found = constant.map_or("varies in flight".into(), |per_s| format!("is {per_s} per second"));
-                    let message = format!("the largest rate of `slew` {found}, expected a number or a parameter above 0");
-                    return Err(self.fault(message, at));
-                };
-                self.program.truncate(start);
-                Memory::slew(per_s, self.step_s)
-            }
-            History::Lag | History::Delay => {
-                let (start, constant) = self.operands.pop().unwrap_or((0, None));
-                let (name, largest) = if history == History::Lag { ("lag", f64::MAX) } else { ("delay", MAX_DELAY_S) };
-                let Some(time_s) = constant else {
-                    let message =
-                        format!("the time of `{name}` must be a number or a parameter, not something that varies in flight");
-                    return Err(self.fault(message, at));
-                };
-                if !(0.0..=largest).contains(&time_s) {
-                    let limit = if history == History::Lag { String::new() } else { format!(" and at most {largest}") };
-                    return Err(self.fault(format!("the time of `{name}` is {time_s} s, expected at least 0{limit}"), at));
-                }
-                let samples = time_s / self.step_s;
-                if history == History::Delay && samples > MAX_DELAY_SAMPLES {
-                    let step_s = self.step_s;
-                    let message = format!(
-                        "the time of `delay` is {time_s} s, {samples:.1e} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:e} can be kept"
-                    );
-                    return Err(self.fault(message, at));
-                }
-                self.program.truncate(start);
-                if history == History::Lag { Memory::lag(time_s, self.step_s) } else { Memory::delay(time_s, self.step_s) }
-            }
-        };
-        if let Some((start, Some(value))) = self.operands.last().copied() {
-            // At rest since ever: a lag, a delay or a slew passes a constant on, its rate is zero.
-            let value = if history == History::Rate { 0.0 } else { value };
-            self.operands.pop();
-            self.program.truncate(start);
-            self.push(Step::Number(value), Some(value));
-        } else {
-            self.program.push(Step::Recall(self.memory.len()));
-            self.memory.push(memory);
-        }
-        Ok(())
-    }
+    /// Index in `inputs` of each column that the machine asks for.
+    order: Vec<usize>,
+    machine: Machine,
 }
 
 impl StreamingFormula {
-    pub(super) fn build(formula: &Formula, step_s: f64, constant: &dyn Fn(&str) -> Option<f64>) -> Result<Self> {
-        if !(step_s > 0.0 && step_s.is_finite()) {
-            let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
-            return Err(Error::Config { place: format!("formula `{formula}`"), field: "step_s".into(), found, expected });
-        }
-        let constants: Vec<Option<f64>> = formula.names.iter().map(|(name, _)| constant(name)).collect();
-        let mut slots = Vec::new();
-        let mut inputs = Vec::new();
-        for ((name, _), constant) in formula.names.iter().zip(&constants) {
-            slots.push(inputs.len());
-            if constant.is_none() {
-                inputs.push(name.clone());
-            }
-        }
-        let mut builder = Builder { formula, step_s, program: Vec::new(), memory: Vec::new(), operands: Vec::new() };
-        let mut depth = 1;
-        for &(instruction, at) in &formula.program {
-            match instruction {
-                Instruction::Number(number) => builder.push(Step::Number(number), Some(number)),
-                Instruction::Name(index) => match constants.get(index).copied().flatten() {
-                    Some(value) => builder.push(Step::Number(value), Some(value)),
-                    None => builder.push(Step::Input(slots.get(index).copied().unwrap_or_default()), None),
-                },
-                Instruction::Apply(operation, count) => builder.apply(operation, count),
-                Instruction::Recall(history) => builder.recall(history, at)?,
-            }
-            depth = depth.max(builder.operands.len());
-        }
-        let Builder { program, memory, .. } = builder;
-        Ok(Self { inputs, program, memory, depth, scratch: Vec::new() })
+    fn build(formula: &Formula, step_s: f64, constant: &dyn Fn(&str) -> Option<f64>) -> Result<Self> {
+        let mut graph = Graph::new(step_s)?;
+        let root = graph.add(formula, &mut |graph, name| Ok(constant(name).map(|value| graph.number(value))))?;
+        let machine = Machine::new(&graph, &[root], &|_| None);
+        Ok(Self { inputs: graph.inputs().to_vec(), order: machine.inputs().to_vec(), machine })
     }
 
     /// The columns it reads, in the order in which [`StreamingFormula::push`] takes their samples.
@@ -164,7 +216,7 @@ impl StreamingFormula {
 
     /// Forgets the past.
     pub fn reset(&mut self) {
-        self.memory.iter_mut().for_each(Memory::reset);
+        self.machine.reset();
     }
 
     /// The value at the next sample; `sample` holds one number for each of [`StreamingFormula::inputs`].
@@ -177,7 +229,7 @@ impl StreamingFormula {
             return Err(Error::Shape { operation: "formula", message });
         }
         let mut value = [0.0];
-        self.block(1, &|input| sample.get(input..=input).unwrap_or(&[0.0]), &mut value);
+        self.run(1, &|input| &sample[input..=input], &mut value);
         Ok(value[0])
     }
 
@@ -194,46 +246,19 @@ impl StreamingFormula {
             let message = format!("column `{name}` has {} samples, expected {}", column.len(), out.len());
             return Err(Error::Shape { operation: "formula", message });
         }
-        for (index, part) in out.chunks_mut(BLOCK).enumerate() {
-            let (start, end) = (index * BLOCK, index * BLOCK + part.len());
-            self.block(part.len(), &|input| columns.get(input).and_then(|column| column.get(start..end)).unwrap_or(&[]), part);
+        let block = self.machine.block();
+        for (index, part) in out.chunks_mut(block).enumerate() {
+            let (start, end) = (index * block, index * block + part.len());
+            self.run(part.len(), &|input| &columns[input][start..end], part);
         }
         Ok(())
     }
 
-    /// Runs `samples` samples through the program.
-    fn block<'a>(&mut self, samples: usize, input: &dyn Fn(usize) -> &'a [f64], out: &mut [f64]) {
-        let Self { program, memory, depth, scratch, .. } = self;
-        if scratch.len() < *depth * samples {
-            scratch.resize(*depth * samples, 0.0);
-        }
-        let mut top = 0;
-        for step in program {
-            match *step {
-                Step::Number(number) => {
-                    scratch[top..top + samples].fill(number);
-                    top += samples;
-                }
-                Step::Input(index) => {
-                    let column = input(index);
-                    scratch[top..top + column.len()].copy_from_slice(column);
-                    top += samples;
-                }
-                Step::Apply(operation, count) => {
-                    operation.apply(count, samples, &mut scratch[top - count * samples..top]);
-                    top -= (count - 1) * samples;
-                }
-                Step::PowerInteger(exponent) => {
-                    scratch[top - samples..top].iter_mut().for_each(|value| *value = value.powi(exponent));
-                }
-                Step::Recall(index) => {
-                    if let Some(memory) = memory.get_mut(index) {
-                        memory.run(&mut scratch[top - samples..top]);
-                    }
-                }
-            }
-        }
-        out.copy_from_slice(&scratch[..samples]);
+    /// Runs some samples; `column` gives those of an input by its index in `inputs`.
+    fn run<'a>(&mut self, samples: usize, column: &dyn Fn(usize) -> &'a [f64], out: &mut [f64]) {
+        let Self { machine, order, .. } = self;
+        machine.advance(samples, &|input| column(order[input]));
+        out.copy_from_slice(&machine.root(0)[..samples]);
     }
 }
 

@@ -1,8 +1,10 @@
-//! The four operators that remember: lag, delay, rate, slew. Each is one state that takes samples in order.
+//! The four operators that remember: lag, delay, rate, slew, and the derivatives of their recursions. Each is one state that takes
+//! samples in order.
 //!
 //! Lag and delay take the signal between two samples to be a straight line;
 //! all take it to have been at rest at its first value before the first sample.
 
+use super::graph::Recall;
 use super::operation::History;
 use std::collections::VecDeque;
 
@@ -22,95 +24,142 @@ pub(super) const MAX_DELAY_S: f64 = 60.0;
 /// Longest delay, samples: 60 s at more than 100 kHz.
 pub(super) const MAX_DELAY_SAMPLES: f64 = 1e7;
 
-/// State of one operator.
+/// State of one operator. T is the step.
 #[derive(Clone, Debug)]
 pub(super) enum Memory {
     /// `y' = (x - y) / tau`, exact for a piecewise linear `x`:
     /// `y[k] = y[k-1] + (1 - a) (x[k-1] - y[k-1]) + ramp (x[k] - x[k-1])`, `a = exp(-T/tau)`, `ramp = 1 - (1 - a) tau/T`.
     Lag { approach: f64, ramp: f64, last: Option<(f64, f64)> },
+    /// `dy/dtau` of that recursion; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
+    LagByTime { approach: f64, ramp: f64, slopes: [f64; 2], last: Option<(f64, f64, f64)> },
     /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before. The newest value is at the back.
     Delay { whole: usize, part: f64, past: VecDeque<f64> },
+    /// `dy/ds` of that: the slope between the two samples.
+    DelayByTime { whole: usize, step_s: f64, past: VecDeque<f64> },
     /// `y[k] = (x[k] - x[k-1]) / T`, zero at the first sample: causal, so half a sample late.
     Rate { step_s: f64, last: Option<f64> },
     /// `y[k] = y[k-1] + clamp(x[k] - y[k-1], -limit, limit)`: a servo at its largest speed.
     Slew { limit: f64, last: Option<f64> },
+    /// Derivative of that by a number, from those of `x` and of the largest rate. The last `y` and its derivative.
+    SlewTangent { limit: f64, step_s: f64, last: Option<(f64, f64)> },
+}
+
+/// `1 - a` and `ramp` of a lag, and their derivatives by its time constant.
+fn lag_coefficients(tau_s: f64, step_s: f64) -> ([f64; 2], [f64; 2]) {
+    if tau_s <= 0.0 {
+        return ([1.0, 1.0], [0.0, -1.0 / step_s]);
+    }
+    let approach = -(-step_s / tau_s).exp_m1();
+    let slope = -(-step_s / tau_s).exp() * step_s / (tau_s * tau_s);
+    ([approach, 1.0 - approach * tau_s / step_s], [slope, -(approach + tau_s * slope) / step_s])
+}
+
+/// The sample so far back, or the first one.
+fn back(past: &VecDeque<f64>, samples: usize) -> f64 {
+    past.get((past.len() - 1).saturating_sub(samples)).copied().expect("the newest sample is there")
 }
 
 impl Memory {
-    pub(super) fn lag(tau_s: f64, step_s: f64) -> Self {
-        if tau_s <= 0.0 {
-            return Self::Lag { approach: 1.0, ramp: 1.0, last: None };
+    /// Of an operator with its time or limit, which is unused by a rate.
+    pub(super) fn new(recall: Recall, number: f64, step_s: f64) -> Self {
+        let whole = (number / step_s).floor();
+        match recall {
+            Recall::History(History::Lag) => {
+                let ([approach, ramp], _) = lag_coefficients(number, step_s);
+                Self::Lag { approach, ramp, last: None }
+            }
+            Recall::LagByTime => {
+                let ([approach, ramp], slopes) = lag_coefficients(number, step_s);
+                Self::LagByTime { approach, ramp, slopes, last: None }
+            }
+            Recall::History(History::Delay) => {
+                Self::Delay { whole: whole as usize, part: number / step_s - whole, past: VecDeque::new() }
+            }
+            Recall::DelayByTime => Self::DelayByTime { whole: whole as usize, step_s, past: VecDeque::new() },
+            Recall::History(History::Rate) => Self::Rate { step_s, last: None },
+            Recall::History(History::Slew) => Self::Slew { limit: number * step_s, last: None },
+            Recall::SlewTangent => Self::SlewTangent { limit: number * step_s, step_s, last: None },
         }
-        let approach = -(-step_s / tau_s).exp_m1();
-        Self::Lag { approach, ramp: 1.0 - approach * tau_s / step_s, last: None }
-    }
-
-    pub(super) fn delay(delay_s: f64, step_s: f64) -> Self {
-        let samples = delay_s / step_s;
-        let whole = samples.floor();
-        Self::Delay { whole: whole as usize, part: samples - whole, past: VecDeque::new() }
-    }
-
-    pub(super) const fn rate(step_s: f64) -> Self {
-        Self::Rate { step_s, last: None }
-    }
-
-    pub(super) fn slew(per_s: f64, step_s: f64) -> Self {
-        Self::Slew { limit: per_s * step_s, last: None }
     }
 
     /// Forgets everything: the next sample is a first one.
     pub(super) fn reset(&mut self) {
         match self {
-            Self::Lag { last, .. } => *last = None,
-            Self::Delay { past, .. } => past.clear(),
+            Self::Lag { last, .. } | Self::SlewTangent { last, .. } => *last = None,
+            Self::LagByTime { last, .. } => *last = None,
+            Self::Delay { past, .. } | Self::DelayByTime { past, .. } => past.clear(),
             Self::Rate { last, .. } | Self::Slew { last, .. } => *last = None,
         }
     }
 
-    /// Replaces the samples, in order, by the operator's output.
-    pub(super) fn run(&mut self, values: &mut [f64]) {
+    /// Takes samples in order. `tangents`, of the signal and of the limit, are read by a slew's derivative alone.
+    pub(super) fn run(&mut self, signal: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
+        let samples = out.iter_mut().zip(signal.iter().copied());
         match self {
             Self::Lag { approach, ramp, last } => {
-                for value in values {
-                    let x = *value;
+                for (out, x) in samples {
                     let (x_before, y_before) = last.unwrap_or((x, x));
-                    *value = y_before + *approach * (x_before - y_before) + *ramp * (x - x_before);
-                    *last = Some((x, *value));
+                    *out = y_before + *approach * (x_before - y_before) + *ramp * (x - x_before);
+                    *last = Some((x, *out));
+                }
+            }
+            Self::LagByTime { approach, ramp, slopes: [of_approach, of_ramp], last } => {
+                for (out, x) in samples {
+                    let (x_before, y_before, slope) = last.unwrap_or((x, x, 0.0));
+                    *out = slope - *approach * slope + *of_approach * (x_before - y_before) + *of_ramp * (x - x_before);
+                    let y = y_before + *approach * (x_before - y_before) + *ramp * (x - x_before);
+                    *last = Some((x, y, *out));
                 }
             }
             Self::Delay { whole, part, past } => {
-                for value in values {
-                    past.push_back(*value);
-                    if past.len() > *whole + 2 {
-                        past.pop_front();
-                    }
-                    let newest = past.len() - 1;
-                    let at = |back: usize| past.get(newest.saturating_sub(back)).copied().unwrap_or(*value);
-                    let near = at(*whole);
-                    *value = if *part == 0.0 { near } else { near + *part * (at(*whole + 1) - near) };
+                for (out, x) in samples {
+                    remember(past, x, *whole);
+                    let near = back(past, *whole);
+                    *out = if *part == 0.0 { near } else { near + *part * (back(past, *whole + 1) - near) };
+                }
+            }
+            Self::DelayByTime { whole, step_s, past } => {
+                for (out, x) in samples {
+                    remember(past, x, *whole);
+                    *out = (back(past, *whole + 1) - back(past, *whole)) / *step_s;
                 }
             }
             Self::Rate { step_s, last } => {
-                for value in values {
-                    let x = *value;
-                    *value = (x - last.unwrap_or(x)) / *step_s;
+                for (out, x) in samples {
+                    *out = (x - last.unwrap_or(x)) / *step_s;
                     *last = Some(x);
                 }
             }
             Self::Slew { limit, last } => {
-                for value in values {
-                    let before = last.unwrap_or(*value);
+                for (out, x) in samples {
+                    *out = slewed(x, last.unwrap_or(x), *limit);
                     // A not-a-number passes through and is forgotten, so that what follows is defined again.
-                    let change = *value - before;
-                    if change.abs() > *limit {
-                        *value = before + limit.copysign(change);
-                    }
-                    *last = Some(*value).filter(|value| value.is_finite());
+                    *last = Some(*out).filter(|value| value.is_finite());
+                }
+            }
+            Self::SlewTangent { limit, step_s, last } => {
+                let [of_signal, of_limit] = tangents;
+                for ((out, x), (&dx, &dlimit)) in samples.zip(of_signal.iter().zip(of_limit)) {
+                    let (before, tangent) = last.unwrap_or((x, dx));
+                    let change = x - before;
+                    *out = if change.abs() > *limit { tangent + (dlimit * *step_s).copysign(change * dlimit) } else { dx };
+                    *last = Some((slewed(x, before, *limit), *out)).filter(|(value, _)| value.is_finite());
                 }
             }
         }
     }
+}
+
+fn remember(past: &mut VecDeque<f64>, x: f64, whole: usize) {
+    past.push_back(x);
+    if past.len() > whole + 2 {
+        past.pop_front();
+    }
+}
+
+fn slewed(x: f64, before: f64, limit: f64) -> f64 {
+    let change = x - before;
+    if change.abs() > limit { before + limit.copysign(change) } else { x }
 }
 
 #[cfg(test)]
@@ -120,15 +169,20 @@ mod tests {
 
     const STEP_S: f64 = 0.01;
 
-    fn run(mut memory: Memory, mut values: Vec<f64>) -> Vec<f64> {
-        memory.run(&mut values);
-        values
+    fn run(history: History, number: f64, values: &[f64]) -> Vec<f64> {
+        recalled(Recall::History(history), number, STEP_S, values)
+    }
+
+    fn recalled(recall: Recall, number: f64, step_s: f64, values: &[f64]) -> Vec<f64> {
+        let mut out = vec![0.0; values.len()];
+        Memory::new(recall, number, step_s).run(values, [&[], &[]], &mut out);
+        out
     }
 
     #[test]
     fn a_lag_of_a_ramp_is_the_exact_solution() {
         let tau_s = 0.04;
-        let found = run(Memory::lag(tau_s, STEP_S), (0..200).map(|k| 3.0 * STEP_S * f64::from(k)).collect());
+        let found = run(History::Lag, tau_s, &(0..200).map(|k| 3.0 * STEP_S * f64::from(k)).collect::<Vec<_>>());
         for (k, y) in found.iter().enumerate() {
             let t = STEP_S * k as f64;
             let exact = 3.0 * (t - tau_s * (1.0 - (-t / tau_s).exp()));
@@ -139,8 +193,8 @@ mod tests {
     #[test]
     fn no_lag_and_no_delay_change_nothing() {
         let values: Vec<f64> = (0..50).map(|k| (f64::from(k) * 0.7).sin()).collect();
-        assert_eq!(run(Memory::delay(0.0, STEP_S), values.clone()), values);
-        for (y, x) in run(Memory::lag(0.0, STEP_S), values.clone()).iter().zip(&values) {
+        assert_eq!(run(History::Delay, 0.0, &values), values);
+        for (y, x) in run(History::Lag, 0.0, &values).iter().zip(&values) {
             assert!((y - x).abs() < Tolerance::Close.relative_f64());
         }
     }
@@ -148,20 +202,20 @@ mod tests {
     #[test]
     fn delays_hold_the_first_value_then_follow() {
         let values: Vec<f64> = (0..8).map(f64::from).collect();
-        assert_eq!(run(Memory::delay(0.02, STEP_S), values.clone()), [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
-        assert_eq!(run(Memory::delay(0.005, STEP_S), values), [0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5]);
+        assert_eq!(run(History::Delay, 0.02, &values), [0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        assert_eq!(run(History::Delay, 0.005, &values), [0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5]);
     }
 
     #[test]
     fn a_slew_follows_no_faster_than_its_limit() {
-        let found = run(Memory::slew(100.0, STEP_S), vec![0.0, 3.0, 3.0, 3.5, 3.2, -9.0, f64::NAN, 5.0]);
+        let found = run(History::Slew, 100.0, &[0.0, 3.0, 3.0, 3.5, 3.2, -9.0, f64::NAN, 5.0]);
         assert_eq!(found[..6], [0.0, 1.0, 2.0, 3.0, 3.2, 2.2]);
         assert!(found[6].is_nan() && found[7] == 5.0);
     }
 
     #[test]
     fn a_rate_is_the_backward_difference() {
-        let found = run(Memory::rate(0.5), vec![1.0, 2.0, 4.0]);
+        let found = recalled(Recall::History(History::Rate), 0.0, 0.5, &[1.0, 2.0, 4.0]);
         assert_eq!(found, [0.0, 2.0, 4.0]);
     }
 }

@@ -17,6 +17,8 @@
 //! The last four remember. Before the first sample their argument is taken to have rested at its first value. Their second
 //! arguments are numbers or parameters, never columns.
 
+mod derivative;
+mod graph;
 mod lexer;
 mod machine;
 mod memory;
@@ -24,7 +26,8 @@ mod operation;
 mod parser;
 mod print;
 
-pub use machine::StreamingFormula;
+pub use graph::{Graph, Node};
+pub use machine::{Machine, StreamingFormula};
 
 use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;

@@ -1,7 +1,7 @@
 //! The words of the grammar: operators and functions, their names, argument counts and what they compute. No parsing here.
 
 /// An operation without memory: its result depends on this sample's operands alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Operation {
     Negate,
     Add,
@@ -30,7 +30,7 @@ pub(super) enum Operation {
 }
 
 /// An operation that remembers earlier samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum History {
     Lag,
     Delay,
@@ -134,61 +134,74 @@ pub(super) mod binding {
     pub const ATOM: u8 = 11;
 }
 
-impl Operation {
-    /// Computes in place: `stack` holds `operands` runs of `samples` values; the result replaces the first run.
-    pub(super) fn apply(self, operands: usize, samples: usize, stack: &mut [f64]) {
-        let (first, rest) = stack.split_at_mut(samples.min(stack.len()));
-        let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
-        match self {
-            Self::Negate => one(first, |x| -x),
-            Self::Add => two(first, rest, |x, y| x + y),
-            Self::Subtract => two(first, rest, |x, y| x - y),
-            Self::Multiply => two(first, rest, |x, y| x * y),
-            Self::Divide => two(first, rest, |x, y| x / y),
-            Self::Power => two(first, rest, f64::powf),
-            Self::Less => two(first, rest, |x, y| truth(x < y)),
-            Self::LessOrEqual => two(first, rest, |x, y| truth(x <= y)),
-            Self::Greater => two(first, rest, |x, y| truth(x > y)),
-            Self::GreaterOrEqual => two(first, rest, |x, y| truth(x >= y)),
-            Self::Abs => one(first, f64::abs),
-            Self::Sqrt => one(first, f64::sqrt),
-            Self::Exp => one(first, f64::exp),
-            Self::Log => one(first, f64::ln),
-            Self::Sin => one(first, f64::sin),
-            Self::Cos => one(first, f64::cos),
-            Self::Tan => one(first, f64::tan),
-            Self::Tanh => one(first, f64::tanh),
-            Self::Sign => one(first, |x| if x == 0.0 || x.is_nan() { x } else { x.signum() }),
-            Self::Atan2 => two(first, rest, f64::atan2),
-            Self::Min => many(first, rest, operands, f64::min),
-            Self::Max => many(first, rest, operands, f64::max),
-            Self::Hypot => many(first, rest, operands, f64::hypot),
-            Self::Clamp => {
-                // Not `f64::clamp`, which panics when the bounds cross; here the upper bound wins.
-                let (low, high) = rest.split_at(samples.min(rest.len()));
-                two(first, low, f64::max);
-                two(first, high, f64::min);
-            }
+/// The function behind an operation, taken apart here once so that loops over samples know it while they are compiled.
+macro_rules! with_unary {
+    ($operation:expr, $f:ident => $body:expr) => {
+        match $operation {
+            Operation::Negate => { let $f = |x: f64| -x; $body }
+            Operation::Abs => { let $f = f64::abs; $body }
+            Operation::Sqrt => { let $f = f64::sqrt; $body }
+            Operation::Exp => { let $f = f64::exp; $body }
+            Operation::Log => { let $f = f64::ln; $body }
+            Operation::Sin => { let $f = f64::sin; $body }
+            Operation::Cos => { let $f = f64::cos; $body }
+            Operation::Tan => { let $f = f64::tan; $body }
+            Operation::Tanh => { let $f = f64::tanh; $body }
+            Operation::Sign => { let $f = |x: f64| if x == 0.0 || x.is_nan() { x } else { x.signum() }; $body }
+            _ => unreachable!("an operation of two operands"),
         }
-    }
+    };
 }
 
-fn one(values: &mut [f64], f: impl Fn(f64) -> f64) {
-    for value in values {
-        *value = f(*value);
-    }
+macro_rules! with_binary {
+    ($operation:expr, $f:ident => $body:expr) => {{
+        let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
+        match $operation {
+            Operation::Add => { let $f = |x: f64, y: f64| x + y; $body }
+            Operation::Subtract => { let $f = |x: f64, y: f64| x - y; $body }
+            Operation::Multiply => { let $f = |x: f64, y: f64| x * y; $body }
+            Operation::Divide => { let $f = |x: f64, y: f64| x / y; $body }
+            Operation::Power => { let $f = f64::powf; $body }
+            Operation::Less => { let $f = |x: f64, y: f64| truth(x < y); $body }
+            Operation::LessOrEqual => { let $f = |x: f64, y: f64| truth(x <= y); $body }
+            Operation::Greater => { let $f = |x: f64, y: f64| truth(x > y); $body }
+            Operation::GreaterOrEqual => { let $f = |x: f64, y: f64| truth(x >= y); $body }
+            Operation::Atan2 => { let $f = f64::atan2; $body }
+            Operation::Min => { let $f = f64::min; $body }
+            Operation::Max => { let $f = f64::max; $body }
+            Operation::Hypot => { let $f = f64::hypot; $body }
+            _ => unreachable!("an operation of one operand, or one that was taken apart"),
+        }
+    }};
 }
 
-fn two(left: &mut [f64], right: &[f64], f: impl Fn(f64, f64) -> f64) {
-    for (value, &other) in left.iter_mut().zip(right) {
-        *value = f(*value, other);
+impl Operation {
+    /// Of one number.
+    pub(super) fn of_one(self, x: f64) -> f64 {
+        with_unary!(self, f => f(x))
     }
-}
 
-fn many(first: &mut [f64], rest: &[f64], operands: usize, f: impl Fn(f64, f64) -> f64) {
-    let samples = first.len().max(1);
-    for other in rest.chunks_exact(samples).take(operands.saturating_sub(1)) {
-        two(first, other, &f);
+    /// Of two numbers.
+    pub(super) fn of_two(self, x: f64, y: f64) -> f64 {
+        with_binary!(self, f => f(x, y))
+    }
+
+    /// Of one column.
+    pub(super) fn of_column(self, x: &[f64], out: &mut [f64]) {
+        with_unary!(self, f => {
+            for (out, &x) in out.iter_mut().zip(x) {
+                *out = f(x);
+            }
+        });
+    }
+
+    /// Of two columns.
+    pub(super) fn of_columns(self, x: &[f64], y: &[f64], out: &mut [f64]) {
+        with_binary!(self, f => {
+            for ((out, &x), &y) in out.iter_mut().zip(x).zip(y) {
+                *out = f(x, y);
+            }
+        });
     }
 }
 
@@ -197,23 +210,24 @@ mod tests {
     use super::*;
     use phyture_kernels::Tolerance;
 
-    fn value(operation: Operation, operands: &[f64]) -> f64 {
-        let mut stack = operands.to_vec();
-        operation.apply(operands.len(), 1, &mut stack);
-        stack[0]
+    #[test]
+    fn corner_cases_are_defined() {
+        assert_eq!(Operation::Sign.of_one(-0.0), 0.0);
+        assert_eq!(Operation::Sign.of_one(-3.0), -1.0);
+        assert!(Operation::Sign.of_one(f64::NAN).is_nan());
+        assert!((Operation::Hypot.of_two(3.0, 4.0) - 5.0).abs() < Tolerance::Close.relative_f64());
+        assert_eq!(Operation::GreaterOrEqual.of_two(1.0, 1.0), 1.0);
+        assert_eq!(Operation::Less.of_two(1.0, f64::NAN), 0.0);
     }
 
     #[test]
-    fn corner_cases_are_defined() {
-        assert_eq!(value(Operation::Sign, &[-0.0]), 0.0);
-        assert_eq!(value(Operation::Sign, &[-3.0]), -1.0);
-        assert!(value(Operation::Sign, &[f64::NAN]).is_nan());
-        assert_eq!(value(Operation::Clamp, &[5.0, 0.0, 1.0]), 1.0);
-        assert_eq!(value(Operation::Clamp, &[5.0, 2.0, 1.0]), 1.0);
-        assert_eq!(value(Operation::Min, &[3.0, 2.0, 7.0]), 2.0);
-        assert!((value(Operation::Hypot, &[2.0, 3.0, 6.0]) - 7.0).abs() < Tolerance::Close.relative_f64());
-        assert_eq!(value(Operation::GreaterOrEqual, &[1.0, 1.0]), 1.0);
-        assert_eq!(value(Operation::Less, &[1.0, f64::NAN]), 0.0);
+    fn columns_are_numbers_one_by_one() {
+        let (x, y) = ([0.5, -2.0, 3.0], [2.0, 0.25, -1.0]);
+        let mut out = [0.0; 3];
+        Operation::Atan2.of_columns(&x, &y, &mut out);
+        assert_eq!(out, std::array::from_fn(|index| Operation::Atan2.of_two(x[index], y[index])));
+        Operation::Tanh.of_column(&x, &mut out);
+        assert_eq!(out, x.map(f64::tanh));
     }
 
     #[test]

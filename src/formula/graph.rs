@@ -1,0 +1,296 @@
+//! Formulas put together into one graph in which equal parts are one node, whoever wrote them: a model is a chain of formulas that
+//! read each other, and many models that differ in little share the rest. Derivatives are in `derivative`, evaluation in `machine`.
+
+use super::memory::{MAX_DELAY_S, MAX_DELAY_SAMPLES};
+use super::operation::{History, Operation};
+use super::{Formula, Instruction};
+use crate::error::{Error, Result};
+use std::collections::HashMap;
+
+/// A value in a [`Graph`]: one number a sample, or one for all samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Node(pub(super) u32);
+
+/// What remembers: the operators of the grammar, and their derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Recall {
+    /// One of the grammar: signal, and its time or limit.
+    History(History),
+    /// Derivative of a lag by its time constant: signal, time constant.
+    LagByTime,
+    /// Derivative of a delay by its time: signal, time.
+    DelayByTime,
+    /// Derivative of a slew: signal, limit, derivative of the signal, derivative of the limit.
+    SlewTangent,
+}
+
+/// How a node is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Kind {
+    /// A number, by its bits.
+    Number(u64),
+    /// A number that may be differentiated by; index into the symbols.
+    Symbol(u32),
+    /// A column; index into the inputs.
+    Input(u32),
+    One(Operation, Node),
+    Two(Operation, Node, Node),
+    /// Unused operands are 0.
+    Recall(Recall, [Node; 4]),
+}
+
+/// A number with an identity: derivatives are taken by it, and its value may differ where the graph is evaluated.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Symbol {
+    pub value: f64,
+    /// Whether an evaluation may give it another value.
+    pub varies: bool,
+}
+
+/// Formulas as one graph.
+#[derive(Clone, Debug)]
+pub struct Graph {
+    pub(super) step_s: f64,
+    pub(super) nodes: Vec<Kind>,
+    /// The value of each node that is the same at all samples, with every symbol at its own value.
+    pub(super) uniform: Vec<Option<f64>>,
+    pub(super) inputs: Vec<String>,
+    pub(super) symbols: Vec<Symbol>,
+    index: HashMap<Kind, Node>,
+}
+
+impl Graph {
+    /// An empty graph for samples that are `step_s` seconds apart.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a step that is not positive and finite.
+    pub fn new(step_s: f64) -> Result<Self> {
+        if !(step_s > 0.0 && step_s.is_finite()) {
+            let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
+            return Err(Error::Config { place: "formula".into(), field: "step_s".into(), found, expected });
+        }
+        Ok(Self {
+            step_s,
+            nodes: Vec::new(),
+            uniform: Vec::new(),
+            inputs: Vec::new(),
+            symbols: Vec::new(),
+            index: HashMap::new(),
+        })
+    }
+
+    /// A number.
+    pub fn number(&mut self, value: f64) -> Node {
+        self.intern(Kind::Number(value.to_bits()))
+    }
+
+    /// A number of its own, by which derivatives can be taken. One that `varies` may have another value in each evaluation.
+    pub fn symbol(&mut self, value: f64, varies: bool) -> Node {
+        self.symbols.push(Symbol { value, varies });
+        self.intern(Kind::Symbol(self.symbols.len() as u32 - 1))
+    }
+
+    /// A column by name.
+    pub fn input(&mut self, name: &str) -> Node {
+        let known = self.inputs.iter().position(|known| known == name);
+        let index = known.unwrap_or_else(|| {
+            self.inputs.push(name.into());
+            self.inputs.len() - 1
+        });
+        self.intern(Kind::Input(index as u32))
+    }
+
+    /// Names of the columns, in the order of their first use.
+    pub fn inputs(&self) -> &[String] {
+        &self.inputs
+    }
+
+    /// The value of a node that is the same at all samples.
+    pub fn uniform(&self, node: Node) -> Option<f64> {
+        self.uniform[node.0 as usize]
+    }
+
+    /// A formula whose names stand for what `resolve` gives; a name for which it gives nothing is a column.
+    ///
+    /// # Errors
+    /// [`Error::Formula`] at a `lag`, `delay` or `slew` whose second argument varies or is out of range; those of `resolve`.
+    pub fn add(&mut self, formula: &Formula, resolve: &mut dyn FnMut(&mut Self, &str) -> Result<Option<Node>>) -> Result<Node> {
+        let mut names = Vec::with_capacity(formula.names.len());
+        for (name, _) in &formula.names {
+            let found = resolve(self, name)?;
+            names.push(found.unwrap_or_else(|| self.input(name)));
+        }
+        let mut stack: Vec<Node> = Vec::new();
+        for &(instruction, at) in &formula.program {
+            let node = match instruction {
+                Instruction::Number(number) => self.number(number),
+                Instruction::Name(index) => names[index],
+                Instruction::Apply(operation, count) => {
+                    let operands = stack.split_off(stack.len() - count);
+                    self.apply(operation, &operands)
+                }
+                Instruction::Recall(history) => {
+                    let operands = stack.split_off(stack.len() - history.operands());
+                    self.recall(history, &operands).map_err(|message| Error::Formula {
+                        message,
+                        formula: formula.text.clone(),
+                        at,
+                    })?
+                }
+            };
+            stack.push(node);
+        }
+        Ok(stack.pop().expect("a parsed formula leaves one value"))
+    }
+
+    /// The sum of two values.
+    pub fn sum(&mut self, left: Node, right: Node) -> Node {
+        self.two(Operation::Add, left, right)
+    }
+
+    /// The difference of two values.
+    pub fn difference(&mut self, left: Node, right: Node) -> Node {
+        self.two(Operation::Subtract, left, right)
+    }
+
+    /// The product of two values.
+    pub fn product(&mut self, left: Node, right: Node) -> Node {
+        self.two(Operation::Multiply, left, right)
+    }
+
+    /// A delay of so many seconds; its range is the caller's to check.
+    pub fn delayed(&mut self, node: Node, seconds: Node) -> Node {
+        self.remember(Recall::History(History::Delay), [node, seconds])
+    }
+
+    /// Operations on more than two operands become operations on two.
+    fn apply(&mut self, operation: Operation, operands: &[Node]) -> Node {
+        match (operation, operands) {
+            (Operation::Clamp, &[value, low, high]) => {
+                // Not `f64::clamp`, which panics when the bounds cross; here the upper bound wins.
+                let raised = self.two(Operation::Max, value, low);
+                self.two(Operation::Min, raised, high)
+            }
+            (_, &[only]) => self.one(operation, only),
+            (_, [first, rest @ ..]) => rest.iter().fold(*first, |left, &right| self.two(operation, left, right)),
+            (_, []) => unreachable!("the parser counts arguments"),
+        }
+    }
+
+    pub(super) fn one(&mut self, operation: Operation, operand: Node) -> Node {
+        self.intern(Kind::One(operation, operand))
+    }
+
+    pub(super) fn two(&mut self, operation: Operation, left: Node, right: Node) -> Node {
+        self.intern(Kind::Two(operation, left, right))
+    }
+
+    pub(super) fn remember<const N: usize>(&mut self, recall: Recall, operands: [Node; N]) -> Node {
+        let zero = self.number(0.0);
+        let mut all = [zero; 4];
+        all[..N].copy_from_slice(&operands);
+        self.intern(Kind::Recall(recall, all))
+    }
+
+    /// An operator of the grammar that remembers, with what is wrong about its second argument.
+    fn recall(&mut self, history: History, operands: &[Node]) -> Result<Node, String> {
+        let signal = operands[0];
+        let Some(&second) = operands.get(1) else { return Ok(self.remember(Recall::History(history), [signal])) };
+        let value = self.uniform(second);
+        match history {
+            History::Slew => {
+                if value.is_none_or(|per_s| per_s.is_nan() || per_s <= 0.0) {
+                    let found = value.map_or("varies in flight".into(), |per_s| format!("is {per_s} per second"));
+                    return Err(format!("the largest rate of `slew` {found}, expected a number or a parameter above 0"));
+                }
+            }
+            History::Lag | History::Delay => {
+                let (name, largest) = if history == History::Lag { ("lag", f64::MAX) } else { ("delay", MAX_DELAY_S) };
+                let Some(time_s) = value else {
+                    return Err(format!("the time of `{name}` must be a number or a parameter, not something that varies in flight"));
+                };
+                if !(0.0..=largest).contains(&time_s) {
+                    let limit = if history == History::Lag { String::new() } else { format!(" and at most {largest}") };
+                    return Err(format!("the time of `{name}` is {time_s} s, expected at least 0{limit}"));
+                }
+                let samples = time_s / self.step_s;
+                if history == History::Delay && samples > MAX_DELAY_SAMPLES {
+                    let step_s = self.step_s;
+                    return Err(format!(
+                        "the time of `delay` is {time_s} s, {samples:.1e} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:e} can be kept"
+                    ));
+                }
+            }
+            History::Rate => {}
+        }
+        Ok(self.remember(Recall::History(history), [signal, second]))
+    }
+
+    fn intern(&mut self, kind: Kind) -> Node {
+        if let Some(known) = self.index.get(&kind) {
+            return *known;
+        }
+        let uniform = self.value_of(kind, &|node| self.uniform[node.0 as usize], &|symbol| self.symbols[symbol].value);
+        let node = Node(u32::try_from(self.nodes.len()).expect("fewer than four thousand million parts"));
+        self.nodes.push(kind);
+        self.uniform.push(uniform);
+        self.index.insert(kind, node);
+        node
+    }
+
+    /// The value of a node that is the same at all samples, from those of its operands.
+    pub(super) fn value_of(&self, kind: Kind, of: &dyn Fn(Node) -> Option<f64>, symbol: &dyn Fn(usize) -> f64) -> Option<f64> {
+        match kind {
+            Kind::Number(bits) => Some(f64::from_bits(bits)),
+            Kind::Symbol(index) => Some(symbol(index as usize)),
+            Kind::Input(_) => None,
+            Kind::One(operation, operand) => of(operand).map(|value| operation.of_one(value)),
+            Kind::Two(operation, left, right) => of(left).zip(of(right)).map(|(left, right)| match whole_power(operation, Some(right)) {
+                Some(exponent) => left.powi(exponent),
+                None => operation.of_two(left, right),
+            }),
+            // At rest since ever: a lag, a delay or a slew passes a constant on, its rate and its derivatives are zero.
+            Kind::Recall(Recall::History(History::Rate) | Recall::LagByTime | Recall::DelayByTime, [signal, ..]) => of(signal).map(|_| 0.0),
+            Kind::Recall(Recall::History(_), [signal, ..]) => of(signal),
+            Kind::Recall(Recall::SlewTangent, [signal, _, tangent, _]) => of(signal).and(of(tangent)),
+        }
+    }
+
+    /// The nodes that a node is made of.
+    pub(super) fn operands(&self, node: Node) -> impl Iterator<Item = Node> + use<> {
+        let (operands, count) = match self.nodes[node.0 as usize] {
+            Kind::Number(_) | Kind::Symbol(_) | Kind::Input(_) => ([node; 4], 0),
+            Kind::One(_, operand) => ([operand; 4], 1),
+            Kind::Two(_, left, right) => ([left, right, left, left], 2),
+            Kind::Recall(_, operands) => (operands, 4),
+        };
+        operands.into_iter().take(count)
+    }
+
+    /// The nodes behind some roots, themselves included, operands before what is made of them.
+    pub(super) fn behind(&self, roots: &[Node]) -> Vec<Node> {
+        let mut needed = vec![false; self.nodes.len()];
+        roots.iter().for_each(|root| needed[root.0 as usize] = true);
+        for index in (0..self.nodes.len()).rev() {
+            if needed[index] {
+                self.operands(Node(index as u32)).for_each(|operand| needed[operand.0 as usize] = true);
+            }
+        }
+        (0..self.nodes.len()).filter(|&index| needed[index]).map(|index| Node(index as u32)).collect()
+    }
+
+    /// The columns that a value is made of.
+    pub fn reads(&self, node: Node) -> Vec<&str> {
+        let input = |node: &Node| match self.nodes[node.0 as usize] {
+            Kind::Input(index) => Some(self.inputs[index as usize].as_str()),
+            _ => None,
+        };
+        self.behind(&[node]).iter().filter_map(input).collect()
+    }
+}
+
+/// The exponent of a power that is a small whole number: taken by multiplication.
+pub(super) fn whole_power(operation: Operation, exponent: Option<f64>) -> Option<i32> {
+    let small = |exponent: &f64| exponent.fract() == 0.0 && exponent.abs() <= 16.0;
+    exponent.filter(|exponent| operation == Operation::Power && small(exponent)).map(|exponent| exponent as i32)
+}
