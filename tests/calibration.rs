@@ -168,7 +168,7 @@ fn undetermined_coefficients_are_named_with_the_reason() -> Result<()> {
             0.4,
             ["`c_z` of effect `collective_thrust`", "`u4` never varies, so `d_z` of effect `vertical_bias` does the same"],
         ),
-        (Column::Vx, 0.0, ["`a_x` of effect `linear_drag`", "`vx` is zero in every row"]),
+        (Column::Vx, 0.0, ["`a_x` of effect `linear_drag`", "`air_vx` is zero in every row"]),
     ] {
         let flights = [still(column, value)?];
         let result = calibrate(&paper(), &flights, &whole(&flights));
@@ -181,7 +181,8 @@ fn undetermined_coefficients_are_named_with_the_reason() -> Result<()> {
     let mut model = paper();
     model.effects.push(Effect::formula("again", 0, "3 * vx", 0.0)?);
     let text = message(calibrate(&model, &flights, &whole(&flights)))?;
-    for part in ["`a_x` of effect `linear_drag` and `coefficient` of effect `again`", "`vx` and `3 * vx`", "linearly dependent"] {
+    for part in ["`a_x` of effect `linear_drag` and `coefficient` of effect `again`", "`air_vx` and `3 * vx`", "linearly dependent"]
+    {
         assert!(text.contains(part), "{text}");
     }
     // Disabled, it takes no part.

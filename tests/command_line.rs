@@ -58,7 +58,14 @@ fn an_effect_is_listed_shown_and_added_once() -> Result<()> {
     assert!(text.lines().any(|line| line.starts_with("cyclic_lag") && line.contains("wx_dot wy_dot ")), "{text}");
     let show = phyture(place.path(), &["effect", "show", "ground_effect"])?;
     let text = String::from_utf8_lossy(&show.stdout).into_owned();
-    for part in ["vz_dot += k * ", "usually 0.6 to 1.3", "tried: 0, 0.2, 0.4", "Mistaken for      rotor_droop", "Cheeseman"] {
+    for part in [
+        "thrust := thrust * (1 + k * ",
+        "Changes signals   thrust",
+        "usually 0.6 to 1.3",
+        "tried: 0, 0.2, 0.4",
+        "Mistaken for      rotor_droop",
+        "Cheeseman",
+    ] {
         assert!(text.contains(part), "{part} in\n{text}");
     }
     let json = phyture(place.path(), &["effect", "show", "wind", "--json", "-"])?;
@@ -75,7 +82,7 @@ fn an_effect_is_listed_shown_and_added_once() -> Result<()> {
     write("bare.toml", "[model]\n")?;
     for (arguments, part) in [
         (["wind", "with.toml"], "already there"),
-        (["wind", "bare.toml"], "nothing that gives `linear_drag_a_x`, which `wind` reads"),
+        (["wind", "bare.toml"], "nothing that reads air_vx, air_vy, air_vz, which `wind` changes"),
         (["flap_tilt", "quad.toml"], "one for which `flap_tilt` makes sense: helicopter"),
     ] {
         let refused = phyture(place.path(), &["effect", "add", arguments[0], "-m", arguments[1], "-o", "no.toml"])?;

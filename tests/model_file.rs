@@ -206,7 +206,7 @@ proptest! {
     ) {
         let mut model = Model::paper(name.clone(), mass_kg, [0.1, 0.2, 0.8 / 3.0], 0.8);
         let mut own = Effect::formula(format!("own {name}"), 5, "lag(vx, tau_s)^2 - -3e-7 * vy", -0.1)?;
-        own.parameters.push(Parameter { name: "tau_s".into(), value: half_width, unit: String::new(), fixed: true });
+        own.parameters.push(Parameter { name: "tau_s".into(), value: half_width, unit: String::new(), fixed: true, ci95: None });
         own.added_by = Some(name);
         model.effects.push(own);
         let coefficients = model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients);

@@ -124,7 +124,7 @@ fn with_memory() -> Result<Model> {
     }
     model.data.control_delay_s = 0.005;
     let mut blowback = Effect::formula("blowback", 3, "lag(vy, tau_s) * hypot(vx, vy) + rate(wx)", 0.02)?;
-    blowback.parameters.push(Parameter { name: "tau_s".into(), value: 0.07, unit: "s".into(), fixed: true });
+    blowback.parameters.push(Parameter { name: "tau_s".into(), value: 0.07, unit: "s".into(), fixed: true, ci95: None });
     model.effects.push(blowback);
     model.effects.push(Effect::formula(
         "wake",
@@ -133,7 +133,7 @@ fn with_memory() -> Result<Model> {
         -0.4,
     )?);
     let mut servo = Effect::formula("servo", 0, "airspeed", 0.0)?;
-    servo.parameters.push(Parameter { name: "tau_s".into(), value: 0.03, unit: "s".into(), fixed: false });
+    servo.parameters.push(Parameter { name: "tau_s".into(), value: 0.03, unit: "s".into(), fixed: false, ci95: None });
     servo.swaps.push(Swap { name: "u1".into(), with: Formula::parse("lag(u1, tau_s)")?, within: vec!["control_moment".into()] });
     model.effects.push(servo);
     Ok(model)

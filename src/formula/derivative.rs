@@ -4,7 +4,7 @@
 //! Where a function has no derivative, at the corner of `max` or of `abs`, one side's is taken; where it has none that is
 //! finite (a root at 0), it is 0.
 
-use super::graph::{Graph, Kind, Node, Recall};
+use super::graph::{Graph, Kind, Node, Recall, Symbol};
 use super::operation::{History, Operation};
 use std::collections::HashMap;
 
@@ -33,14 +33,26 @@ impl Graph {
     /// The same values with what never acts left out: products with 0, sums with 0, products with 1, and symbols that are 0
     /// wherever this graph is evaluated.
     pub fn settled(&mut self, values: &[Node]) -> Vec<Node> {
+        self.with_zeros(values, &|symbol, _| symbol.value == 0.0 && !symbol.varies)
+    }
+
+    /// A value where these symbols are 0, with what then never acts left out.
+    pub fn without(&mut self, value: Node, symbols: &[Node]) -> Node {
+        self.with_zeros(&[value], &|_, node| symbols.contains(&node))[0]
+    }
+
+    fn with_zeros(&mut self, values: &[Node], is_zero: &dyn Fn(Symbol, Node) -> bool) -> Vec<Node> {
         let mut known: HashMap<Node, Node> = HashMap::new();
         for node in self.behind(values) {
             let of = |node: Node| known.get(&node).copied().expect("operands come first");
             let settled = match self.nodes[node.0 as usize] {
                 Kind::Number(_) | Kind::Input(_) => node,
                 Kind::Symbol(index) => {
-                    let symbol = self.symbols[index as usize];
-                    if symbol.value == 0.0 && !symbol.varies { self.number(0.0) } else { node }
+                    if is_zero(self.symbols[index as usize], node) {
+                        self.number(0.0)
+                    } else {
+                        node
+                    }
                 }
                 Kind::One(operation, operand) => {
                     let operand = of(operand);
@@ -61,11 +73,25 @@ impl Graph {
     }
 
     fn is(&self, node: Node, number: f64) -> bool {
-        matches!(self.nodes[node.0 as usize], Kind::Number(bits) if f64::from_bits(bits) == number)
+        self.literal(node) == Some(number)
+    }
+
+    fn literal(&self, node: Node) -> Option<f64> {
+        match self.nodes[node.0 as usize] {
+            Kind::Number(bits) => Some(f64::from_bits(bits)),
+            _ => None,
+        }
+    }
+
+    /// A value that is made of plain numbers alone is one.
+    fn folded(&mut self, node: Node) -> Node {
+        let value = self.uniform(node).filter(|_| self.operands(node).all(|operand| self.literal(operand).is_some()));
+        value.map_or(node, |value| self.number(value))
     }
 
     fn unary(&mut self, operation: Operation, operand: Node) -> Node {
-        if operation == Operation::Negate && self.is(operand, 0.0) { operand } else { self.one(operation, operand) }
+        let node = self.one(operation, operand);
+        self.folded(node)
     }
 
     fn binary(&mut self, operation: Operation, left: Node, right: Node) -> Node {
@@ -79,7 +105,10 @@ impl Graph {
             Operation::Divide if zero(self, left) || one(self, right) => left,
             Operation::Power if one(self, right) => left,
             Operation::Power if zero(self, right) => self.number(1.0),
-            _ => self.two(operation, left, right),
+            _ => {
+                let node = self.two(operation, left, right);
+                self.folded(node)
+            }
         }
     }
 
@@ -148,9 +177,8 @@ impl Graph {
                     }
                     Recall::History(History::Slew) => {
                         let zero = self.number(0.0);
-                        (dx.is_some() || dtime.is_some()).then(|| {
-                            self.remember(Recall::SlewTangent, [x, time, dx.unwrap_or(zero), dtime.unwrap_or(zero)])
-                        })
+                        (dx.is_some() || dtime.is_some())
+                            .then(|| self.remember(Recall::SlewTangent, [x, time, dx.unwrap_or(zero), dtime.unwrap_or(zero)]))
                     }
                     Recall::LagByTime | Recall::DelayByTime | Recall::SlewTangent => {
                         unreachable!("derivatives are taken of formulas, not of derivatives")
@@ -347,7 +375,7 @@ mod tests {
     /// Values of some roots, with `p` and `q` among the symbols at other values.
     fn run(graph: &Graph, roots: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> Vec<Vec<f64>> {
         let [a, b] = columns();
-        let mut machine = Machine::new(graph, roots, number);
+        let mut machine = Machine::new(graph, roots, STEP_S, number).expect("a step and short delays");
         let inputs: Vec<usize> = machine.inputs().to_vec();
         let mut found = vec![Vec::new(); roots.len()];
         let block = machine.block();
@@ -364,7 +392,7 @@ mod tests {
 
     /// A formula with its symbols `p` and `q`.
     fn graph(text: &str, p: f64, q: f64) -> Result<(Graph, Node, [Node; 2])> {
-        let mut graph = Graph::new(STEP_S)?;
+        let mut graph = Graph::new();
         let symbols = [graph.symbol(p, true), graph.symbol(q, true)];
         let root = graph.add(&Formula::parse(text)?, &mut |_, name| {
             Ok(["p", "q"].iter().position(|known| *known == name).map(|index| symbols[index]))
@@ -453,9 +481,9 @@ mod tests {
 
     #[test]
     fn equal_parts_are_one_and_numbers_that_are_zero_leave_nothing_behind() -> Result<()> {
-        let mut graph = Graph::new(STEP_S)?;
+        let mut graph = Graph::new();
         let (off, on) = (graph.symbol(0.0, false), graph.symbol(2.0, false));
-        let mut add = |graph: &mut Graph, text: &str| {
+        let add = |graph: &mut Graph, text: &str| {
             graph.add(&Formula::parse(text)?, &mut |_, name| {
                 Ok(match name {
                     "off" => Some(off),

@@ -1,7 +1,7 @@
 //! Formulas put together into one graph in which equal parts are one node, whoever wrote them: a model is a chain of formulas that
 //! read each other, and many models that differ in little share the rest. Derivatives are in `derivative`, evaluation in `machine`.
 
-use super::memory::{MAX_DELAY_S, MAX_DELAY_SAMPLES};
+use super::memory::MAX_DELAY_S;
 use super::operation::{History, Operation};
 use super::{Formula, Instruction};
 use crate::error::{Error, Result};
@@ -48,9 +48,8 @@ pub(super) struct Symbol {
 }
 
 /// Formulas as one graph.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Graph {
-    pub(super) step_s: f64,
     pub(super) nodes: Vec<Kind>,
     /// The value of each node that is the same at all samples, with every symbol at its own value.
     pub(super) uniform: Vec<Option<f64>>,
@@ -60,23 +59,9 @@ pub struct Graph {
 }
 
 impl Graph {
-    /// An empty graph for samples that are `step_s` seconds apart.
-    ///
-    /// # Errors
-    /// [`Error::Config`] for a step that is not positive and finite.
-    pub fn new(step_s: f64) -> Result<Self> {
-        if !(step_s > 0.0 && step_s.is_finite()) {
-            let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
-            return Err(Error::Config { place: "formula".into(), field: "step_s".into(), found, expected });
-        }
-        Ok(Self {
-            step_s,
-            nodes: Vec::new(),
-            uniform: Vec::new(),
-            inputs: Vec::new(),
-            symbols: Vec::new(),
-            index: HashMap::new(),
-        })
+    /// An empty graph.
+    pub fn new() -> Self {
+        Self::default()
     }
 
     /// A number.
@@ -207,18 +192,13 @@ impl Graph {
             History::Lag | History::Delay => {
                 let (name, largest) = if history == History::Lag { ("lag", f64::MAX) } else { ("delay", MAX_DELAY_S) };
                 let Some(time_s) = value else {
-                    return Err(format!("the time of `{name}` must be a number or a parameter, not something that varies in flight"));
+                    return Err(format!(
+                        "the time of `{name}` must be a number or a parameter, not something that varies in flight"
+                    ));
                 };
                 if !(0.0..=largest).contains(&time_s) {
                     let limit = if history == History::Lag { String::new() } else { format!(" and at most {largest}") };
                     return Err(format!("the time of `{name}` is {time_s} s, expected at least 0{limit}"));
-                }
-                let samples = time_s / self.step_s;
-                if history == History::Delay && samples > MAX_DELAY_SAMPLES {
-                    let step_s = self.step_s;
-                    return Err(format!(
-                        "the time of `delay` is {time_s} s, {samples:.1e} samples of {step_s:e} s; at most {MAX_DELAY_SAMPLES:e} can be kept"
-                    ));
                 }
             }
             History::Rate => {}
@@ -245,12 +225,16 @@ impl Graph {
             Kind::Symbol(index) => Some(symbol(index as usize)),
             Kind::Input(_) => None,
             Kind::One(operation, operand) => of(operand).map(|value| operation.of_one(value)),
-            Kind::Two(operation, left, right) => of(left).zip(of(right)).map(|(left, right)| match whole_power(operation, Some(right)) {
-                Some(exponent) => left.powi(exponent),
-                None => operation.of_two(left, right),
-            }),
+            Kind::Two(operation, left, right) => {
+                of(left).zip(of(right)).map(|(left, right)| match whole_power(operation, Some(right)) {
+                    Some(exponent) => left.powi(exponent),
+                    None => operation.of_two(left, right),
+                })
+            }
             // At rest since ever: a lag, a delay or a slew passes a constant on, its rate and its derivatives are zero.
-            Kind::Recall(Recall::History(History::Rate) | Recall::LagByTime | Recall::DelayByTime, [signal, ..]) => of(signal).map(|_| 0.0),
+            Kind::Recall(Recall::History(History::Rate) | Recall::LagByTime | Recall::DelayByTime, [signal, ..]) => {
+                of(signal).map(|_| 0.0)
+            }
             Kind::Recall(Recall::History(_), [signal, ..]) => of(signal),
             Kind::Recall(Recall::SlewTangent, [signal, _, tangent, _]) => of(signal).and(of(tangent)),
         }
@@ -277,6 +261,11 @@ impl Graph {
             }
         }
         (0..self.nodes.len()).filter(|&index| needed[index]).map(|index| Node(index as u32)).collect()
+    }
+
+    /// Whether a value is made of any of these.
+    pub fn depends(&self, node: Node, on: &[Node]) -> bool {
+        self.behind(&[node]).iter().any(|part| on.contains(part))
     }
 
     /// The columns that a value is made of.

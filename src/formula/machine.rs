@@ -2,8 +2,8 @@
 //! code, block by block or one by one, so that both give the same bits.
 
 use super::graph::{Graph, Kind, Node, Recall, whole_power};
-use super::memory::Memory;
-use super::operation::Operation;
+use super::memory::{MAX_DELAY_SAMPLES, Memory};
+use super::operation::{History, Operation};
 use super::{Formula, Value};
 use crate::error::{Error, Result};
 use std::borrow::Cow;
@@ -62,8 +62,16 @@ impl Slots {
 }
 
 impl Machine {
-    /// Binds the values at `roots`; `number` gives the value of each symbol that varies, by its node, where it is not the symbol's own.
-    pub fn new(graph: &Graph, roots: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> Self {
+    /// Binds the values at `roots` to samples that are `step_s` seconds apart; `number` gives the value of each symbol that varies, by its
+    /// node, where it is not the symbol's own.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a step that is not positive and finite, or a delay of too many steps.
+    pub fn new(graph: &Graph, roots: &[Node], step_s: f64, number: &dyn Fn(Node) -> Option<f64>) -> Result<Self> {
+        if !(step_s > 0.0 && step_s.is_finite()) {
+            let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
+            return Err(Error::Config { place: "formula".into(), field: "step_s".into(), found, expected });
+        }
         let behind = graph.behind(roots);
         let uniform = uniform(graph, &behind, number);
         let mut last_use: HashMap<Node, usize> = HashMap::new();
@@ -79,10 +87,9 @@ impl Machine {
             Self { steps: Vec::new(), memory: Vec::new(), columns: Vec::new(), roots: Vec::new(), inputs: Vec::new(), block: 0 };
         let mut slots = Slots { count: 0, free: Vec::new(), of: HashMap::new() };
         // Columns of constants are filled once, so they are never given to anything else.
-        let constants: Vec<(Slot, f64)> =
-            behind.iter().filter_map(|node| Some((slots.take(*node), *uniform.get(node)?))).collect();
+        let constants: Vec<(Slot, f64)> = behind.iter().filter_map(|node| Some((slots.take(*node), *uniform.get(node)?))).collect();
         for (place, &node) in behind.iter().enumerate().filter(|(_, node)| !uniform.contains_key(node)) {
-            machine.step(graph, node, &uniform, &mut slots);
+            machine.step(graph, node, step_s, &uniform, &mut slots)?;
             let mut ended: Vec<Node> = graph.operands(node).filter(|operand| last_use.get(operand) == Some(&place)).collect();
             ended.sort_unstable();
             ended.dedup();
@@ -92,11 +99,11 @@ impl Machine {
         machine.block = (NUMBERS_AT_ONCE / slots.count.max(1)).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
         machine.columns = vec![vec![0.0; machine.block]; slots.count];
         constants.iter().for_each(|&(slot, value)| machine.columns[slot as usize].fill(value));
-        machine
+        Ok(machine)
     }
 
     /// Adds what computes one node.
-    fn step(&mut self, graph: &Graph, node: Node, uniform: &HashMap<Node, f64>, slots: &mut Slots) {
+    fn step(&mut self, graph: &Graph, node: Node, step_s: f64, uniform: &HashMap<Node, f64>, slots: &mut Slots) -> Result<()> {
         let of = |slots: &Slots, node: Node| slots.of[&node];
         let step = match graph.nodes[node.0 as usize] {
             Kind::Number(_) | Kind::Symbol(_) => unreachable!("a number is the same at all samples"),
@@ -117,13 +124,23 @@ impl Machine {
                 }
             }
             Kind::Recall(recall, [x, number, tangent, limit]) => {
-                let number = if recall == Recall::History(super::operation::History::Rate) { 0.0 } else { uniform[&number] };
-                self.memory.push(Memory::new(recall, number, graph.step_s));
+                let number = if recall == Recall::History(History::Rate) { 0.0 } else { uniform[&number] };
+                let samples = number / step_s;
+                if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) && samples > MAX_DELAY_SAMPLES {
+                    return Err(Error::Config {
+                        place: "formula".into(),
+                        field: "delay".into(),
+                        found: format!("{number} s, {samples:.1e} samples of {step_s:e} s"),
+                        expected: format!("at most {MAX_DELAY_SAMPLES:e} samples, which can be kept"),
+                    });
+                }
+                self.memory.push(Memory::new(recall, number, step_s));
                 let (x, tangents) = (of(slots, x), [of(slots, tangent), of(slots, limit)]);
                 Step::Recall { memory: self.memory.len() as u32 - 1, x, tangents, out: slots.take(node) }
             }
         };
         self.steps.push(step);
+        Ok(())
     }
 
     /// For each column that is read, its index in [`Graph::inputs`]; [`Machine::advance`] asks for them in this order.
@@ -203,9 +220,9 @@ pub struct StreamingFormula {
 
 impl StreamingFormula {
     fn build(formula: &Formula, step_s: f64, constant: &dyn Fn(&str) -> Option<f64>) -> Result<Self> {
-        let mut graph = Graph::new(step_s)?;
+        let mut graph = Graph::new();
         let root = graph.add(formula, &mut |graph, name| Ok(constant(name).map(|value| graph.number(value))))?;
-        let machine = Machine::new(&graph, &[root], &|_| None);
+        let machine = Machine::new(&graph, &[root], step_s, &|_| None)?;
         Ok(Self { inputs: graph.inputs().to_vec(), order: machine.inputs().to_vec(), machine })
     }
 

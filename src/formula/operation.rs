@@ -138,16 +138,46 @@ pub(super) mod binding {
 macro_rules! with_unary {
     ($operation:expr, $f:ident => $body:expr) => {
         match $operation {
-            Operation::Negate => { let $f = |x: f64| -x; $body }
-            Operation::Abs => { let $f = f64::abs; $body }
-            Operation::Sqrt => { let $f = f64::sqrt; $body }
-            Operation::Exp => { let $f = f64::exp; $body }
-            Operation::Log => { let $f = f64::ln; $body }
-            Operation::Sin => { let $f = f64::sin; $body }
-            Operation::Cos => { let $f = f64::cos; $body }
-            Operation::Tan => { let $f = f64::tan; $body }
-            Operation::Tanh => { let $f = f64::tanh; $body }
-            Operation::Sign => { let $f = |x: f64| if x == 0.0 || x.is_nan() { x } else { x.signum() }; $body }
+            Operation::Negate => {
+                let $f = |x: f64| -x;
+                $body
+            }
+            Operation::Abs => {
+                let $f = f64::abs;
+                $body
+            }
+            Operation::Sqrt => {
+                let $f = f64::sqrt;
+                $body
+            }
+            Operation::Exp => {
+                let $f = f64::exp;
+                $body
+            }
+            Operation::Log => {
+                let $f = f64::ln;
+                $body
+            }
+            Operation::Sin => {
+                let $f = f64::sin;
+                $body
+            }
+            Operation::Cos => {
+                let $f = f64::cos;
+                $body
+            }
+            Operation::Tan => {
+                let $f = f64::tan;
+                $body
+            }
+            Operation::Tanh => {
+                let $f = f64::tanh;
+                $body
+            }
+            Operation::Sign => {
+                let $f = |x: f64| if x == 0.0 || x.is_nan() { x } else { x.signum() };
+                $body
+            }
             _ => unreachable!("an operation of two operands"),
         }
     };
@@ -157,19 +187,58 @@ macro_rules! with_binary {
     ($operation:expr, $f:ident => $body:expr) => {{
         let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
         match $operation {
-            Operation::Add => { let $f = |x: f64, y: f64| x + y; $body }
-            Operation::Subtract => { let $f = |x: f64, y: f64| x - y; $body }
-            Operation::Multiply => { let $f = |x: f64, y: f64| x * y; $body }
-            Operation::Divide => { let $f = |x: f64, y: f64| x / y; $body }
-            Operation::Power => { let $f = f64::powf; $body }
-            Operation::Less => { let $f = |x: f64, y: f64| truth(x < y); $body }
-            Operation::LessOrEqual => { let $f = |x: f64, y: f64| truth(x <= y); $body }
-            Operation::Greater => { let $f = |x: f64, y: f64| truth(x > y); $body }
-            Operation::GreaterOrEqual => { let $f = |x: f64, y: f64| truth(x >= y); $body }
-            Operation::Atan2 => { let $f = f64::atan2; $body }
-            Operation::Min => { let $f = f64::min; $body }
-            Operation::Max => { let $f = f64::max; $body }
-            Operation::Hypot => { let $f = f64::hypot; $body }
+            Operation::Add => {
+                let $f = |x: f64, y: f64| x + y;
+                $body
+            }
+            Operation::Subtract => {
+                let $f = |x: f64, y: f64| x - y;
+                $body
+            }
+            Operation::Multiply => {
+                let $f = |x: f64, y: f64| x * y;
+                $body
+            }
+            Operation::Divide => {
+                let $f = |x: f64, y: f64| x / y;
+                $body
+            }
+            Operation::Power => {
+                let $f = f64::powf;
+                $body
+            }
+            Operation::Less => {
+                let $f = |x: f64, y: f64| truth(x < y);
+                $body
+            }
+            Operation::LessOrEqual => {
+                let $f = |x: f64, y: f64| truth(x <= y);
+                $body
+            }
+            Operation::Greater => {
+                let $f = |x: f64, y: f64| truth(x > y);
+                $body
+            }
+            Operation::GreaterOrEqual => {
+                let $f = |x: f64, y: f64| truth(x >= y);
+                $body
+            }
+            Operation::Atan2 => {
+                let $f = f64::atan2;
+                $body
+            }
+            Operation::Min => {
+                let $f = f64::min;
+                $body
+            }
+            Operation::Max => {
+                let $f = f64::max;
+                $body
+            }
+            Operation::Hypot => {
+                let $f = f64::hypot;
+                $body
+            }
             _ => unreachable!("an operation of one operand, or one that was taken apart"),
         }
     }};

@@ -52,7 +52,7 @@ const DEFINITIONS: [Definition; 9] = [
             coefficient("a_z", "1/s", "along body down (heave)").negative("drag that pushes"),
         ],
         parameters: &[],
-        terms: &[(0, Some("a_x"), "vx"), (1, Some("a_y"), "vy"), (2, Some("a_z"), "vz")],
+        terms: &[(0, Some("a_x"), "air_vx"), (1, Some("a_y"), "air_vy"), (2, Some("a_z"), "air_vz")],
         swaps: &[],
         notes: None,
     },

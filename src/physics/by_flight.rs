@@ -7,7 +7,7 @@
 //! differ by the prior alone), so each flight's b_f is eliminated by a triangular factor, which is exact; only the σ_c are iterated.
 //! Rows count as independent: with minutes of a flight the prior decides only what the data leave open.
 
-use super::least_squares::{Cluster, Factor, Failure, Fit};
+use super::least_squares::{Cluster, Factor, Failure, Fit, Hold};
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
@@ -33,6 +33,8 @@ pub(super) struct Shape<'a> {
     pub channels: &'a [Vec<usize>],
     /// What belongs to a flight.
     pub own: &'a Own,
+    /// What holds the common coefficients.
+    pub hold: Option<&'a Hold>,
 }
 
 /// What came out.
@@ -103,6 +105,9 @@ impl Shape<'_> {
             tops.push(triangle.rows(0, own).into_owned());
             common.add_factor(&triangle.view((own, own), (self.free + 1, self.free + 1)).into_owned(), rows, 1.0);
         }
+        if let Some(hold) = self.hold {
+            common.add_factor(&hold.factor(), 0, 1.0);
+        }
         let (triangle, rows) = common.finish();
         if rows <= self.free {
             return Err(Failure::TooFewRows(rows));
@@ -128,9 +133,10 @@ impl Shape<'_> {
 pub(super) fn settle(shape: &Shape<'_>, clusters: &mut [Cluster]) -> Result<Settled, Failure> {
     let parts = shape.parts(clusters);
     let own = shape.own_count();
-    let mut weights = vec![1.0; shape.channels.len()];
+    let mut weights = shape.hold.map_or_else(|| vec![1.0; shape.channels.len()], |hold| hold.weights.clone());
     let (mut values, mut flights) = shape.joint(&parts, &weights)?;
-    for _ in 0..MOST_ROUNDS {
+    // Where the weights are given, they are those of the step before; the next step has better ones.
+    for _ in 0..if shape.hold.is_some() { 0 } else { MOST_ROUNDS } {
         let mut sums = vec![(0.0, 0.0, 0); weights.len()];
         for (parts, of_flight) in parts.values().zip(&flights) {
             for part in parts {

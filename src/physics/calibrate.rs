@@ -1,16 +1,23 @@
-//! Calibration: the coefficients of a model's enabled effects by least squares on recorded flights (paper eq. 33), with units,
+//! Calibration: the numbers of a model's enabled effects by least squares on recorded flights (paper eq. 33), with units,
 //! 95 % intervals and a condition number; and a refusal that names the reason where the data do not determine them.
 //!
 //! What stands in which column is in `layout`, the algebra in `least_squares`, and coefficients that belong to a flight in `by_flight`.
 
 use super::by_flight;
 use super::catalogue;
+use super::columns::{Columns, Wanted};
+use super::compose::Free;
+use super::effect::Effect;
+use super::evaluate::standard_names;
 use super::layout::Layout;
-use super::least_squares::{Cluster, Failure, solve};
+use super::least_squares::{Cluster, Failure, Hold, residual, solve, step};
 use super::model::Model;
 use super::sign::{SignDoubt, SignFinding};
+use super::signal::{Stage, signal_named};
 use crate::error::{Error, Result};
-use crate::flight::{Flight, Span};
+use crate::flight::{Column, Flight, Span};
+use crate::formula::Formula;
+use nalgebra::DVector;
 use std::collections::BTreeMap;
 
 /// Clusters that the whole of the data is cut into for the intervals, unless it is cut into more by flights.
@@ -19,18 +26,25 @@ const CLUSTERS: usize = 40;
 /// Clusters are not made shorter than this, s.
 const SHORTEST_CLUSTER_S: f64 = 1.0;
 
-/// Formulas may read the values of other coefficients, so a calibration is repeated until those have settled; at most so often.
-const MOST_ROUNDS: usize = 8;
+/// Passes over the flights, at most; a model of twenty effects takes about ten.
+const MOST_ROUNDS: usize = 40;
 
-/// Coefficients that formulas read have settled when none moves by more than this share of itself.
-const SETTLED: f64 = 1e-9;
+/// Numbers have settled when none would move by more than this share of its standard error, were residuals independent. They are not,
+/// so the intervals are some times wider.
+const SETTLED: f64 = 1e-2;
 
-/// Share from which a person should know that they have not.
-const WORTH_SAYING: f64 = 1e-6;
+/// A standard error counts as at least this share of the number: where the flights know it to the last digit, that digit does not matter.
+const SMALLEST_ERROR: f64 = 1e-7;
 
-/// How far a round may go, in steps of the plain iteration.
-const SHORTEST_STRIDE: f64 = 0.2;
-const LONGEST_STRIDE: f64 = 4.0;
+/// Weight at first of what holds the numbers where they are, in independent samples that would know each to its usual size; and the
+/// factor by which it changes with each step that succeeds or fails (Levenberg 1944, Marquardt 1963). In units of the usual sizes, not of
+/// the columns: a number that the flights hardly know then moves no further than it may.
+const DAMPING: f64 = 1.0;
+const DAMPING_FACTOR: f64 = 10.0;
+const LARGEST_DAMPING: f64 = 1e12;
+
+/// Share of its usual size at which a coefficient starts whose effect has shape parameters: at 0 these do nothing, and have no slope.
+const START: f64 = 0.1;
 
 /// One calibrated coefficient.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -70,9 +84,9 @@ pub struct Calibration {
     pub rows: usize,
     /// Stretches of consecutive rows that the intervals rest on.
     pub clusters: usize,
-    /// Rounds it took; more than one if formulas read the values of coefficients.
+    /// Passes over the flights; one, if the model is linear in its numbers.
     pub rounds: usize,
-    /// Largest relative change, in the last round, of a coefficient that formulas read.
+    /// By how much a number would still move, in half intervals.
     pub last_change: f64,
     /// Coefficients whose sign physics fixes and this calibration does not show.
     #[serde(default)]
@@ -105,9 +119,9 @@ impl std::fmt::Display for Calibration {
                 _ => writeln!(f)?,
             }
         }
-        if self.last_change > WORTH_SAYING {
+        if self.last_change > SETTLED {
             let change = self.last_change;
-            writeln!(f, "coefficients that formulas read still moved by {change:.1e} of themselves after {} rounds", self.rounds)?;
+            writeln!(f, "numbers still moved by {change:.1e} of half their intervals after {} passes", self.rounds)?;
         }
         write!(
             f,
@@ -126,139 +140,351 @@ impl std::fmt::Display for Calibration {
     }
 }
 
-/// Fits the free coefficients of the enabled effects to the measured accelerations in `spans` and returns the model with the
-/// values and intervals set.
+/// Fits the numbers of the enabled effects to the measured accelerations in `spans` and returns the model with the values and
+/// intervals set: coefficients, and parameters that are not known beforehand (time constants, shapes).
 ///
-/// The regressand is the measured acceleration minus the terms without a coefficient. Every channel is fitted by itself in
-/// physical units, unweighted; channels that share a coefficient are fitted together, weighted by residual variance.
-/// Overlapping spans count once. Hidden state (lags, delays) runs from the start of each flight.
+/// Gauss-Newton: near its numbers the model is the sum of its columns, and each step is the least squares of these. A model that is linear in
+/// its numbers takes one step. The regressand is the measured acceleration minus what has no number. Every channel is fitted by itself in
+/// physical units, unweighted; channels that share a number are fitted together, weighted by residual variance. Steps are damped
+/// as far as they have to be for the likelihood to rise. Overlapping spans count once. Hidden state (lags, delays) runs from the start of
+/// each flight.
 ///
-/// Where formulas read the values of coefficients (a thrust, a predicted acceleration), the fit is repeated with the values found until
-/// those that are read have settled, at most eight times; if one that is read is still zero, the first fit leaves out the effects
-/// that read. Coefficients of a flight (wind, bias) are estimated with the others at once, with a prior from the
-/// catalogue; a flight outside the spans gets their mean, and the intervals of the others hold given them.
+/// If a coefficient of the baseline is still zero, the baseline is fitted first by itself: what scales with a thrust of zero vanishes. A
+/// parameter stays within its bounds; one whose effect is zero, or that is on a bound, is left where it is, without an interval. Coefficients of
+/// a flight (wind, bias) are estimated with the others at once, with a prior from the catalogue; a flight outside the spans gets
+/// their mean, and the intervals of the others hold given them.
 ///
 /// # Errors
-/// [`Error::Undetermined`] naming the coefficients and why the data do not determine them; otherwise as [`Model::predict`].
+/// [`Error::Undetermined`] naming the numbers and why the data do not determine them; otherwise as [`Model::predict`].
 pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
     model.check()?;
     if let Some(span) = spans.iter().find(|span| span.flight >= flights.len()) {
         let (found, expected) = (span.flight.to_string(), format!("an index of the {} flights", flights.len()));
         return Err(Error::Config { place: "calibrate".into(), field: "span.flight".into(), found, expected });
     }
-    let mut read: Vec<(usize, usize)> = Vec::new();
-    let mut bare = model.clone();
-    for (effect, left_out) in model.effects.iter().zip(&mut bare.effects).filter(|(effect, _)| effect.enabled) {
-        let reads = model.coefficients_read(effect)?;
-        left_out.enabled = reads.is_empty();
-        read.extend(reads);
+    let rows = Rows::of(flights, spans)?;
+    let mut current = started(model, &rows)?;
+    let mut pass = Pass::at(&current, &rows)?;
+    if pass.is_linear {
+        let solved = pass.solve(&current, &rows, None, true)?;
+        return Ok((solved.model.clone(), solved.calibration(&pass, &rows, 1, 0.0)));
     }
-    // Each once, or it would be moved more than once a round.
-    read.sort_unstable();
-    read.dedup();
-    let values = |model: &Model| -> Vec<f64> {
-        let value = |&(effect, index): &(usize, usize)| Some(model.effects.get(effect)?.coefficients.get(index)?.value);
-        read.iter().map(|place| value(place).unwrap_or_default()).collect()
-    };
+    let mut damping = DAMPING;
+    for round in 2..=MOST_ROUNDS {
+        let solved = pass.bounded(&current, &rows, damping)?;
+        if solved.largest_move <= SETTLED {
+            return pass.finished(&current, &rows, round - 1);
+        }
+        // A step may lead to where a formula is no number, or where the flights determine nothing: then it was too long.
+        match Pass::at(&solved.model, &rows) {
+            Ok(next) if next.cost <= pass.cost => {
+                (pass, current) = (next, solved.model);
+                damping /= DAMPING_FACTOR;
+            }
+            Ok(_) | Err(Error::Undetermined(_)) if damping < LARGEST_DAMPING => damping *= DAMPING_FACTOR,
+            Ok(_) => return pass.finished(&current, &rows, round),
+            Err(error) => return Err(error),
+        }
+    }
+    pass.finished(&current, &rows, MOST_ROUNDS)
+}
+
+/// A model from which steps lead somewhere: its baseline fitted if it is blank, and no amplitude of a shape at zero.
+fn started(model: &Model, rows: &Rows<'_>) -> Result<Model> {
     let mut current = model.clone();
-    if values(model).contains(&0.0) {
-        // A thrust of zero makes the regressors that scale with it vanish.
-        let (found, _) = fit(&bare, flights, spans)?;
+    if !model.effects.iter().any(|effect| effect.enabled && leans_on_others(model, effect)) {
+        return Ok(current);
+    }
+    let of_baseline = |kind: &str| catalogue::definition(kind).is_some_and(|definition| definition.notes.is_none());
+    let is_blank = |effect: &Effect| effect.coefficients.iter().any(|coefficient| coefficient.value == 0.0);
+    if model.effects.iter().any(|effect| effect.enabled && of_baseline(&effect.kind) && is_blank(effect)) {
+        let mut bare = model.clone();
+        bare.effects.iter_mut().for_each(|effect| effect.enabled &= of_baseline(&effect.kind));
+        let pass = Pass::at(&bare, rows)?;
+        let found = pass.solve(&bare, rows, None, false)?.model;
         for (effect, found) in current.effects.iter_mut().zip(found.effects).filter(|(_, found)| found.enabled) {
             effect.coefficients = found.coefficients;
         }
     }
-    // The rounds are a fixed-point iteration of the values read; its steps are lengthened or shortened by what the step before did (Irons &
-    // Tuck 1969, Int. J. Numerical Methods in Engineering 1:275), without which alike regressors settle slowly.
-    let mut round = 1;
-    let (mut stride, mut residual_before): (f64, Option<Vec<f64>>) = (1.0, None);
-    loop {
-        let before = values(&current);
-        let (found, mut calibration) = fit(&current, flights, spans)?;
-        let residual: Vec<f64> = values(&found)
-            .into_iter()
-            .zip(&before)
-            .map(|(now, before)| (now - before) / now.abs().max(before.abs()).max(f64::MIN_POSITIVE))
-            .collect();
-        let last_change = residual.iter().fold(0.0_f64, |largest, change| largest.max(change.abs()));
-        (calibration.rounds, calibration.last_change) = (round, last_change);
-        if last_change <= SETTLED || round == MOST_ROUNDS {
-            return Ok((found, calibration));
-        }
-        if let Some(earlier) = &residual_before {
-            let change: Vec<f64> = residual.iter().zip(earlier).map(|(now, earlier)| now - earlier).collect();
-            let along: f64 = change.iter().zip(earlier).map(|(change, earlier)| change * earlier).sum();
-            let square: f64 = change.iter().map(|change| change * change).sum();
-            stride = if square > 0.0 { (-stride * along / square).clamp(SHORTEST_STRIDE, LONGEST_STRIDE) } else { 1.0 };
-        }
-        current = found;
-        for (&(effect, index), before) in read.iter().zip(before) {
-            let coefficient = current.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
-            if let Some(coefficient) = coefficient {
-                coefficient.value = before + stride * (coefficient.value - before);
+    for effect in current.effects.iter_mut().filter(|effect| effect.enabled) {
+        let Some(definition) = catalogue::definition(&effect.kind) else { continue };
+        if effect.parameters.iter().any(|parameter| !parameter.fixed) {
+            for coefficient in effect.coefficients.iter_mut().filter(|c| c.value == 0.0 && c.by_flight.is_none()) {
+                let usual = definition.coefficient(&coefficient.name).and_then(|known| known.expected);
+                coefficient.value =
+                    START * usual.map_or(1.0, |[low, high]| if low < 0.0 && 0.0 < high { high } else { 0.5 * (low + high) });
             }
         }
-        residual_before = Some(residual);
-        round += 1;
+    }
+    Ok(current)
+}
+
+/// Whether an effect acts through the numbers of others: it changes a signal, reads one that the baseline makes, or reads a coefficient.
+fn leans_on_others(model: &Model, effect: &Effect) -> bool {
+    let reads = |name: &str| match signal_named(name) {
+        Some(signal) => signal.stage >= Stage::Rotor,
+        None => !standard_names().contains(&name) && effect.number_named(name).is_none() && model.coefficient_named(name).is_some(),
+    };
+    !effect.swaps.is_empty() || effect.formulas().flat_map(Formula::names).any(reads)
+}
+
+/// The rows that a calibration sees.
+struct Rows<'a> {
+    flights: &'a [Flight],
+    ranges: Vec<Vec<(usize, usize)>>,
+    /// Flights with rows, and how many clusters each is cut into.
+    jobs: Vec<(usize, usize)>,
+    total: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn of(flights: &'a [Flight], spans: &[Span]) -> Result<Self> {
+        let ranges: Vec<Vec<(usize, usize)>> = (0..flights.len()).map(|flight| union(flight, spans, flights)).collect();
+        let rows: Vec<usize> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum()).collect();
+        let total: usize = rows.iter().sum();
+        if total == 0 {
+            return Err(Error::Undetermined("no rows to calibrate on: the spans are empty; give at least one flight".into()));
+        }
+        Ok(Self { flights, ranges, jobs: cut(flights, &rows)?, total })
     }
 }
 
-/// One round: every formula reads the values that the model has.
-fn fit(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
-    let layout = Layout::of(model);
-    let ranges: Vec<Vec<(usize, usize)>> = (0..flights.len()).map(|flight| union(flight, spans, flights)).collect();
-    let rows: Vec<usize> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum()).collect();
-    let total: usize = rows.iter().sum();
-    if total == 0 {
-        return Err(Error::Undetermined("no rows to calibrate on: the spans are empty; give at least one flight".into()));
-    }
-    let jobs = cut(flights, &rows)?;
-    let reduce = |&(flight, clusters): &(usize, usize)| layout.reduce(model, flight, &flights[flight], &ranges[flight], clusters);
-    #[cfg(feature = "rayon")]
-    let reduced: Result<Vec<Vec<Cluster>>> = {
-        use rayon::prelude::*;
-        jobs.par_iter().map(reduce).collect()
-    };
-    #[cfg(not(feature = "rayon"))]
-    let reduced: Result<Vec<Vec<Cluster>>> = jobs.iter().map(reduce).collect();
-    let mut clusters: Vec<Cluster> = reduced?.into_iter().flatten().collect();
+/// A model's columns on the rows, at its present numbers.
+struct Pass {
+    layout: Layout,
+    clusters: Vec<Cluster>,
+    is_linear: bool,
+    /// One over the standard deviation of each channel's residual.
+    weights: Vec<f64>,
+    /// Minus twice the logarithm of the likelihood, the channels' variances being those of their residuals, but for a constant.
+    cost: f64,
+}
 
-    let mut calibrated = model.clone();
-    if !layout.own.is_empty() {
-        let shape = by_flight::Shape { free: layout.free.len(), channels: &layout.channels, own: &layout.own_columns(model) };
-        let settled = by_flight::settle(&shape, &mut clusters).map_err(|failure| layout.explain(model, &layout.free, &failure))?;
-        clusters = settled.clusters;
-        for (place, &(effect, index)) in layout.own.iter().enumerate() {
-            let coefficient = calibrated.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
-            let Some(coefficient) = coefficient else { continue };
-            let values: BTreeMap<String, f64> = settled
-                .values
-                .iter()
-                .filter_map(|(&flight, values)| Some((flights.get(flight)?.name.clone(), *values.get(place)?)))
-                .collect();
-            coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
-            (coefficient.ci95, coefficient.by_flight) = (None, Some(values));
+/// What one solution brought.
+struct Solved {
+    model: Model,
+    condition_number: f64,
+    clusters: usize,
+    /// By how much a number moved at most, in half intervals or, without these, in standard errors.
+    largest_move: f64,
+}
+
+impl Solved {
+    fn calibration(&self, pass: &Pass, rows: &Rows<'_>, rounds: usize, last_change: f64) -> Calibration {
+        let numbers = pass.layout.all();
+        Calibration {
+            coefficients: numbers.into_iter().filter_map(|(effect, index)| estimate(&self.model, effect, index)).collect(),
+            condition_number: self.condition_number,
+            rows: rows.total,
+            clusters: self.clusters,
+            rounds,
+            last_change,
+            signs: self.model.sign_doubts(),
         }
     }
-    let mut condition_number = 1.0_f64;
-    for (members, problem) in layout.problems() {
-        let solution = solve(&problem, &mut clusters).map_err(|failure| layout.explain(model, &members, &failure))?;
-        condition_number = condition_number.max(solution.condition_number);
-        if let Some(vague) = (0..members.len()).find(|&at| !solution.ci95[at].iter().all(|end| end.is_finite())) {
-            return Err(layout.explain(model, &members, &Failure::OneCluster(vague)));
+}
+
+impl Pass {
+    fn at(model: &Model, rows: &Rows<'_>) -> Result<Self> {
+        let mut columns = Columns::default();
+        let wanted = Wanted { parameters: true, ..Wanted::default() };
+        let regressors = columns.regressors(model, wanted)?;
+        let is_linear = columns.is_linear(model, &regressors, wanted)?;
+        let layout = Layout::of(model, regressors);
+        layout.check_complete(model)?;
+        let reduce = |&(flight, clusters): &(usize, usize)| {
+            layout.reduce((model, &columns), (flight, &rows.flights[flight]), &rows.ranges[flight], clusters)
+        };
+        #[cfg(feature = "rayon")]
+        let reduced: Result<Vec<Vec<Cluster>>> = {
+            use rayon::prelude::*;
+            rows.jobs.par_iter().map(reduce).collect()
+        };
+        #[cfg(not(feature = "rayon"))]
+        let reduced: Result<Vec<Vec<Cluster>>> = rows.jobs.iter().map(reduce).collect();
+        let clusters: Vec<Cluster> = reduced?.into_iter().flatten().collect();
+        let mut pass = Self { layout, clusters, is_linear, weights: Vec::new(), cost: 0.0 };
+        if !is_linear {
+            pass.weigh(model, rows);
         }
-        for ((&(effect, index), value), ci95) in members.iter().zip(&solution.values).zip(&solution.ci95) {
-            let coefficient = calibrated.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(index));
-            if let Some(coefficient) = coefficient {
-                (coefficient.value, coefficient.ci95) = (*value, Some(*ci95));
+        Ok(pass)
+    }
+
+    /// Residuals of the model at its numbers.
+    fn weigh(&mut self, model: &Model, rows: &Rows<'_>) {
+        let value = |&(effect, index): &Free, flight: usize| {
+            model.effects[effect].number(index).map_or(0.0, |number| number.in_flight(&rows.flights[flight].name))
+        };
+        let mut squares = vec![0.0; Column::TARGETS.len()];
+        for cluster in &mut self.clusters {
+            for (channel, factor) in cluster.factors.iter_mut().enumerate() {
+                let free = self.layout.channels[channel].iter().map(|&column| value(&self.layout.free[column], cluster.flight));
+                let own = self.layout.own_channels[channel].iter().map(|&column| value(&self.layout.own[column], cluster.flight));
+                let values = DVector::from_iterator(factor.width() - 1, free.chain(own));
+                squares[channel] += residual(factor.finish().0, &values).norm_squared();
+            }
+        }
+        let deviations = self.layout.own_columns(model).deviations;
+        let mut prior = 0.0;
+        for &(flight, _) in &rows.jobs {
+            prior += self
+                .layout
+                .own
+                .iter()
+                .zip(&deviations)
+                .map(|(own, deviation)| (value(own, flight) / deviation).powi(2))
+                .sum::<f64>();
+        }
+        let count = rows.total as f64;
+        self.weights = squares.iter().map(|squares| (count / squares.max(f64::MIN_POSITIVE)).sqrt()).collect();
+        self.cost = prior + squares.iter().map(|squares| count * (squares.max(f64::MIN_POSITIVE) / count).ln()).sum::<f64>();
+    }
+
+    /// A damped step that leaves no parameter beyond its bounds: the one that goes furthest is put on its bound, until none is left.
+    fn bounded(&self, model: &Model, rows: &Rows<'_>, damping: f64) -> Result<Solved> {
+        let mut held: BTreeMap<Free, f64> = BTreeMap::new();
+        loop {
+            let solved = self.solve(model, rows, Some((damping, &held)), false)?;
+            let beyond = self.layout.free.iter().filter(|free| !held.contains_key(*free)).filter_map(|&free| {
+                let [low, high] = parameter_bounds(model, free)?;
+                let value = solved.model.effects[free.0].number(free.1)?.value;
+                let excess = (low - value).max(value - high);
+                (excess > 0.0).then(|| (excess / usual_size(model, free), free, value.clamp(low, high)))
+            });
+            match beyond.max_by(|left, right| left.0.total_cmp(&right.0)) {
+                None => return Ok(solved),
+                Some((_, free, bound)) => drop(held.insert(free, bound)),
             }
         }
     }
-    let coefficients = layout.all().into_iter().filter_map(|(effect, index)| estimate(&calibrated, effect, index)).collect();
-    let signs = calibrated.sign_doubts();
-    let calibration =
-        Calibration { coefficients, condition_number, rows: total, clusters: clusters.len(), rounds: 1, last_change: 0.0, signs };
-    Ok((calibrated, calibration))
+
+    /// The model at its numbers, with the intervals of a step that is not damped.
+    fn finished(&self, model: &Model, rows: &Rows<'_>, rounds: usize) -> Result<(Model, Calibration)> {
+        let on_bound = |free: &&Free| {
+            let value = model.effects[free.0].number(free.1).map(|number| number.value);
+            parameter_bounds(model, **free).zip(value).is_some_and(|([low, high], value)| value <= low || value >= high)
+        };
+        let held: BTreeMap<Free, f64> = self
+            .layout
+            .free
+            .iter()
+            .filter(on_bound)
+            .filter_map(|&free| Some((free, model.effects[free.0].number(free.1)?.value)))
+            .collect();
+        let mut solved = self.solve(model, rows, Some((0.0, &held)), true)?;
+        for &(effect, index) in &self.layout.free {
+            let before = model.effects[effect].number(index).map_or(0.0, |number| number.value);
+            if let Some((value, ci95)) = solved.model.effects[effect].number_mut(index) {
+                let moved = *value - before;
+                *ci95 = ci95.map(|ends| ends.map(|end| end - moved)).filter(|_| !held.contains_key(&(effect, index)));
+                *value = before;
+            }
+        }
+        let last_change = solved.largest_move;
+        let calibration = solved.calibration(self, rows, rounds, last_change);
+        Ok((solved.model, calibration))
+    }
+
+    /// Least squares of the columns, by groups of channels that share numbers; damped and with some numbers held where that is asked for.
+    fn solve(
+        &self,
+        model: &Model,
+        rows: &Rows<'_>,
+        damped: Option<(f64, &BTreeMap<Free, f64>)>,
+        with_intervals: bool,
+    ) -> Result<Solved> {
+        let layout = &self.layout;
+        let mut clusters = self.clusters.clone();
+        let mut found = model.clone();
+        let hold = |members: &[Free]| {
+            damped.map(|(damping, held)| Hold {
+                weights: self.weights.clone(),
+                rows: members
+                    .iter()
+                    .map(|free| match held.get(free) {
+                        Some(&bound) => (1e9 / usual_size(model, *free), bound),
+                        None => (
+                            damping.sqrt() / usual_size(model, *free),
+                            model.effects[free.0].number(free.1).map_or(0.0, |number| number.value),
+                        ),
+                    })
+                    .collect(),
+            })
+        };
+        if !layout.own.is_empty() {
+            let all = hold(&layout.free);
+            let shape = by_flight::Shape {
+                free: layout.free.len(),
+                channels: &layout.channels,
+                own: &layout.own_columns(model),
+                hold: all.as_ref(),
+            };
+            let settled =
+                by_flight::settle(&shape, &mut clusters).map_err(|failure| layout.explain(model, &layout.free, &failure))?;
+            clusters = settled.clusters;
+            for (place, &(effect, index)) in layout.own.iter().enumerate() {
+                let coefficient = &mut found.effects[effect].coefficients[index];
+                let values: BTreeMap<String, f64> = settled
+                    .values
+                    .iter()
+                    .filter_map(|(&flight, values)| Some((rows.flights.get(flight)?.name.clone(), *values.get(place)?)))
+                    .collect();
+                coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
+                (coefficient.ci95, coefficient.by_flight) = (None, Some(values));
+            }
+        }
+        let (mut condition_number, mut largest_move) = (1.0_f64, 0.0_f64);
+        for (members, problem) in layout.problems() {
+            let failed = |failure: Failure| layout.explain(model, &members, &failure);
+            let hold = hold(&members);
+            let (values, errors, ci95): (Vec<f64>, Vec<f64>, Vec<Option<[f64; 2]>>) = if with_intervals {
+                let solution = solve(&problem, &mut clusters, hold.as_ref()).map_err(failed)?;
+                condition_number = condition_number.max(solution.condition_number);
+                if let Some(vague) = (0..members.len()).find(|&at| !solution.ci95[at].iter().all(|end| end.is_finite())) {
+                    return Err(failed(Failure::OneCluster(vague)));
+                }
+                let halves = solution.ci95.iter().map(|[low, high]| 0.5 * (high - low)).collect();
+                (solution.values, halves, solution.ci95.into_iter().map(Some).collect())
+            } else {
+                let step = step(&problem, &mut clusters, hold.as_ref()).map_err(failed)?;
+                condition_number = condition_number.max(step.fit.condition_number());
+                let errors = (0..members.len()).map(|at| step.fit.standard_error(at)).collect();
+                (step.fit.values.iter().copied().collect(), errors, vec![None; members.len()])
+            };
+            for (at, &(effect, index)) in members.iter().enumerate() {
+                // On a bound to the last digit.
+                let value = damped.and_then(|(_, held)| held.get(&(effect, index)).copied()).unwrap_or(values[at]);
+                if let Some((known, interval)) = found.effects[effect].number_mut(index) {
+                    let error = errors[at].max(SMALLEST_ERROR * value.abs());
+                    if error > 0.0 {
+                        largest_move = largest_move.max((value - *known).abs() / error);
+                    }
+                    (*known, *interval) = (value, ci95[at]);
+                }
+            }
+        }
+        Ok(Solved { model: found, condition_number, clusters: clusters.len(), largest_move })
+    }
+}
+
+/// Bounds of a parameter; coefficients have none here.
+fn parameter_bounds(model: &Model, (effect, index): Free) -> Option<[f64; 2]> {
+    let effect = model.effects.get(effect)?;
+    let parameter = effect.parameters.get(index.checked_sub(effect.coefficients.len())?)?;
+    Some(catalogue::definition(&effect.kind)?.parameter(&parameter.name)?.bounds)
+}
+
+/// About how large a number usually is.
+fn usual_size(model: &Model, (effect, index): Free) -> f64 {
+    let effect = &model.effects[effect];
+    let Some(number) = effect.number(index) else { return 1.0 };
+    let definition = catalogue::definition(&effect.kind);
+    let expected = definition.and_then(|definition| definition.coefficient(&number.name)).and_then(|known| known.expected);
+    match expected {
+        Some([low, high]) => low.abs().max(high.abs()),
+        None if number.value != 0.0 => number.value.abs(),
+        None => 1.0,
+    }
 }
 
 /// How many clusters each flight with rows is cut into.
@@ -288,18 +514,18 @@ fn cut(flights: &[Flight], rows: &[usize]) -> Result<Vec<(usize, usize)>> {
 
 fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {
     let effect = model.effects.get(effect)?;
-    let coefficient = effect.coefficients.get(index)?;
+    let number = effect.number(index)?;
+    let definition = catalogue::definition(&effect.kind);
+    let of_coefficient = definition.and_then(|definition| definition.coefficient(&number.name)).map(|known| known.bounds);
+    let of_parameter = definition.and_then(|definition| definition.parameter(&number.name)).map(|known| known.bounds);
     Some(Estimate {
         effect: effect.name.clone(),
-        name: coefficient.name.clone(),
-        value: coefficient.value,
-        ci95: coefficient.ci95,
-        unit: coefficient.unit.clone(),
-        bounds: catalogue::definition(&effect.kind)
-            .and_then(|definition| definition.coefficient(&coefficient.name))
-            .map(|definition| definition.bounds)
-            .filter(|bounds| bounds.iter().all(|bound| bound.is_finite())),
-        by_flight: coefficient.by_flight.clone(),
+        name: number.name,
+        value: number.value,
+        ci95: number.ci95,
+        unit: number.unit,
+        bounds: of_coefficient.or(of_parameter).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())),
+        by_flight: number.by_flight,
     })
 }
 

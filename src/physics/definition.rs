@@ -191,6 +191,20 @@ pub struct SwapDefinition {
     pub within: &'static [&'static str],
 }
 
+impl SwapDefinition {
+    /// The same for these effects alone.
+    #[must_use]
+    pub const fn within(mut self, effects: &'static [&'static str]) -> Self {
+        self.within = effects;
+        self
+    }
+}
+
+/// A change to a signal for all who read it.
+pub const fn change(name: &'static str, with: &'static str) -> SwapDefinition {
+    SwapDefinition { name, with, within: &[] }
+}
+
 /// What a search and a person need to know about an effect that may be missing.
 #[derive(Clone, Copy, Debug)]
 pub struct Notes {
@@ -210,7 +224,7 @@ pub struct Notes {
 
 /// A built-in effect.
 ///
-/// Formulas may name, besides columns and their own parameters, the model's numbers (`mass_kg`, `ix`, …) and the current value of
+/// Formulas may name, besides columns, [signals](super::SIGNALS) and their own numbers, the model's numbers (`mass_kg`, `ix`, …) and
 /// a coefficient of another effect as `<effect>_<coefficient>`, for example `control_moment_c_x`.
 #[derive(Clone, Copy, Debug)]
 pub struct Definition {
@@ -251,6 +265,7 @@ impl Definition {
             },
             unit: definition.unit.into(),
             fixed: definition.grid.is_empty(),
+            ci95: None,
         };
         // Formulas here are constants of this crate; a test parses each.
         let parse = |text: &str| Formula::parse(text).expect("a built-in formula parses");

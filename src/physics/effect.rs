@@ -1,5 +1,6 @@
 //! An effect: one named piece of physics, as terms in the formula grammar. Data only; evaluation is in `evaluate`.
 
+use super::compose::check_changeable;
 use super::evaluate::standard_names;
 use crate::error::{Error, Result};
 use crate::flight::Column;
@@ -56,7 +57,7 @@ impl Coefficient {
     }
 }
 
-/// A number inside a regressor that calibration leaves alone: geometry, a time constant.
+/// A number inside a formula: geometry, which is known, or a time constant, which calibration finds.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameter {
     /// Name under which the formulas of the effect use it.
@@ -65,16 +66,34 @@ pub struct Parameter {
     pub value: f64,
     /// Unit.
     pub unit: String,
-    /// Known beforehand (geometry), as against chosen by a search.
+    /// Known beforehand (geometry), as against found by a search or a calibration.
     pub fixed: bool,
+    /// 95 % confidence interval of the last calibration.
+    #[serde(default)]
+    pub ci95: Option<[f64; 2]>,
 }
 
-/// A signal that the other effects should see changed: a servo lag replaces `u1` by `lag(u1, tau_s)`. It has no coefficient.
+impl Parameter {
+    /// As a number that calibration finds.
+    pub(super) fn as_coefficient(&self) -> Coefficient {
+        Coefficient {
+            name: self.name.clone(),
+            value: self.value,
+            unit: self.unit.clone(),
+            ci95: self.ci95,
+            meaning: String::new(),
+            by_flight: None,
+        }
+    }
+}
+
+/// A change to a [signal](super::SIGNALS) that the other effects read: a servo lag makes `lag(u1, tau_s)` of `u1`, a ground effect
+/// `thrust * (1 + k * …)` of `thrust`. The formula may read the coefficients of its effect.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Swap {
-    /// Name replaced in the regressors.
+    /// The signal or quantity that is changed.
     pub name: String,
-    /// What stands there instead; it may use `name` itself and the parameters of the effect that owns the swap.
+    /// What it becomes; all changes of one effect are made from what was before.
     pub with: Formula,
     /// Names of the effects it changes; empty means all.
     pub within: Vec<String>,
@@ -110,11 +129,35 @@ impl Effect {
     /// [`Error::Formula`] if the text is no formula.
     pub fn formula(name: impl Into<String>, channel: usize, formula: &str, value: f64) -> Result<Self> {
         let unit = Column::TARGETS.get(channel).map_or("1", |column| column.unit());
-        Ok(Self {
+        let term = Term { channel, coefficient: Some(FORMULA_COEFFICIENT.into()), regressor: Formula::parse(formula)? };
+        Ok(Self { terms: vec![term], ..Self::own(name.into(), unit, value) })
+    }
+
+    /// A user's own effect that adds `coefficient * formula` to a [signal](super::SIGNALS): whatever reads the signal sees it.
+    ///
+    /// ```
+    /// use phyture::physics::Effect;
+    /// let gusty_head = Effect::change("blade_twist", "thrust", "thrust * hypot(air_vx, air_vy)", 0.01)?;
+    /// assert_eq!(gusty_head.to_string(), "thrust := thrust + 0.01 * (thrust * hypot(air_vx, air_vy))");
+    /// # Ok::<(), phyture::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::Formula`] if the text is no formula.
+    pub fn change(name: impl Into<String>, signal: &str, formula: &str, value: f64) -> Result<Self> {
+        let unit = super::signal_named(signal).map_or("1", |signal| signal.unit);
+        let formula = Formula::parse(formula)?;
+        let with = Formula::parse(&format!("{signal} + {FORMULA_COEFFICIENT} * ({formula})"))?;
+        Ok(Self { swaps: vec![Swap { name: signal.into(), with, within: Vec::new() }], ..Self::own(name.into(), unit, value) })
+    }
+
+    /// A user's own effect without a formula yet.
+    fn own(name: String, unit: &str, value: f64) -> Self {
+        Self {
             kind: FORMULA_KIND.into(),
-            name: name.into(),
+            name,
             meaning: "a formula of the user".into(),
-            terms: vec![Term { channel, coefficient: Some(FORMULA_COEFFICIENT.into()), regressor: Formula::parse(formula)? }],
+            terms: Vec::new(),
             coefficients: vec![Coefficient {
                 name: FORMULA_COEFFICIENT.into(),
                 value,
@@ -127,7 +170,43 @@ impl Effect {
             swaps: Vec::new(),
             enabled: true,
             added_by: None,
-        })
+        }
+    }
+
+    /// What a user's own effect adds to the signal that it changes: the signal's name and the formula.
+    pub(super) fn own_change(&self) -> Option<(&str, String)> {
+        let swap = self.swaps.first().filter(|_| self.kind == FORMULA_KIND)?;
+        let text = swap.with.to_string();
+        let formula = text.strip_prefix(&format!("{} + {FORMULA_COEFFICIENT} * ", swap.name))?;
+        let inner = formula.strip_prefix('(').and_then(|rest| rest.strip_suffix(')'));
+        let whole = inner.filter(|inner| Formula::parse(inner).is_ok()).unwrap_or(formula);
+        Some((&swap.name, whole.to_owned()))
+    }
+
+    /// All formulas: of its terms, then of what it changes.
+    pub fn formulas(&self) -> impl Iterator<Item = &Formula> {
+        self.terms.iter().map(|term| &term.regressor).chain(self.swaps.iter().map(|swap| &swap.with))
+    }
+
+    /// Index of a number by name: coefficients first, then parameters.
+    pub(super) fn number_named(&self, name: &str) -> Option<usize> {
+        let names = self.coefficients.iter().map(|coefficient| &coefficient.name);
+        names.chain(self.parameters.iter().map(|parameter| &parameter.name)).position(|known| known == name)
+    }
+
+    /// A number by index, as a coefficient.
+    pub(super) fn number(&self, index: usize) -> Option<Coefficient> {
+        let parameter = || self.parameters.get(index - self.coefficients.len()).map(Parameter::as_coefficient);
+        self.coefficients.get(index).cloned().or_else(parameter)
+    }
+
+    /// Value and interval of a number by index, to change them.
+    pub(super) fn number_mut(&mut self, index: usize) -> Option<(&mut f64, &mut Option<[f64; 2]>)> {
+        let coefficients = self.coefficients.len();
+        if let Some(coefficient) = self.coefficients.get_mut(index) {
+            return Some((&mut coefficient.value, &mut coefficient.ci95));
+        }
+        self.parameters.get_mut(index - coefficients).map(|parameter| (&mut parameter.value, &mut parameter.ci95))
     }
 
     /// A coefficient by name.
@@ -143,7 +222,7 @@ impl Effect {
     /// What a person should know of a user's own formula that looks back: it has a coefficient of its own, and in closed loop what a pilot
     /// or a controller did and felt a moment ago tells of the gust that still blows. The catalogue's lags and delays have none.
     pub fn caution(&self) -> Option<String> {
-        let looks_back = self.kind == FORMULA_KIND && self.terms.iter().any(|term| term.regressor.remembers());
+        let looks_back = self.kind == FORMULA_KIND && self.formulas().any(Formula::remembers);
         looks_back.then(|| {
             format!(
                 "the formula of `{}` reads earlier samples and has a free coefficient: in closed loop such a term can explain gusts, whatever \
@@ -174,12 +253,16 @@ impl Effect {
         }
         for swap in &self.swaps {
             self.check_inputs(&swap.with)?;
+            if let Some(found) = check_changeable(swap) {
+                return fault("changes", found, "a signal of the model, as `phyture effect signals` lists them");
+            }
         }
         for coefficient in &self.coefficients {
             if !coefficient.value.is_finite() {
                 return fault(&coefficient.name, coefficient.value.to_string(), "a finite number");
             }
-            if !self.terms.iter().any(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
+            let is_read = self.formulas().flat_map(Formula::names).any(|name| name == coefficient.name);
+            if !is_read && !self.terms.iter().any(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
                 return fault(&coefficient.name, "listed but used by no term".into(), "a coefficient that a term multiplies");
             }
         }
@@ -230,7 +313,12 @@ impl fmt::Display for Effect {
             gap = "\n";
         }
         for swap in &self.swaps {
-            write!(f, "{gap}{} := {}", swap.name, swap.with)?;
+            let number = |name: &str| {
+                let value = self.number_named(name).and_then(|index| self.number(index)).map(|number| number.value)?;
+                Formula::parse(&if value < 0.0 { format!("({value:?})") } else { format!("{value:?}") }).ok()
+            };
+            let with = swap.with.substitute(&number).unwrap_or_else(|_| swap.with.clone());
+            write!(f, "{gap}{} := {with}", swap.name)?;
             gap = "\n";
         }
         Ok(())

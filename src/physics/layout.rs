@@ -1,53 +1,76 @@
-//! Which coefficient stands behind which column of which channel, and the reduction of flights to those columns. What is then
+//! Which number stands behind which column of which channel, and the reduction of flights to those columns. What is then
 //! solved, and how often, is calibration's business.
 
 use super::by_flight;
 use super::catalogue;
-use super::evaluate::{Place, Program, not_finite};
+use super::columns::{Columns, Regressor};
+use super::compose::Free;
+use super::evaluate::not_finite;
 use super::least_squares::{Cluster, Factor, Failure, Problem};
 use super::model::Model;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight};
+use crate::formula::Node;
 
-/// One coefficient: indices of its effect and of itself in the effect.
-pub(super) type Free = (usize, usize);
-
-/// Which coefficient stands behind which column of which channel: first those common to all flights, then those of a flight, and
+/// Which number stands behind which column of which channel: first those common to all flights, then those of a flight, and
 /// last the regressand.
 pub(super) struct Layout {
-    /// Coefficients common to all flights.
+    /// Numbers common to all flights.
     pub free: Vec<Free>,
     /// For each channel, its columns as indices into `free`.
     pub channels: Vec<Vec<usize>>,
     /// Coefficients that belong to a flight.
     pub own: Vec<Free>,
     /// For each channel, its further columns as indices into `own`.
-    own_channels: Vec<Vec<usize>>,
+    pub own_channels: Vec<Vec<usize>>,
+    regressors: Vec<Regressor>,
 }
 
 impl Layout {
-    pub(super) fn of(model: &Model) -> Self {
+    pub(super) fn of(model: &Model, regressors: Vec<Regressor>) -> Self {
         let none = || vec![Vec::new(); Column::TARGETS.len()];
-        let mut layout = Self { free: Vec::new(), channels: none(), own: Vec::new(), own_channels: none() };
-        for (effect_index, effect) in model.effects.iter().enumerate().filter(|(_, effect)| effect.enabled) {
-            for (index, coefficient) in effect.coefficients.iter().enumerate() {
-                let (known, channels) = match coefficient.by_flight {
-                    None => (&mut layout.free, &mut layout.channels),
-                    Some(_) => (&mut layout.own, &mut layout.own_channels),
-                };
-                let column = known.len();
-                known.push((effect_index, index));
-                for term in effect.terms.iter().filter(|term| term.coefficient.as_ref() == Some(&coefficient.name)) {
-                    if let Some(columns) = channels.get_mut(term.channel).filter(|columns| columns.last() != Some(&column)) {
-                        columns.push(column);
-                    }
-                }
+        let mut layout = Self { free: Vec::new(), channels: none(), own: Vec::new(), own_channels: none(), regressors };
+        for regressor in &layout.regressors {
+            let Some(number) = regressor.number else { continue };
+            let place = (regressor.effect, number);
+            let belongs_to_flight = model.effects[place.0].number(number).is_some_and(|number| number.by_flight.is_some());
+            let known = if belongs_to_flight { &mut layout.own } else { &mut layout.free };
+            if !known.contains(&place) {
+                known.push(place);
             }
         }
+        layout.free.sort_unstable();
+        layout.own.sort_unstable();
+        for regressor in &layout.regressors {
+            let Some(number) = regressor.number else { continue };
+            let place = (regressor.effect, number);
+            let (known, channels) = match layout.free.binary_search(&place) {
+                Ok(index) => (index, &mut layout.channels),
+                Err(_) => (layout.own.binary_search(&place).expect("listed above"), &mut layout.own_channels),
+            };
+            let columns = &mut channels[regressor.channel];
+            if !columns.contains(&known) {
+                columns.push(known);
+            }
+        }
+        layout.channels.iter_mut().chain(&mut layout.own_channels).for_each(|columns| columns.sort_unstable());
         layout
     }
 
-    /// Every coefficient that is found, in the order of the model.
+    /// Refuses coefficients that act nowhere, whatever their value: what they multiply is zero.
+    pub(super) fn check_complete(&self, model: &Model) -> Result<()> {
+        for (index, effect) in model.effects.iter().enumerate().filter(|(_, effect)| effect.enabled) {
+            for coefficient in 0..effect.coefficients.len() {
+                let place = (index, coefficient);
+                if !self.free.contains(&place) && !self.own.contains(&place) {
+                    return Err(self.explain(model, &[place], &Failure::Zero(0)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Every number that is found, in the order of the model.
     pub(super) fn all(&self) -> Vec<Free> {
         let mut all: Vec<Free> = self.free.iter().chain(&self.own).copied().collect();
         all.sort_unstable();
@@ -67,15 +90,15 @@ impl Layout {
         }
     }
 
-    /// Column of a term in its channel; `None` for fixed terms.
-    fn column(&self, place: Place) -> Option<usize> {
-        let wanted = Some((place.effect, place.coefficient?));
-        let columns = self.channels.get(place.channel)?;
-        if let Some(free) = self.free.iter().position(|&free| Some(free) == wanted) {
+    /// Column of a regressor in its channel; `None` for what is fixed.
+    fn column(&self, regressor: &Regressor) -> Option<usize> {
+        let wanted = (regressor.effect, regressor.number?);
+        let columns = &self.channels[regressor.channel];
+        if let Ok(free) = self.free.binary_search(&wanted) {
             return columns.iter().position(|&column| column == free);
         }
-        let own = self.own.iter().position(|&own| Some(own) == wanted)?;
-        self.own_channels.get(place.channel)?.iter().position(|&column| column == own).map(|column| columns.len() + column)
+        let own = self.own.binary_search(&wanted).ok()?;
+        self.own_channels[regressor.channel].iter().position(|&column| column == own).map(|column| columns.len() + column)
     }
 
     /// Columns of each channel without the regressand.
@@ -86,60 +109,54 @@ impl Layout {
     /// Reduces the chosen rows of one flight to clusters of about equal length.
     pub(super) fn reduce(
         &self,
-        model: &Model,
-        index: usize,
-        flight: &Flight,
+        (model, columns): (&Model, &Columns),
+        (index, flight): (usize, &Flight),
         ranges: &[(usize, usize)],
         clusters: usize,
     ) -> Result<Vec<Cluster>> {
-        let mut program = Program::for_flight(model, flight)?;
-        let places: Vec<Place> = program.places().collect();
-        let targets: Vec<Option<usize>> = places.iter().map(|&place| self.column(place)).collect();
+        let nodes: Vec<Node> = self.regressors.iter().map(|regressor| regressor.node).collect();
+        let targets: Vec<Option<usize>> = self.regressors.iter().map(|regressor| self.column(regressor)).collect();
         let empty = Cluster { flight: index, factors: self.widths().map(|columns| Factor::new(columns + 1)).collect() };
         let mut reduced = vec![empty; clusters];
         let rows: usize = ranges.iter().map(|range| range.1 - range.0).sum();
         let mut seen = 0;
         let mut pieces: Vec<(usize, usize)> = ranges.to_vec();
         pieces.reverse();
-        program.run(flight, ranges.last().map_or(0, |range| range.1), &mut |block, values| {
-            // One matrix a channel: its regressors, then the measured acceleration minus the fixed terms.
-            let mut matrices: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.channels.len());
-            for (columns, target) in self.widths().zip(Column::TARGETS) {
-                let mut matrix = vec![vec![0.0; block.len()]; columns];
-                matrix.push(flight.column(target).get(block.clone()).unwrap_or_default().to_vec());
-                matrices.push(matrix);
+        // One matrix a channel: its regressors, then the measured acceleration minus what is fixed.
+        let mut matrices: Vec<Vec<Vec<f64>>> = self.widths().map(|columns| vec![Vec::new(); columns + 1]).collect();
+        columns.evaluate(&nodes, flight, ranges.last().map_or(0, |range| range.1), &mut |range, values| {
+            for (matrix, target) in matrices.iter_mut().zip(Column::TARGETS) {
+                matrix.iter_mut().for_each(|column| column.clear());
+                let (measured, columns) = matrix.split_last_mut().expect("the regressand is there");
+                measured.extend_from_slice(&flight.column(target)[range.clone()]);
+                columns.iter_mut().for_each(|column| column.resize(range.len(), 0.0));
             }
-            for ((place, target), values) in places.iter().zip(&targets).zip(values) {
-                let Some(matrix) = matrices.get_mut(place.channel) else { continue };
+            for (place, (regressor, target)) in self.regressors.iter().zip(&targets).enumerate() {
+                let matrix = &mut matrices[regressor.channel];
                 let (column, sign) = match target {
-                    Some(column) => (matrix.get_mut(*column), 1.0),
-                    None => (matrix.last_mut(), -1.0),
+                    Some(column) => (*column, 1.0),
+                    None => (matrix.len() - 1, -1.0),
                 };
-                for (sum, value) in column.into_iter().flatten().zip(values) {
-                    *sum += sign * value;
-                }
+                matrix[column].iter_mut().zip(values.column(place)).for_each(|(sum, value)| *sum += sign * value);
             }
             while let Some((start, end)) = pieces.pop() {
-                if start >= block.end {
+                if start >= range.end {
                     pieces.push((start, end));
                     break;
                 }
                 // As far as this block and this row's cluster reach: row i belongs to cluster floor(i clusters / rows).
                 let cluster = seen * clusters / rows;
                 let cluster_end = ((cluster + 1) * rows).div_ceil(clusters);
-                let stop = end.min(block.end).min(start + cluster_end - seen);
-                let part = start - block.start..stop - block.start;
-                for ((place, _), values) in places.iter().zip(&targets).zip(values) {
-                    if let Some(at) = values.iter().skip(part.start).take(part.len()).position(|value| !value.is_finite()) {
-                        return Err(not_finite(model, flight, *place, start + at));
+                let stop = end.min(range.end).min(start + cluster_end - seen);
+                let part = start - range.start..stop - range.start;
+                for (place, regressor) in self.regressors.iter().enumerate() {
+                    if let Some(at) = values.column(place)[part.clone()].iter().position(|value| !value.is_finite()) {
+                        return Err(not_finite(model, flight, (regressor.effect, regressor.channel), start + at));
                     }
                 }
-                if let Some(cluster) = reduced.get_mut(cluster) {
-                    for (factor, matrix) in cluster.factors.iter_mut().zip(&matrices) {
-                        let columns: Vec<&[f64]> =
-                            matrix.iter().map(|column| column.get(part.clone()).unwrap_or_default()).collect();
-                        factor.add(&columns);
-                    }
+                for (factor, matrix) in reduced[cluster].factors.iter_mut().zip(&matrices) {
+                    let columns: Vec<&[f64]> = matrix.iter().map(|column| &column[part.clone()]).collect();
+                    factor.add(&columns);
                 }
                 seen += stop - start;
                 if stop < end {
@@ -187,15 +204,13 @@ impl Layout {
     pub(super) fn explain(&self, model: &Model, members: &[Free], failure: &Failure) -> Error {
         let describe = |index: usize| -> (String, String) {
             let effect = members.get(index).and_then(|free| model.effects.get(free.0));
-            let coefficient = effect.zip(members.get(index)).and_then(|(effect, free)| effect.coefficients.get(free.1));
-            let (Some(effect), Some(coefficient)) = (effect, coefficient) else { return Default::default() };
-            let regressors: Vec<String> = effect
-                .terms
-                .iter()
-                .filter(|term| term.coefficient.as_ref() == Some(&coefficient.name))
-                .map(|term| term.regressor.to_string())
-                .collect();
-            (format!("`{}` of effect `{}`", coefficient.name, effect.name), format!("`{}`", regressors.join("`, `")))
+            let number = effect.zip(members.get(index)).and_then(|(effect, free)| effect.number(free.1));
+            let (Some(effect), Some(number)) = (effect, number) else { return Default::default() };
+            let terms = effect.terms.iter().filter(|term| term.coefficient.as_ref() == Some(&number.name));
+            let swaps = effect.swaps.iter().filter(|swap| swap.with.names().contains(&number.name.as_str()));
+            let regressors: Vec<String> =
+                terms.map(|term| term.regressor.to_string()).chain(swaps.map(|swap| swap.with.to_string())).collect();
+            (format!("`{}` of effect `{}`", number.name, effect.name), format!("`{}`", regressors.join("`, `")))
         };
         let advice = "give flights that move it, or set `enabled = false` on the effect";
         Error::Undetermined(match failure {

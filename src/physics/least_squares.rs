@@ -13,6 +13,13 @@ use nalgebra::{DMatrix, DVector};
 /// Rows collected before they are reduced.
 const ROWS_AT_ONCE: usize = 256;
 
+/// From so many columns on the normal equations are formed after all: their products run at ten times the speed of reflections, and a
+/// model of so many numbers is not known to half of the digits. Columns are those of flights, whose noise is far above rounding.
+const WIDE: usize = 40;
+
+/// Share of a column's square that must be left beside the columns before it; less is rounding, and the column is taken for dependent.
+const SMALLEST_SQUARE: f64 = 1e-13;
+
 /// Condition number of the scaled columns beyond which the data do not determine the coefficients: half of the digits are gone.
 pub(super) const LARGEST_CONDITION: f64 = 1e8;
 
@@ -27,13 +34,16 @@ pub(super) struct Factor {
     rows: usize,
     /// Upper triangle, `columns` square.
     triangle: DMatrix<f64>,
+    /// Of a wide factor, `[X | y]ᵀ [X | y]`; the triangle follows when it is asked for.
+    squares: Option<DMatrix<f64>>,
     /// Rows not yet reduced, row-major.
     pending: Vec<f64>,
 }
 
 impl Factor {
     pub(super) fn new(columns: usize) -> Self {
-        Self { columns, rows: 0, triangle: DMatrix::zeros(columns, columns), pending: Vec::new() }
+        let square = || DMatrix::zeros(columns, columns);
+        Self { columns, rows: 0, triangle: square(), squares: (columns > WIDE).then(square), pending: Vec::new() }
     }
 
     /// Adds the same stretch of every column.
@@ -59,22 +69,56 @@ impl Factor {
         }
     }
 
+    /// Columns, the regressand's included.
+    pub(super) fn width(&self) -> usize {
+        self.columns
+    }
+
     fn reduce(&mut self) {
         let pending = self.pending.len() / self.columns.max(1);
         if pending == 0 {
             return;
         }
-        let mut stacked = DMatrix::zeros(self.columns + pending, self.columns);
-        stacked.rows_mut(0, self.columns).copy_from(&self.triangle);
-        stacked.rows_mut(self.columns, pending).copy_from(&DMatrix::from_row_slice(pending, self.columns, &self.pending));
-        self.triangle = stacked.qr().r();
+        if let Some(squares) = &mut self.squares {
+            let transposed = DMatrix::from_column_slice(self.columns, pending, &self.pending);
+            squares.gemm(1.0, &transposed, &transposed.transpose(), 1.0);
+        } else {
+            let mut stacked = DMatrix::zeros(self.columns + pending, self.columns);
+            stacked.rows_mut(0, self.columns).copy_from(&self.triangle);
+            stacked.rows_mut(self.columns, pending).copy_from(&DMatrix::from_row_slice(pending, self.columns, &self.pending));
+            self.triangle = stacked.qr().r();
+        }
         self.pending.clear();
     }
 
     pub(super) fn finish(&mut self) -> (&DMatrix<f64>, usize) {
         self.reduce();
+        if let Some(squares) = &self.squares {
+            self.triangle = root(squares);
+        }
         (&self.triangle, self.rows)
     }
+}
+
+/// The upper triangle R with `RᵀR` the given squares; the row of a column that depends on those before it is zero.
+fn root(squares: &DMatrix<f64>) -> DMatrix<f64> {
+    let size = squares.nrows();
+    let mut triangle: DMatrix<f64> = DMatrix::zeros(size, size);
+    for row in 0..size {
+        let above: f64 = triangle.view((0, row), (row, 1)).norm_squared();
+        let left = squares[(row, row)] - above;
+        // What is no number must not be taken for nothing.
+        if left <= SMALLEST_SQUARE * squares[(row, row)] {
+            continue;
+        }
+        let pivot = left.sqrt();
+        triangle[(row, row)] = pivot;
+        for column in row + 1..size {
+            let above: f64 = triangle.view((0, row), (row, 1)).dot(&triangle.view((0, column), (row, 1)));
+            triangle[(row, column)] = (squares[(row, column)] - above) / pivot;
+        }
+    }
+    triangle
 }
 
 /// A stretch of consecutive rows, one factor a channel.
@@ -93,6 +137,29 @@ pub(super) struct Problem {
     pub coefficients: usize,
     /// Channel and the coefficient index of each column of its factor (without the regressand).
     pub channels: Vec<(usize, Vec<usize>)>,
+}
+
+/// What holds numbers near where they were: rows `weight (θ - target)` beside those of the flights, which are in units of their channel's
+/// standard deviation.
+#[derive(Clone, Debug)]
+pub(super) struct Hold {
+    /// One over the standard deviation of the residual, for each channel there is.
+    pub weights: Vec<f64>,
+    /// For each coefficient of the problem, weight and target.
+    pub rows: Vec<(f64, f64)>,
+}
+
+impl Hold {
+    /// The rows as a factor beside those of the channels.
+    pub(super) fn factor(&self) -> DMatrix<f64> {
+        let size = self.rows.len();
+        let mut rows = DMatrix::zeros(size, size + 1);
+        for (index, &(weight, target)) in self.rows.iter().enumerate() {
+            rows[(index, index)] = weight;
+            rows[(index, size)] = weight * target;
+        }
+        rows
+    }
 }
 
 /// What came out.
@@ -145,35 +212,11 @@ fn total(clusters: &[Cluster], channel: usize, columns: usize) -> (DMatrix<f64>,
 /// length, which cancels the first-order bias of correlation across cluster borders ("lugsail", Vats & Flegal 2022,
 /// Biometrika 109:735); and t has one degree of freedom less than the number of clusters that effectively carry the
 /// coefficient (Carter, Schnepel & Steigerwald 2017, Rev. Economics and Statistics 99:698).
-pub(super) fn solve(problem: &Problem, clusters: &mut [Cluster]) -> Result<Solution, Failure> {
-    clusters.iter_mut().flat_map(|cluster| &mut cluster.factors).for_each(Factor::reduce);
+///
+/// With `hold`, its weights are taken as they are, and its rows count with those of the flights.
+pub(super) fn solve(problem: &Problem, clusters: &mut [Cluster], hold: Option<&Hold>) -> Result<Solution, Failure> {
+    let Step { fit, weights } = step(problem, clusters, hold)?;
     let wanted = problem.coefficients;
-    let totals: Vec<(DMatrix<f64>, usize)> = problem
-        .channels
-        .iter()
-        .map(|(channel, columns)| {
-            let (triangle, rows) = total(clusters, *channel, columns.len() + 1);
-            (embed(&triangle, columns, wanted), rows)
-        })
-        .collect();
-    let rows: usize = totals.iter().map(|total| total.1).sum();
-    if rows <= wanted {
-        return Err(Failure::TooFewRows(rows));
-    }
-
-    let mut weights = vec![1.0; totals.len()];
-    let mut fit = Fit::new(&totals, &weights, wanted)?;
-    if totals.len() > 1 {
-        for _ in 0..3 {
-            for (weight, (wide, rows)) in weights.iter_mut().zip(&totals) {
-                let squares = residual(wide, &fit.values).norm_squared();
-                let level = wide.column(wanted).norm_squared() * f64::EPSILON;
-                *weight = (*rows as f64 / squares.max(level).max(f64::MIN_POSITIVE)).sqrt();
-            }
-            fit = Fit::new(&totals, &weights, wanted)?;
-        }
-    }
-
     let fine: Vec<Information> = clusters.iter().map(|cluster| Information::of(cluster, problem, &weights, &fit)).collect();
     let coarse = merge_neighbours(&fine);
     let half_length = jackknife(&fit, &fine);
@@ -188,8 +231,53 @@ pub(super) fn solve(problem: &Problem, clusters: &mut [Cluster]) -> Result<Solut
     Ok(Solution { values: fit.values.iter().copied().collect(), ci95, condition_number: fit.condition_number })
 }
 
+/// An estimate without intervals, and the weights of the channels that it rests on.
+pub(super) struct Step {
+    pub fit: Fit,
+    weights: Vec<f64>,
+}
+
+/// As [`solve`], without intervals.
+pub(super) fn step(problem: &Problem, clusters: &mut [Cluster], hold: Option<&Hold>) -> Result<Step, Failure> {
+    clusters.iter_mut().flat_map(|cluster| &mut cluster.factors).for_each(|factor| {
+        factor.finish();
+    });
+    let wanted = problem.coefficients;
+    let mut totals: Vec<(DMatrix<f64>, usize)> = problem
+        .channels
+        .iter()
+        .map(|(channel, columns)| {
+            let (triangle, rows) = total(clusters, *channel, columns.len() + 1);
+            (embed(&triangle, columns, wanted), rows)
+        })
+        .collect();
+    let rows: usize = totals.iter().map(|total| total.1).sum();
+    if rows <= wanted {
+        return Err(Failure::TooFewRows(rows));
+    }
+
+    let mut weights = vec![1.0; totals.len()];
+    if let Some(hold) = hold {
+        weights = problem.channels.iter().map(|(channel, _)| hold.weights[*channel]).collect();
+        totals.push((hold.factor(), 0));
+        weights.push(1.0);
+    }
+    let mut fit = Fit::new(&totals, &weights, wanted)?;
+    if totals.len() > 1 && hold.is_none() {
+        for _ in 0..3 {
+            for (weight, (wide, rows)) in weights.iter_mut().zip(&totals) {
+                let squares = residual(wide, &fit.values).norm_squared();
+                let level = wide.column(wanted).norm_squared() * f64::EPSILON;
+                *weight = (*rows as f64 / squares.max(level).max(f64::MIN_POSITIVE)).sqrt();
+            }
+            fit = Fit::new(&totals, &weights, wanted)?;
+        }
+    }
+    Ok(Step { fit, weights })
+}
+
 /// `y − X θ` of a wide triangle: the part of the residual that the rows of the triangle carry.
-fn residual(wide: &DMatrix<f64>, values: &DVector<f64>) -> DVector<f64> {
+pub(super) fn residual(wide: &DMatrix<f64>, values: &DVector<f64>) -> DVector<f64> {
     wide.column(values.len()) - wide.columns(0, values.len()) * values
 }
 
@@ -235,6 +323,15 @@ impl Fit {
         Ok(Self { values, inverse, condition_number })
     }
 
+    /// Standard error of a coefficient if residuals were independent, of variance 1.
+    pub(super) fn standard_error(&self, index: usize) -> f64 {
+        self.inverse.row(index).norm()
+    }
+
+    pub(super) fn condition_number(&self) -> f64 {
+        self.condition_number
+    }
+
     /// How many equally informative clusters would carry a coefficient as evenly: 1 / Σ share².
     fn effective_clusters(&self, clusters: &[Information], index: usize) -> f64 {
         // In the orthonormal coordinates of Q, coefficient `index` is read off along this row.
@@ -260,6 +357,7 @@ impl Information {
         let wanted = problem.coefficients;
         let mut share = DMatrix::zeros(wanted, wanted);
         let mut score = DVector::zeros(wanted);
+        // What holds numbers is no knowledge of the flights: its weight comes after those of the channels.
         for ((channel, columns), weight) in problem.channels.iter().zip(weights) {
             let Some(factor) = cluster.factors.get(*channel) else { continue };
             let wide = embed(&factor.triangle, columns, wanted) * *weight;
@@ -361,7 +459,7 @@ mod tests {
     fn estimate_and_jackknife_are_those_of_refitting() -> Result<(), Failure> {
         let rows = rows();
         let mut clusters = clusters(&rows, &[0, 0, 1, 2, 3]);
-        let solution = solve(&problem(), &mut clusters)?;
+        let solution = solve(&problem(), &mut clusters, None)?;
         let expected = by_normal_equations(rows.iter().flatten());
         let (wide, count) = (embed(&total(&clusters, 0, 3).0, &[0, 1], 2), 2021);
         let fit = Fit::new(&[(wide, count)], &[1.0], 2)?;
@@ -400,7 +498,7 @@ mod tests {
             })
             .collect();
         let problem = Problem { coefficients: 1, channels: vec![(0, vec![0]), (1, vec![0])] };
-        let found = solve(&problem, &mut clusters)?.values[0];
+        let found = solve(&problem, &mut clusters, None)?.values[0];
         // The loud channel's variance is 1e6 times the quiet one's, and pulls by 3 / 1e6 at most; its noise by about as much.
         assert!((found - 2.0).abs() < 1e-2, "{found}");
         Ok(())
@@ -413,7 +511,7 @@ mod tests {
             let columns: [Vec<f64>; 2] = [x.iter().map(|x| f(*x)[0]).collect(), x.iter().map(|x| f(*x)[1]).collect()];
             let mut factor = Factor::new(3);
             factor.add(&[&columns[0], &columns[1], &x]);
-            solve(&problem(), &mut [Cluster { flight: 0, factors: vec![factor] }]).map(|solution| solution.values)
+            solve(&problem(), &mut [Cluster { flight: 0, factors: vec![factor] }], None).map(|solution| solution.values)
         };
         assert_eq!(case(&|x| [x, 0.0]), Err(Failure::Zero(1)));
         assert!(matches!(case(&|x| [x, 3.0 * x]), Err(Failure::Dependent(both, _)) if both == [0, 1]));

@@ -8,6 +8,7 @@ mod by_flight;
 mod calibrate;
 pub mod catalogue;
 mod columns;
+mod compose;
 mod definition;
 mod effect;
 mod evaluate;
@@ -18,20 +19,22 @@ mod model;
 #[cfg(feature = "files")]
 mod model_file;
 mod sign;
+mod signal;
 #[cfg(feature = "files")]
 mod toml_section;
 mod vehicle;
 
 pub use baseline::PAPER;
 pub use calibrate::{Calibration, Estimate, calibrate};
-pub use columns::{Regressor, evaluate_blocks, missing_input};
+pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
 pub use definition::{
-    AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, coefficient,
-    parameter,
+    AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, change,
+    coefficient, parameter,
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
-pub use evaluate::{StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
+pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
 pub use sign::{Sign, SignDoubt, SignFinding, doubt, physical_sign};
+pub use signal::{Plain, SIGNALS, Signal, Stage, signal_named};
 pub use vehicle::{Assumed, MASS_KG, ROTOR_RADIUS_M};

@@ -9,7 +9,6 @@ use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
 use crate::flight::{Accelerations, Column, Flight, names};
-use crate::formula::Formula;
 use std::collections::BTreeMap;
 
 /// A value of the free table `[provenance]`.
@@ -205,67 +204,24 @@ impl Model {
         Ok(())
     }
 
-    /// A constant as the formulas of `effect` see it: its own parameters first, then the model's numbers, then the current value of
-    /// another enabled effect's coefficient, named `<effect>_<coefficient>`.
-    pub(super) fn constant(&self, effect: &Effect, name: &str) -> Option<f64> {
-        if let Some(parameter) = effect.parameters.iter().find(|parameter| parameter.name == name) {
-            return Some(parameter.value);
-        }
+    /// One of the model's own numbers by name.
+    pub(super) fn constant(&self, name: &str) -> Option<f64> {
         let [ix, iy, iz] = self.inertia;
         let values = [self.mass_kg, ix, iy, iz, self.rotor_radius_m, self.data.control_delay_s];
-        let own = Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1);
-        own.or_else(|| {
-            let (effect, coefficient) = self.coefficient_named(name)?;
-            Some(self.effects.get(effect)?.coefficients.get(coefficient)?.value)
-        })
+        Self::CONSTANTS.into_iter().zip(values).find(|known| known.0 == name).map(|known| known.1)
     }
 
-    /// Whether formulas of an effect may read this name as a constant: one of its parameters, of the model's own numbers, or the
-    /// coefficient of an enabled effect.
+    /// Whether formulas of an effect may read this name as a number: one of its own, of the model's, or the coefficient of an enabled
+    /// effect.
     pub fn gives(&self, effect: &Effect, name: &str) -> bool {
-        self.constant(effect, name).is_some()
+        effect.number_named(name).is_some() || self.constant(name).is_some() || self.coefficient_named(name).is_some()
     }
 
     /// The coefficient that formulas call `<effect>_<coefficient>`: indices of the effect and of the coefficient in it.
-    fn coefficient_named(&self, name: &str) -> Option<(usize, usize)> {
+    pub(super) fn coefficient_named(&self, name: &str) -> Option<(usize, usize)> {
         self.effects.iter().enumerate().filter(|(_, effect)| effect.enabled).find_map(|(index, effect)| {
             let coefficient = name.strip_prefix(effect.name.as_str())?.strip_prefix('_')?;
             Some((index, effect.coefficients.iter().position(|known| known.name == coefficient)?))
         })
-    }
-
-    /// The coefficients whose values the formulas of an effect read, as indices of effects and of coefficients in them.
-    pub(super) fn coefficients_read(&self, effect: &Effect) -> Result<Vec<(usize, usize)>> {
-        let mut read = Vec::new();
-        for term in &effect.terms {
-            let regressor = self.effective_regressor(effect, &term.regressor)?;
-            for name in regressor.names() {
-                let known = Self::CONSTANTS.contains(&name) || effect.parameters.iter().any(|parameter| parameter.name == name);
-                read.extend(if known { None } else { self.coefficient_named(name) });
-            }
-        }
-        Ok(read)
-    }
-
-    /// A regressor of `effect` as it is evaluated: the swaps of the enabled effects applied in order, then the control delay.
-    pub(super) fn effective_regressor(&self, effect: &Effect, regressor: &Formula) -> Result<Formula> {
-        let mut result = regressor.clone();
-        for owner in self.effects.iter().filter(|owner| owner.enabled) {
-            for swap in owner.swaps.iter().filter(|swap| swap.within.is_empty() || swap.within.contains(&effect.name)) {
-                // The owner's parameters become numbers here: `effect` may have parameters of the same names.
-                let number = |name: &str| owner.parameters.iter().find(|known| known.name == name).map(|known| known.value);
-                let with =
-                    swap.with.substitute(&|name| number(name).and_then(|value| Formula::parse(&format!("({value:?})")).ok()))?;
-                result = result
-                    .substitute(&|name| (name == swap.name).then(|| with.clone()))
-                    .map_err(|error| owner.name_error(error))?;
-            }
-        }
-        if self.data.control_delay_s > 0.0 {
-            let control = |name: &str| matches!(Column::from_name(name), Some(Column::U1 | Column::U2 | Column::U3 | Column::U4));
-            let delayed = |name: &str| Formula::parse(&format!("delay({name}, control_delay_s)")).ok();
-            result = result.substitute(&|name| if control(name) { delayed(name) } else { None })?;
-        }
-        Ok(result)
     }
 }

@@ -4,7 +4,9 @@ use super::baseline::{self, PAPER};
 use super::catalogue;
 use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
+use super::evaluate::standard_names;
 use super::model::{Entry, Model, ModelData};
+use super::signal::{SIGNALS, changeable, signal_named};
 use super::toml_section::{Section, line_of, number};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
@@ -21,8 +23,65 @@ const NOMINAL_MASS_KG: f64 = 4.58;
 const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
 
+/// What effects mean: since 2 they read and change the signals of the model.
+const FORMAT: u32 = 2;
+
+/// Effects of the catalogue that, alone beside the baseline, mean in format 2 what they meant before.
+const UNCHANGED: [&str; 15] = [
+    "climb_inflow",
+    "collective_lag",
+    "ctrl_cross",
+    "ctrl_nonlin",
+    "dihedral_speedstab",
+    "quad_drag",
+    "rate_cross",
+    "speed_damping",
+    "tail_lag",
+    "tail_rotor_inflow",
+    "tail_side_force",
+    "tilt_misalign",
+    "vel_cross",
+    "weathercock",
+    "wind",
+];
+
+fn read_format(model: &Section<'_>) -> Result<u32> {
+    let Some(format) = model.number("format")? else { return Ok(1) };
+    if format == 1.0 || format == f64::from(FORMAT) {
+        return Ok(format as u32);
+    }
+    Err(model.fault("format", format.to_string(), "1 or 2, the formats that this version reads"))
+}
+
+/// Refuses numbers of effects that a file of format 1 found for other formulas.
+fn check_meaning(file: &Section<'_>, effects: &[Effect]) -> Result<()> {
+    let has_numbers = |effect: &&Effect| {
+        let of_catalogue = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
+        let given = |definition: &super::definition::Definition| {
+            let blank = definition.effect(1.0, 1.0);
+            let moved =
+                effect.parameters.iter().zip(&blank.parameters).any(|(left, right)| !left.fixed && left.value != right.value);
+            moved || effect.coefficients.iter().any(|coefficient| coefficient.value != 0.0)
+        };
+        effect.enabled && of_catalogue.is_some_and(given)
+    };
+    let found: Vec<&Effect> = effects.iter().filter(has_numbers).collect();
+    let changed = match found.as_slice() {
+        [] => return Ok(()),
+        [only] if UNCHANGED.contains(&only.kind.as_str()) => return Ok(()),
+        [first, ..] => found.iter().find(|effect| !UNCHANGED.contains(&effect.kind.as_str())).unwrap_or(first),
+    };
+    Err(file.fault(
+        "model.format",
+        format!("nothing, and numbers of `{}`, found when effects did not see each other", changed.name),
+        "`format = 2` under [model], and then `phyture calibrate`: effects now read thrust, air velocity and controls as the other effects leave them",
+    ))
+}
+
 impl Model {
     /// Reads a model file.
+    ///
+    /// A file without `format = 2` was written when effects did not see each other: it is read where that means the same.
     ///
     /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
     /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m) and are marked in [`Model::assumed`], the name to the file's, and without `baseline` the model holds
@@ -48,7 +107,8 @@ impl Model {
         let file = Section { path, text, name: "", table: parsed.get_ref() };
         file.allow(&["model", "data", "effect", "provenance"])?;
         let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
-        model.allow(&["name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
+        model.allow(&["format", "name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
+        let format = read_format(&model)?;
         let (mass, inertia, radius) = (model.number("mass_kg")?, model.numbers("inertia")?, model.number("rotor_radius_m")?);
         let assumed = Assumed { mass: mass.is_none(), inertia: inertia.is_none(), rotor_radius: radius.is_none() };
         let (mass_kg, rotor_radius_m) = (mass.unwrap_or(NOMINAL_MASS_KG), radius.unwrap_or(NOMINAL_ROTOR_RADIUS_M));
@@ -89,6 +149,9 @@ impl Model {
                 Some(known) => *known = effect,
                 None => effects.push(effect),
             }
+        }
+        if format < FORMAT {
+            check_meaning(&file, &effects)?;
         }
         let mut data = ModelData::default();
         if let Some(section) = file.section("data", "data")? {
@@ -138,7 +201,7 @@ impl Model {
         let [ix, iy, iz] = self.inertia;
         self.check_numbers()?;
         // Writing to a String does not fail.
-        let _ = writeln!(text, "[model]\nname = {}", quoted(&self.name));
+        let _ = writeln!(text, "[model]\nformat = {FORMAT}\nname = {}", quoted(&self.name));
         // A number that nobody gave stays a comment, so that whoever reads the file asks for it, too.
         let mut number = |assumed: bool, key: &str, value: String| {
             let _ = match assumed {
@@ -195,27 +258,34 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
     let kind = section.text("kind")?.ok_or_else(|| missing("kind"))?;
     let common = ["kind", "name", "enabled", "ci95", "added_by", "parameters", "flights"];
     let mut effect = if kind == FORMULA_KIND {
-        section.allow(&[&common[..], &["channel", "formula", "coefficient", "unit"]].concat())?;
+        section.allow(&[&common[..], &["channel", "changes", "formula", "coefficient", "unit"]].concat())?;
         let name = section.text("name")?.ok_or_else(|| missing("name"))?;
-        let channel = section.text("channel")?.ok_or_else(|| missing("channel"))?;
-        let names = Column::TARGETS.map(Column::name);
-        let index = names.iter().position(|name| *name == channel).ok_or_else(|| {
-            section.fault(
-                "channel",
-                format!("`{channel}`{}", did_you_mean(channel, names)),
-                format!("one of `{}`", names.join("`, `")),
-            )
-        })?;
         let formula = section.text("formula")?.ok_or_else(|| missing("formula"))?;
         let value = section.number("coefficient")?.unwrap_or_default();
-        let mut effect = Effect::formula(name, index, formula, value).map_err(|error| located(section, name, error))?;
+        let made = match (section.text("channel")?, section.text("changes")?) {
+            (Some(channel), None) => Effect::formula(name, channel_named(section, channel)?, formula, value),
+            (None, Some(signal)) => {
+                if !changeable(signal) || (signal_named(signal).is_none() && !standard_names().contains(&signal)) {
+                    let names = || SIGNALS.iter().map(|signal| signal.name).filter(|name| changeable(name));
+                    let found = format!("`{signal}`{}", did_you_mean(signal, names()));
+                    return Err(section.fault("changes", found, format!("one of `{}`", names().collect::<Vec<_>>().join("`, `"))));
+                }
+                Effect::change(name, signal, formula, value)
+            }
+            (None, None) => return Err(missing("channel")),
+            (Some(_), Some(_)) => {
+                let expected = "one of both: `channel` for an acceleration, `changes` for a signal";
+                return Err(section.fault("changes", "beside `channel`", expected));
+            }
+        };
+        let mut effect = made.map_err(|error| located(section, name, error))?;
         if let (Some(unit), Some(coefficient)) = (section.text("unit")?, effect.coefficient_mut(FORMULA_COEFFICIENT)) {
             coefficient.unit = unit.into();
         }
         if let Some(parameters) = section.section("parameters", "effect.parameters")? {
             for name in parameters.keys() {
                 let value = parameters.number(name)?.unwrap_or_default();
-                effect.parameters.push(Parameter { name: name.into(), value, unit: String::new(), fixed: true });
+                effect.parameters.push(Parameter { name: name.into(), value, unit: String::new(), fixed: true, ci95: None });
             }
         }
         effect
@@ -247,11 +317,12 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
         effect
     };
     if let Some(intervals) = section.section("ci95", "effect.ci95")? {
-        intervals.allow(&names(&effect))?;
-        for coefficient in &mut effect.coefficients {
-            coefficient.ci95 = intervals.numbers(&coefficient.name)?;
-            if let Some([low, high]) = coefficient.ci95.filter(|interval| interval[0] > interval[1]) {
-                return Err(intervals.fault(&coefficient.name, format!("[{low}, {high}]"), "the lower end first"));
+        intervals.allow(&numbers(&effect))?;
+        let of_coefficients = effect.coefficients.iter_mut().map(|c| (&c.name, &mut c.ci95));
+        for (name, ci95) in of_coefficients.chain(effect.parameters.iter_mut().map(|p| (&p.name, &mut p.ci95))) {
+            *ci95 = intervals.numbers(name)?;
+            if let Some([low, high]) = ci95.filter(|interval| interval[0] > interval[1]) {
+                return Err(intervals.fault(name, format!("[{low}, {high}]"), "the lower end first"));
             }
         }
     }
@@ -277,6 +348,20 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
 
 fn names(effect: &Effect) -> Vec<&str> {
     effect.coefficients.iter().map(|coefficient| coefficient.name.as_str()).collect()
+}
+
+/// Names of everything that may have an interval.
+fn numbers(effect: &Effect) -> Vec<&str> {
+    names(effect).into_iter().chain(effect.parameters.iter().map(|parameter| parameter.name.as_str())).collect()
+}
+
+/// The index of an acceleration by name.
+fn channel_named(section: &Section<'_>, channel: &str) -> Result<usize> {
+    let names = Column::TARGETS.map(Column::name);
+    names.iter().position(|name| *name == channel).ok_or_else(|| {
+        let found = format!("`{channel}`{}", did_you_mean(channel, names));
+        section.fault("channel", found, format!("one of `{}`", names.join("`, `")))
+    })
 }
 
 /// Puts file and line before a formula error.
@@ -312,9 +397,14 @@ fn write_effect(text: &mut String, effect: &Effect) {
         format!("{{ {} }}", entries.join(", "))
     };
     if effect.kind == FORMULA_KIND {
-        if let (Some(term), Some(coefficient)) = (effect.terms.first(), effect.coefficients.first()) {
+        if let Some(term) = effect.terms.first() {
             line("channel", quoted(Column::TARGETS.get(term.channel).map_or("", |column| column.name())));
             line("formula", quoted(&term.regressor.to_string()));
+        } else if let Some((signal, formula)) = effect.own_change() {
+            line("changes", quoted(signal));
+            line("formula", quoted(&formula));
+        }
+        if let Some(coefficient) = effect.coefficients.first() {
             line("coefficient", format!("{:?}", coefficient.value));
             line("unit", quoted(&coefficient.unit));
         }
@@ -324,10 +414,11 @@ fn write_effect(text: &mut String, effect: &Effect) {
     if !effect.parameters.is_empty() {
         line("parameters", table(effect.parameters.iter().map(|p| (p.name.as_str(), format!("{:?}", p.value))).collect()));
     }
-    let intervals: Vec<(&str, String)> = effect
-        .coefficients
-        .iter()
-        .filter_map(|c| c.ci95.map(|[low, high]| (c.name.as_str(), format!("[{low:?}, {high:?}]"))))
+    let of_coefficients = effect.coefficients.iter().map(|c| (c.name.as_str(), c.ci95));
+    let of_parameters = effect.parameters.iter().map(|p| (p.name.as_str(), p.ci95));
+    let intervals: Vec<(&str, String)> = of_coefficients
+        .chain(of_parameters)
+        .filter_map(|(name, ci95)| ci95.map(|[low, high]| (name, format!("[{low:?}, {high:?}]"))))
         .collect();
     if !intervals.is_empty() {
         line("ci95", table(intervals));

@@ -136,7 +136,7 @@ impl Model {
 /// Which numbers of the vehicle the formulas and parameters of an effect are made of.
 fn reads(effect: &Effect) -> Assumed {
     let mut read = Assumed::default();
-    for name in effect.terms.iter().flat_map(|term| term.regressor.names()) {
+    for name in effect.formulas().flat_map(|formula| formula.names()) {
         match name {
             "mass_kg" => read.mass = true,
             "ix" | "iy" | "iz" => read.inertia = true,

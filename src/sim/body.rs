@@ -197,11 +197,13 @@ impl Body {
         if self.on.has(Mechanism::StallSaturation) {
             thrust = stall(thrust, 1.3 * GRAVITY_M_S2 / scale(Mechanism::StallSaturation));
         }
-        let load = thrust / GRAVITY_M_S2;
+        // The baseline's heave damping is the rotor's, too: it acts wherever the thrust does.
+        let whole = thrust - a[2] * v[2];
+        let load = whole / GRAVITY_M_S2;
         let power = 0.2 + 0.8 * load.abs().powf(1.5) - load * v[2] / self.rotor.hover_induced * 0.8;
         let droop = 1.0 - scale(Mechanism::RotorDroop) * DROOP * (power - 1.0) - state.rotor_speed;
 
-        let force = self.force(&Air { v, speed }, thrust, [lateral.0, longitudinal.0], tail.0);
+        let force = self.force(&Air { v, speed }, [thrust, whole], [lateral.0, longitudinal.0], tail.0);
         let lighter = 1.0 / (1.0 - 0.1 * scale(Mechanism::MassDrift) * burnt);
         let gravity = to_body(&rotation, [0.0, 0.0, GRAVITY_M_S2]);
         let turning = cross(state.rate, state.velocity);
@@ -210,7 +212,7 @@ impl Body {
         });
 
         // Angular acceleration times the diagonal inertia is the moment; the gyroscopic term uses the tensor there is.
-        let extra = self.moment(&Air { v, speed }, state.rate, thrust, [u[0], u[1], tail.0, collective.0]);
+        let extra = self.moment(&Air { v, speed }, state.rate, whole, [u[0], u[1], tail.0, collective.0]);
         let damping = [(1.0 - ROTOR_DAMPING_SHARE) * b[0] * p, (1.0 - ROTOR_DAMPING_SHARE) * b[1] * q, b[2] * r];
         let controlled = [lateral.0, longitudinal.0, tail.0];
         let direct: [f64; 3] = std::array::from_fn(|axis| {
@@ -247,14 +249,14 @@ impl Body {
         ]
     }
 
-    /// Specific aerodynamic force beyond A v, m/s².
-    fn force(&self, air: &Air, thrust: f64, flap: [f64; 2], tail: f64) -> [f64; 3] {
+    /// Specific aerodynamic force beyond A v, m/s²; thrust without and with the heave damping.
+    fn force(&self, air: &Air, [thrust, whole]: [f64; 2], flap: [f64; 2], tail: f64) -> [f64; 3] {
         let scale = |mechanism| self.on.scale(mechanism);
         let Air { v, speed } = *air;
         let drag = scale(Mechanism::QuadDrag) * -0.5 * AIR_DENSITY_KG_M3 / MASS_KG * speed;
         let cross = scale(Mechanism::VelCross);
         // The disc tilts with the flapping: aft for a nose-up, to starboard for a right-roll cyclic.
-        let tilt = scale(Mechanism::FlapTilt) * TILT_RAD * thrust;
+        let tilt = scale(Mechanism::FlapTilt) * TILT_RAD * whole;
         let side = scale(Mechanism::TailSideForce) * COEFFICIENTS.c2[2] * INERTIA_KG_M2[2] / (MASS_KG * TAIL_ARM_M);
         let mut force = [
             drag * FUSELAGE_AREA_M2[0] * v[0] + cross * (0.06 * v[1] + 0.10 * v[2]) - tilt * flap[1],
@@ -263,7 +265,7 @@ impl Body {
         ];
         if self.on.has(Mechanism::FuselageWake) {
             // Gavrilets: the fuselage sees the induced velocity on top of the axial one.
-            let wake = self.rotor.hover_induced * (thrust.abs() / GRAVITY_M_S2).sqrt().copysign(thrust);
+            let wake = self.rotor.hover_induced * (whole.abs() / GRAVITY_M_S2).sqrt().copysign(whole);
             let washed = norm([v[0], v[1], v[2] + wake]);
             let factor = scale(Mechanism::FuselageWake) * -0.5 * AIR_DENSITY_KG_M3 / MASS_KG;
             let seen = [v[0], v[1], v[2] + wake];

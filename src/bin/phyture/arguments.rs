@@ -433,6 +433,8 @@ pub enum Command {
 pub enum EffectCommand {
     /// Every effect in a line
     List,
+    /// The signals that effects read and change, which formulas of your own may read and change too
+    Signals,
     /// All that is known about one effect
     Show {
         /// Effect

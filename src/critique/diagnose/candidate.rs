@@ -2,7 +2,7 @@
 //! values of its open parameters.
 
 use crate::flight::Flight;
-use crate::physics::{Definition, Effect, Model, catalogue, missing_input};
+use crate::physics::{Columns, Definition, Effect, Model, Wanted, catalogue};
 
 /// An effect that may be missing.
 #[derive(Clone, Debug)]
@@ -86,13 +86,14 @@ fn inapplicable(model: &Model, effect: &Effect, flights: &[Flight]) -> Option<St
     let mut enlarged = model.clone();
     enlarged.effects.retain(|other| other.name != effect.name);
     enlarged.effects.push(effect.clone());
-    let regressors = match enlarged.regressors(|_| true) {
+    let mut columns = Columns::default();
+    let regressors = match columns.regressors(&enlarged, Wanted::default()) {
         Ok(regressors) => regressors,
         Err(error) => return Some(error.to_string()),
     };
     let missing = regressors
         .iter()
-        .find_map(|regressor| flights.iter().find_map(|flight| missing_input(&regressor.formula, flight).map(str::to_owned)));
+        .find_map(|regressor| flights.iter().find_map(|flight| columns.missing_input(regressor.node, flight).map(str::to_owned)));
     missing.map(|name| format!("the flights or the model do not carry `{name}`"))
 }
 

@@ -78,7 +78,7 @@ fn kept(flights: &[Flight], locked: &[Span]) -> Kept {
 /// Squared error of each block of each channel under a model's own numbers; properties of a flight are found from its other blocks.
 pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
     let mut design = Design::default();
-    let layout = design.add(&model.regressors(|_| true)?);
+    let layout = design.model(model)?;
     let grams = grams(engine.flights, &engine.blocks, &design)?;
     let priors = priors(model, &layout, &engine.held);
     let mut errors: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::new());

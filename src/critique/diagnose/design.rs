@@ -1,22 +1,26 @@
-//! Which columns a set of models needs, and how each model is made of them. Equal formulas are one column.
+//! Which columns a set of models needs, and how each model is made of them. Equal columns are one.
 
 use crate::error::Result;
-use crate::formula::Formula;
-use crate::physics::{Model, Regressor};
+use crate::formula::Node;
+use crate::physics::{Columns, Model, Regressor, Wanted};
 use std::collections::HashMap;
 
 /// Distinct columns of many models, by channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Design {
-    /// Every distinct formula.
-    pub formulas: Vec<Formula>,
-    by_text: HashMap<String, usize>,
-    /// For each channel the formulas it multiplies, in order of first use.
+    /// What the columns are made of.
+    pub columns: Columns,
+    /// Every distinct column.
+    pub nodes: Vec<Node>,
+    /// What the first model that has a column calls it.
+    pub labels: Vec<String>,
+    known: HashMap<Node, usize>,
+    /// For each channel the columns in it, in order of first use.
     pub channels: [Vec<usize>; 6],
 }
 
 /// A coefficient that a fit finds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Free {
     /// Index of the effect in the model.
     pub effect: usize,
@@ -41,69 +45,90 @@ pub(super) struct Layout {
 }
 
 impl Design {
-    fn column(&mut self, regressor: &Regressor) -> usize {
-        let text = regressor.formula.to_string();
-        let formula = *self.by_text.entry(text).or_insert_with(|| {
-            self.formulas.push(regressor.formula.clone());
-            self.formulas.len() - 1
+    fn column(&mut self, model: &Model, regressor: &Regressor) -> usize {
+        let column = *self.known.entry(regressor.node).or_insert_with(|| {
+            self.nodes.push(regressor.node);
+            self.labels.push(model.label(regressor));
+            self.nodes.len() - 1
         });
-        let Some(channel) = self.channels.get_mut(regressor.channel) else { return 0 };
-        channel.iter().position(|known| *known == formula).unwrap_or_else(|| {
-            channel.push(formula);
+        let channel = &mut self.channels[regressor.channel];
+        channel.iter().position(|known| *known == column).unwrap_or_else(|| {
+            channel.push(column);
             channel.len() - 1
         })
     }
 
-    /// Adds what a model needs and says how the model is made of it.
-    pub fn add(&mut self, regressors: &[Regressor]) -> Layout {
+    /// Adds what a model needs at its present numbers and says how the model is made of it.
+    ///
+    /// # Errors
+    /// As [`Columns::regressors`].
+    pub fn model(&mut self, model: &Model) -> Result<Layout> {
+        let regressors = self.columns.regressors(model, Wanted::default())?;
+        Ok(self.add(model, &regressors))
+    }
+
+    /// Adds regressors of a model and says how it is made of them.
+    pub fn add(&mut self, model: &Model, regressors: &[Regressor]) -> Layout {
         let mut layout = Layout::default();
         for regressor in regressors {
-            let column = self.column(regressor);
-            let free = regressor.coefficient.map(|coefficient| {
-                let free = Free { effect: regressor.effect, coefficient };
-                layout.free.iter().position(|known| *known == free).unwrap_or_else(|| {
-                    layout.free.push(free);
-                    layout.free.len() - 1
-                })
-            });
-            let Some(channel) = layout.channels.get_mut(regressor.channel) else { continue };
-            match free {
-                None => channel.fixed.push(column),
-                Some(free) => match channel.free.iter_mut().find(|known| known.0 == free) {
-                    Some(known) => known.1.push((column, 1.0)),
-                    None => channel.free.push((free, vec![(column, 1.0)])),
-                },
+            let Some(coefficient) = regressor.number else { continue };
+            let free = Free { effect: regressor.effect, coefficient };
+            if !layout.free.contains(&free) {
+                layout.free.push(free);
+            }
+        }
+        // In the order of the model: those of an effect at its end come last.
+        layout.free.sort_unstable();
+        for regressor in regressors {
+            let column = self.column(model, regressor);
+            let channel = &mut layout.channels[regressor.channel];
+            let Some(coefficient) = regressor.number else {
+                channel.fixed.push(column);
+                continue;
+            };
+            let wanted = Free { effect: regressor.effect, coefficient };
+            let free = layout.free.binary_search(&wanted).expect("listed above");
+            match channel.free.iter_mut().find(|known| known.0 == free) {
+                Some(known) => known.1.push((column, 1.0)),
+                None => channel.free.push((free, vec![(column, 1.0)])),
             }
         }
         layout
     }
-}
 
-/// The regressors of a model that has all effects of `base` and one more at its end: those of `base` are taken over unless the new
-/// effect changes signals.
-pub(super) fn enlarged(model: &Model, base: &[Regressor]) -> Result<Vec<Regressor>> {
-    let last = model.effects.len() - 1;
-    if model.effects.last().is_some_and(|effect| effect.swaps.is_empty()) {
+    /// The regressors of a model that has all effects of `base` and one more at its end: those of `base` are taken over where the new effect
+    /// is still off, its coefficients zero.
+    ///
+    /// # Errors
+    /// As [`Columns::regressors`].
+    pub fn enlarged(&mut self, model: &Model, base: &[Regressor]) -> Result<Vec<Regressor>> {
+        let last = model.effects.len() - 1;
+        let is_off = model.effects.last().is_some_and(|effect| {
+            let zero = |value: &f64| *value == 0.0;
+            !effect.coefficients.is_empty()
+                && effect.coefficients.iter().all(|c| zero(&c.value) && c.by_flight.iter().flatten().all(|(_, value)| zero(value)))
+        });
+        if !is_off {
+            return self.columns.regressors(model, Wanted::default());
+        }
         let mut regressors = base.to_vec();
-        regressors.extend(model.regressors(|index| index == last)?);
-        return Ok(regressors);
+        regressors.extend(self.columns.regressors(model, Wanted { effect: Some(last), ..Wanted::default() })?);
+        Ok(regressors)
     }
-    model.regressors(|_| true)
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::gram::tests::model;
     use super::*;
-    use crate::physics::Effect;
+    use crate::physics::{Effect, catalogue};
 
     #[test]
     fn equal_formulas_are_one_column_and_one_coefficient_in_two_channels_is_one() -> Result<()> {
         let mut model = model();
         model.effects.push(Effect::formula("again", 0, "vx", 0.0)?);
         let mut design = Design::default();
-        let layout = design.add(&model.regressors(|_| true)?);
-        assert_eq!(design.formulas.iter().filter(|formula| formula.to_string() == "vx").count(), 1);
+        let layout = design.model(&model)?;
         // Two coefficients on one column: the model's own drag and the copy.
         let columns: Vec<_> = layout.channels[0].free.iter().map(|entry| entry.1.clone()).collect();
         assert_eq!(columns.len(), 2);
@@ -116,10 +141,10 @@ mod tests {
     #[test]
     fn adding_a_model_twice_adds_no_column() -> Result<()> {
         let mut design = Design::default();
-        let first = design.add(&model().regressors(|_| true)?);
-        let formulas = design.formulas.len();
-        let second = design.add(&model().regressors(|_| true)?);
-        assert_eq!(design.formulas.len(), formulas);
+        let first = design.model(&model())?;
+        let columns = design.nodes.len();
+        let second = design.model(&model())?;
+        assert_eq!(design.nodes.len(), columns);
         assert_eq!(first.channels, second.channels);
         assert_eq!(first.free, second.free);
         Ok(())
@@ -127,13 +152,23 @@ mod tests {
 
     #[test]
     fn a_model_enlarged_piece_by_piece_has_the_columns_of_the_whole() -> Result<()> {
-        let base = model().regressors(|_| true)?;
-        let mut larger = model();
-        larger.effects.push(Effect::formula("more", 3, "u4 * wz", 0.0)?);
         let mut design = Design::default();
-        let (pieces, whole) = (design.add(&enlarged(&larger, &base)?), design.add(&larger.regressors(|_| true)?));
-        assert_eq!(pieces.channels, whole.channels);
-        assert_eq!(pieces.free, whole.free);
+        let base = design.columns.regressors(&model(), Wanted::default())?;
+        for kind in ["", "ground_effect", "wind", "imu_lever", "rotor_droop", "ctrl_nonlin"] {
+            let mut larger = model();
+            larger.effects.push(match catalogue::definition(kind) {
+                Some(definition) => definition.effect(4.58, 0.8),
+                None => Effect::formula("more", 3, "u4 * wz", 0.0)?,
+            });
+            let pieces = design.enlarged(&larger, &base)?;
+            let (pieces, whole) = (design.add(&larger, &pieces), design.model(&larger)?);
+            assert_eq!(pieces.free, whole.free, "{kind}");
+            for (pieces, mut whole) in pieces.channels.into_iter().zip(whole.channels) {
+                whole.free.sort_by_key(|entry| pieces.free.iter().position(|known| known.0 == entry.0));
+                assert_eq!(pieces.fixed, whole.fixed, "{kind}");
+                assert_eq!(pieces.free, whole.free, "{kind}");
+            }
+        }
         Ok(())
     }
 }

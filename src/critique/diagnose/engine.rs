@@ -1,11 +1,11 @@
 //! Models tried on the same blocks: one pass for the columns of all of them, then for each its held-out error block by block.
 
-use super::design::{Design, Layout, enlarged};
+use super::design::{Design, Layout};
 use super::fit::{Component, Prior, Reduced, Solution, components};
 use super::gram::{Block, BlockGram, grams};
 use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
-use crate::physics::{Model, Regressor, calibrate, catalogue};
+use crate::physics::{Model, Regressor, Wanted, calibrate, catalogue};
 
 /// Folds over the blocks.
 pub(super) const FOLDS: usize = 10;
@@ -85,11 +85,12 @@ impl Engine<'_> {
     /// [`Error::Undetermined`] if the blocks, or those of nine of the ten folds, do not determine the coefficients of `base`.
     pub fn pass(&self, base: &Model, models: &[Model]) -> Result<Pass> {
         let mut design = Design::default();
-        let regressors = base.regressors(|_| true)?;
-        let layout = design.add(&regressors);
+        let regressors = design.columns.regressors(base, Wanted::default())?;
+        let layout = design.add(base, &regressors);
         let mut layouts = Vec::with_capacity(models.len());
         for model in models {
-            layouts.push(design.add(&self.regressors_of(model, base, &regressors)?));
+            let own = regressors_of(&mut design, model, (base, &regressors))?;
+            layouts.push(design.add(model, &own));
         }
         let grams = grams(self.flights, &self.blocks, &design)?;
         let base = self.base(base, &layout, &grams)?;
@@ -102,14 +103,6 @@ impl Engine<'_> {
         #[cfg(not(feature = "rayon"))]
         let trials = models.iter().zip(&layouts).map(one).collect();
         Ok(Pass { base, trials, grams })
-    }
-
-    fn regressors_of(&self, model: &Model, base: &Model, known: &[Regressor]) -> Result<Vec<Regressor>> {
-        let common = base.effects.len();
-        if model.effects.len() == common + 1 && model.effects.iter().zip(&base.effects).all(|(left, right)| left == right) {
-            return enlarged(model, known);
-        }
-        model.regressors(|_| true)
     }
 
     /// A model by itself.
@@ -244,6 +237,15 @@ impl Engine<'_> {
             trial.at_bound |= free.effect == last && solution.bound[position];
         }
     }
+}
+
+/// The regressors of a model, those of `base` taken over where it only has an effect more.
+fn regressors_of(design: &mut Design, model: &Model, (base, known): (&Model, &[Regressor])) -> Result<Vec<Regressor>> {
+    let common = base.effects.len();
+    if model.effects.len() == common + 1 && model.effects.iter().zip(&base.effects).all(|(left, right)| left == right) {
+        return design.enlarged(model, known);
+    }
+    design.columns.regressors(model, Wanted::default())
 }
 
 fn value(model: &Model, free: super::design::Free) -> f64 {

@@ -388,7 +388,7 @@ mod tests {
         // Each block of a fold under what the other folds say.
         for held in 0..5 {
             let mut design = Design::default();
-            let layout = design.add(&model.regressors(|_| true)?);
+            let layout = design.model(&model)?;
             let all = grams(&flights, &engine.blocks, &design)?;
             let mut fitted = model.clone();
             for (channels, members) in components(&layout) {

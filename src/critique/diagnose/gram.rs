@@ -4,7 +4,6 @@
 use super::design::Design;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Span};
-use crate::physics::evaluate_blocks;
 use ndarray::Array2;
 use ndarray::linalg::general_mat_mul;
 
@@ -72,7 +71,7 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
     let mut found: Vec<BlockGram> = blocks.iter().map(|_| empty()).collect();
     let end = blocks.iter().map(|block| block.end).max().unwrap_or(0);
     let mut scratch = Vec::new();
-    evaluate_blocks(&design.formulas, flight, end, &mut |range, values| {
+    design.columns.evaluate(&design.nodes, flight, end, &mut |range, values| {
         for (block, gram) in blocks.iter().zip(&mut found) {
             let (start, end) = (block.start.max(range.start), block.end.min(range.end));
             if start >= end {
@@ -80,13 +79,13 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
             }
             gram.rows += end - start;
             let part = start - range.start..end - range.start;
-            for ((formulas, target), sum) in design.channels.iter().zip(Column::TARGETS).zip(&mut gram.channels) {
+            for ((columns, target), sum) in design.channels.iter().zip(Column::TARGETS).zip(&mut gram.channels) {
                 scratch.clear();
-                for &formula in formulas {
-                    scratch.extend_from_slice(values.get(formula).and_then(|column| column.get(part.clone())).unwrap_or_default());
+                for &column in columns {
+                    scratch.extend_from_slice(&values.column(column)[part.clone()]);
                 }
-                scratch.extend_from_slice(flight.column(target).get(start..end).unwrap_or_default());
-                let shape = (formulas.len() + 1, part.len());
+                scratch.extend_from_slice(&flight.column(target)[start..end]);
+                let shape = (columns.len() + 1, part.len());
                 let Ok(matrix) = ndarray::ArrayView2::from_shape(shape, &scratch) else { continue };
                 general_mat_mul(1.0, &matrix, &matrix.t(), 1.0, sum);
             }
@@ -94,13 +93,13 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
         Ok(())
     })?;
     for (block, gram) in blocks.iter().zip(&found) {
-        for (formulas, matrix) in design.channels.iter().zip(&gram.channels) {
+        for (columns, matrix) in design.channels.iter().zip(&gram.channels) {
             if let Some(column) = matrix.diag().iter().position(|value| !value.is_finite()) {
-                let formula = formulas.get(column).and_then(|&formula| design.formulas.get(formula));
+                let label = columns.get(column).map(|&column| &design.labels[column]);
                 return Err(Error::Undetermined(format!(
                     "{} is not a finite number somewhere between t = {:.2} s and {:.2} s of flight `{}`; guard the formula, for example \
                      `max(height, 0.1)`",
-                    formula.map_or("the measured acceleration".into(), |formula| format!("the regressor `{formula}`")),
+                    label.map_or("the measured acceleration", String::as_str),
                     flight.time_s(block.start),
                     flight.time_s(block.end - 1),
                     flight.name
@@ -167,7 +166,7 @@ pub(super) mod tests {
             let flights = noise(seed, &[samples]);
             let mut design = Design::default();
             let failed = |error: Error| TestCaseError::fail(error.to_string());
-            design.add(&model().regressors(|_| true).map_err(failed)?);
+            design.model(&model()).map_err(failed)?;
             let one = grams(&flights, &[Block { flight: 0, start: 0, end: samples }], &design).map_err(failed)?;
             let parts = grams(&flights, &blocks(&flights, &whole(&flights), block_s), &design).map_err(failed)?;
             prop_assert_eq!(parts.iter().map(|part| part.rows).sum::<usize>(), one[0].rows);
@@ -186,7 +185,7 @@ pub(super) mod tests {
         let mut design = Design::default();
         let mut model = model();
         model.effects.push(crate::physics::Effect::formula("root", 0, "sqrt(vx)", 0.0)?);
-        design.add(&model.regressors(|_| true)?);
+        design.model(&model)?;
         let message = grams(&flights, &blocks(&flights, &whole(&flights), 3.0), &design).map_err(|error| error.to_string());
         assert!(matches!(message, Err(text) if text.contains("sqrt(vx)") && text.contains("`f0`")));
         Ok(())

@@ -44,7 +44,8 @@ pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6],
         let name = Column::TARGETS.get(channel).map_or("", |column| column.name());
         unknown.iter().filter(|unknown| unknown.channel == name).any(|unknown| {
             let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
-            let mut formulas = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
+            let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
+            let mut formulas = terms.chain(effect.swaps.iter().map(|swap| &swap.with));
             let reads = formulas.any(|formula| formula.names().iter().any(|name| related(name, variable)));
             let bar = if reads { 0.5 } else { 1.0 };
             unknown.r2 * left[channel] > bar * removed[channel]
@@ -55,6 +56,7 @@ pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6],
 /// Whether two names speak of the same motion: a speed is made of velocities.
 fn related(name: &str, variable: &str) -> bool {
     let speeds = |name: &str| ["airspeed", "hypot(vx, vy)"].contains(&name);
+    let name = name.strip_prefix("air_").unwrap_or(name);
     let velocities = |name: &str| ["vx", "vy", "vz"].contains(&name);
     let gravity = ["g_x", "g_y", "g_z"].contains(&name) && ["roll", "pitch"].contains(&variable);
     name == variable

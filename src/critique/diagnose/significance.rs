@@ -6,7 +6,7 @@
 //! normality (Hemerik, Goeman & Finos 2020, J. Royal Statistical Society B 82:841). The statistic is studentised, S = sᵀ V⁻¹ s with
 //! s the sum and V the sum of squares of the block scores, and the largest over the effect's grid, under the same signs.
 //!
-//! A swap has no coefficient; its regressor is the change it makes to the prediction, and its test is one-sided. Blocks are weighted by the
+//! A lag or a delay has no coefficient; its regressor is the change it makes to the prediction, and its test is one-sided. Blocks are weighted by the
 //! inverse of their error, or a few aerobatic ones would decide everything.
 
 use super::design::Layout;
@@ -46,7 +46,7 @@ pub(super) struct Raw {
 pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weights: &[Vec<f64>; 6]) -> Option<Raw> {
     let effect = trial.model.effects.last()?;
     let one_sided = effect.coefficients.is_empty();
-    let layout = if effect.swaps.is_empty() { trial.layout.clone() } else { difference(base, trial) };
+    let layout = if one_sided { difference(base, trial) } else { trial.layout.clone() };
     let known = base.layout.free.len();
     let channels: Vec<usize> =
         (0..6).filter(|&channel| layout.channels[channel].free.iter().any(|entry| entry.0 >= known)).collect();

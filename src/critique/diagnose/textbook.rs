@@ -26,7 +26,7 @@ const THRESHOLDS: [f64; 8] = [0.003, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7];
 /// What a method reports: effects, the one that explains most first.
 pub type Named = Vec<String>;
 
-/// Both methods on one data set: `(stepwise, STLSQ)`. `dynamic` keeps the columns of swaps in the library.
+/// Both methods on one data set: `(stepwise, STLSQ)`. `dynamic` keeps the columns of effects without a coefficient (lags, delays) in the library.
 ///
 /// # Errors
 /// As [`super::diagnose`].
@@ -37,13 +37,13 @@ pub fn textbook(flights: &[Flight], model: &Model, searched: &[Span], dynamic: b
     let base = engine.pass(model, &[])?.base.model;
     let tried: Vec<_> = candidates(&base, flights)
         .into_iter()
-        .filter(|candidate| candidate.inapplicable.is_none() && (dynamic || candidate.effect.swaps.is_empty()))
+        .filter(|candidate| candidate.inapplicable.is_none() && (dynamic || !candidate.effect.coefficients.is_empty()))
         .collect();
     let mut design = Design::default();
-    let own = design.add(&base.regressors(|_| true)?);
+    let own = design.model(&base)?;
     let mut libraries: [Vec<(usize, String)>; 6] = Default::default();
     for candidate in &tried {
-        let layout = design.add(&with(&base, &candidate.effect).regressors(|_| true)?);
+        let layout = design.model(&with(&base, &candidate.effect))?;
         for (channel, library) in libraries.iter_mut().enumerate() {
             for column in columns(&layout, channel) {
                 if !columns(&own, channel).contains(&column) && !library.iter().any(|known| known.0 == column) {

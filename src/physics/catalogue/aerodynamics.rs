@@ -1,6 +1,6 @@
 //! Forces and moments of the air on fuselage, fin and tail rotor. The main rotor is in `thrust` and `rotor`.
 
-use super::super::definition::{Definition, Notes, coefficient};
+use super::super::definition::{Definition, Notes, change, coefficient};
 use super::{ANY, HELICOPTER};
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -13,7 +13,11 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("k_z", "1/m", "along body down").within(-0.1, 0.0).usually(-0.03, -0.007),
         ],
         parameters: &[],
-        terms: &[(0, Some("k_x"), "airspeed * vx"), (1, Some("k_y"), "airspeed * vy"), (2, Some("k_z"), "airspeed * vz")],
+        terms: &[
+            (0, Some("k_x"), "airspeed * air_vx"),
+            (1, Some("k_y"), "airspeed * air_vy"),
+            (2, Some("k_z"), "airspeed * air_vz"),
+        ],
         swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
@@ -37,12 +41,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("x_vy"), "vy"),
-            (0, Some("x_vz"), "vz"),
-            (1, Some("y_vx"), "vx"),
-            (1, Some("y_vz"), "vz"),
-            (2, Some("z_vx"), "vx"),
-            (2, Some("z_vy"), "vy"),
+            (0, Some("x_vy"), "air_vy"),
+            (0, Some("x_vz"), "air_vz"),
+            (1, Some("y_vx"), "air_vx"),
+            (1, Some("y_vz"), "air_vz"),
+            (2, Some("z_vx"), "air_vx"),
+            (2, Some("z_vy"), "air_vy"),
         ],
         swaps: &[],
         notes: Some(Notes {
@@ -56,27 +60,32 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     },
     Definition {
         kind: "wind",
-        meaning: "a steady wind: drag acts against the air, not against the ground, v -> v - R^T W",
+        meaning: "a steady wind: all that the air does goes by the velocity against the air, v - R^T W",
         coefficients: &[
             coefficient("wind_n", "m/s", "motion of the air to the north").within(-15.0, 15.0).usually(-5.0, 5.0).each_flight(3.0),
             coefficient("wind_e", "m/s", "motion of the air to the east").within(-15.0, 15.0).usually(-5.0, 5.0).each_flight(3.0),
         ],
         parameters: &[],
-        terms: &[
-            (0, Some("wind_n"), "-linear_drag_a_x * cos(pitch) * cos(yaw)"),
-            (1, Some("wind_n"), "-linear_drag_a_y * (sin(roll) * sin(pitch) * cos(yaw) - cos(roll) * sin(yaw))"),
-            (2, Some("wind_n"), "-linear_drag_a_z * (cos(roll) * sin(pitch) * cos(yaw) + sin(roll) * sin(yaw))"),
-            (0, Some("wind_e"), "-linear_drag_a_x * cos(pitch) * sin(yaw)"),
-            (1, Some("wind_e"), "-linear_drag_a_y * (sin(roll) * sin(pitch) * sin(yaw) + cos(roll) * cos(yaw))"),
-            (2, Some("wind_e"), "-linear_drag_a_z * (cos(roll) * sin(pitch) * sin(yaw) - sin(roll) * cos(yaw))"),
+        terms: &[],
+        swaps: &[
+            change("air_vx", "air_vx - wind_n * cos(pitch) * cos(yaw) - wind_e * cos(pitch) * sin(yaw)"),
+            change(
+                "air_vy",
+                "air_vy - wind_n * (sin(roll) * sin(pitch) * cos(yaw) - cos(roll) * sin(yaw)) \
+                 - wind_e * (sin(roll) * sin(pitch) * sin(yaw) + cos(roll) * cos(yaw))",
+            ),
+            change(
+                "air_vz",
+                "air_vz - wind_n * (cos(roll) * sin(pitch) * cos(yaw) + sin(roll) * sin(yaw)) \
+                 - wind_e * (cos(roll) * sin(pitch) * sin(yaw) - sin(roll) * cos(yaw))",
+            ),
         ],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "every heading, and banks in which the heave damping meets the wind",
             confusable_with: &["quad_drag", "vel_cross", "tilt_misalign", "sensor_bias", "weathercock", "dihedral_speedstab"],
             would_tell_apart: "a slow pirouette in hover, and the same straight flight up and down the wind",
-            source: "air-relative velocity in eq. 14 of the baseline; ZYX Euler angles",
+            source: "velocity against the air; ZYX Euler angles: Stevens & Lewis sec. 1.3",
             searched: true,
         }),
     },
@@ -91,7 +100,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .positive("a tail rotor that its own swing speeds up"),
         ],
         parameters: &[],
-        terms: &[(1, Some("k_u"), "u3"), (1, Some("k_r"), "wz")],
+        // The tail's thrust in full sticks: the sign holds for any convention of the stick.
+        terms: &[(1, Some("k_u"), "tail_thrust * control_moment_c_z / max(control_moment_c_z^2, 1e-6)"), (1, Some("k_r"), "wz")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -116,8 +126,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .positive("a tail rotor that turns the tail into the wind"),
         ],
         parameters: &[],
-        terms: &[(5, Some("k_fin"), "airspeed * vy"), (5, Some("k_tail"), "vy")],
-        swaps: &[],
+        terms: &[(5, Some("k_fin"), "airspeed * air_vy")],
+        swaps: &[change("tail_thrust", "tail_thrust + k_tail * air_vy")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "sideslip at several speeds",
@@ -138,8 +148,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .positive("a rotor that tilts into its own speed"),
         ],
         parameters: &[],
-        terms: &[(3, Some("l_v"), "vy"), (4, Some("m_u"), "vx")],
-        swaps: &[],
+        terms: &[],
+        swaps: &[change("rotor_roll", "rotor_roll + l_v * air_vy"), change("rotor_pitch", "rotor_pitch + m_u * air_vx")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "accelerations from hover, forwards and sideways",
@@ -182,8 +192,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .negative("anti-damping at high rate"),
         ],
         parameters: &[],
-        terms: &[(5, Some("k_speed"), "u3 * hypot(vx, vy)"), (5, Some("k_rate"), "abs(wz) * wz")],
-        swaps: &[],
+        terms: &[],
+        swaps: &[change("tail_thrust", "tail_thrust + k_speed * u3 * hypot(air_vx, air_vy) + k_rate * abs(wz) * wz")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "tail inputs at speed, and pirouettes beyond 2 rad/s",

@@ -1,6 +1,6 @@
 //! Mass and its distribution: products of inertia, centre of mass, fuel, displaced air.
 
-use super::super::definition::{Definition, Notes, coefficient};
+use super::super::definition::{Definition, Notes, change, coefficient};
 use super::{ANY, HELICOPTER};
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -19,15 +19,15 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (3, Some("i_xz"), concat!("(", predicted!(wz), " + wx * wy) / ix")),
+            (3, Some("i_xz"), "(predicted_wz + wx * wy) / ix"),
             (4, Some("i_xz"), "(wz^2 - wx^2) / iy"),
-            (5, Some("i_xz"), concat!("(", predicted!(wx), " - wy * wz) / iz")),
-            (3, Some("i_xy"), concat!("(", predicted!(wy), " - wx * wz) / ix")),
-            (4, Some("i_xy"), concat!("(", predicted!(wx), " + wy * wz) / iy")),
+            (5, Some("i_xz"), "(predicted_wx - wy * wz) / iz"),
+            (3, Some("i_xy"), "(predicted_wy - wx * wz) / ix"),
+            (4, Some("i_xy"), "(predicted_wx + wy * wz) / iy"),
             (5, Some("i_xy"), "(wx^2 - wy^2) / iz"),
             (3, Some("i_yz"), "(wy^2 - wz^2) / ix"),
-            (4, Some("i_yz"), concat!("(", predicted!(wz), " - wx * wy) / iy")),
-            (5, Some("i_yz"), concat!("(", predicted!(wy), " + wx * wz) / iz")),
+            (4, Some("i_yz"), "(predicted_wz - wx * wy) / iy"),
+            (5, Some("i_yz"), "(predicted_wy + wx * wz) / iz"),
             (3, Some("ratio_x"), "wy * wz"),
             (4, Some("ratio_y"), "wz * wx"),
             (5, Some("ratio_z"), "wx * wy"),
@@ -50,7 +50,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("y_m", "m", "centre of mass to starboard of the mast").within(-0.05, 0.05).usually(-0.01, 0.01),
         ],
         parameters: &[],
-        terms: &[(4, Some("x_m"), concat!("mass_kg / iy * ", thrust!())), (3, Some("y_m"), concat!("-mass_kg / ix * ", thrust!()))],
+        terms: &[(4, Some("x_m"), "mass_kg / iy * thrust"), (3, Some("y_m"), "-mass_kg / ix * thrust")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
@@ -67,8 +67,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[coefficient("k", "1/s", "share of the mass lost per second").within(0.0, 0.01).usually(0.0002, 0.002)],
         parameters: &[],
         // Time as the log counts it: each flight is taken to start with full tanks at t = 0.
-        terms: &[(2, Some("k"), concat!(thrust!(), " * t"))],
-        swaps: &[],
+        terms: &[],
+        swaps: &[change("thrust", "thrust * (1 + k * t)")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "flights of several minutes each, with the time counted from take-off",
@@ -84,9 +84,9 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[coefficient("k", "1", "mass of that air over the aircraft's").within(0.0, 0.05).usually(0.002, 0.01)],
         parameters: &[],
         terms: &[
-            (0, Some("k"), "-(g_x + linear_drag_a_x * vx)"),
-            (1, Some("k"), "-(g_y + linear_drag_a_y * vy)"),
-            (2, Some("k"), concat!("-(g_z + linear_drag_a_z * vz + ", thrust!(), ")")),
+            (0, Some("k"), "-(g_x + linear_drag_a_x * air_vx)"),
+            (1, Some("k"), "-(g_y + linear_drag_a_y * air_vy)"),
+            (2, Some("k"), "-(g_z + thrust)"),
         ],
         swaps: &[],
         notes: Some(Notes {

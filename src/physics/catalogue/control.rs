@@ -1,26 +1,33 @@
 //! The way from a stick to what it moves: delay, lags, limits, cross-coupling, linkage.
 
-use super::super::definition::{Definition, Notes, SwapDefinition, coefficient, parameter};
+use super::super::definition::{Definition, Notes, change, coefficient, parameter};
 use super::{ANY, HELICOPTER};
 
-/// Effects in which the cyclic makes a moment, the predicted angular accelerations included.
-const CYCLIC_MOMENTS: &[&str] = &["control_moment", "imu_lever", "inertia_cross", "rotor_droop"];
+/// Delays that a search tries, s.
+const DELAYS: &[f64] = &[0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1];
+/// Largest rates of servos that it tries, full sticks per second.
+const SLEWS: &[f64] = &[1.0, 2.0, 3.0, 4.5, 7.0, 12.0];
 
 pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "ctrl_delay",
         meaning: "between a recorded control and its effect passes a fixed time",
         coefficients: &[],
-        parameters: &[parameter("delay_s", "s", "delay of all four controls")
-            .starting(0.02)
-            .tried(&[0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1])
-            .within(0.0, 0.15)],
+        parameters: &[
+            parameter("delay_s", "s", "delay of the cyclic").starting(0.02).tried(DELAYS).within(0.0, 0.15),
+            parameter("tail_s", "s", "delay of the tail").starting(0.02).tried(DELAYS).within(0.0, 0.15).tied("delay_s"),
+            parameter("collective_s", "s", "delay of the collective")
+                .starting(0.02)
+                .tried(DELAYS)
+                .within(0.0, 0.15)
+                .tied("delay_s"),
+        ],
         terms: &[],
         swaps: &[
-            SwapDefinition { name: "u1", with: "delay(u1, delay_s)", within: &[] },
-            SwapDefinition { name: "u2", with: "delay(u2, delay_s)", within: &[] },
-            SwapDefinition { name: "u3", with: "delay(u3, delay_s)", within: &[] },
-            SwapDefinition { name: "u4", with: "delay(u4, delay_s)", within: &[] },
+            change("u1", "delay(u1, delay_s)"),
+            change("u2", "delay(u2, delay_s)"),
+            change("u3", "delay(u3, tail_s)"),
+            change("u4", "delay(u4, collective_s)"),
         ],
         notes: Some(Notes {
             vehicles: ANY,
@@ -28,6 +35,42 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             confusable_with: &["cyclic_lag", "tail_lag", "collective_lag", "sync"],
             would_tell_apart: "3-2-1-1 inputs on each stick: a lag rounds the corners, a delay does not",
             source: "servo and receiver delays of 40 to 50 ms: Walker & Tischler, VFS Forum 77, 2021",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "servo_rate_limit",
+        meaning: "servos turn no faster than they can, so quick inputs arrive as ramps",
+        coefficients: &[],
+        parameters: &[
+            parameter("rate_per_s", "1/s", "largest rate of the cyclic, in full sticks per second")
+                .starting(3.0)
+                .tried(SLEWS)
+                .within(0.2, 20.0),
+            parameter("tail_per_s", "1/s", "largest rate of the tail")
+                .starting(3.0)
+                .tried(SLEWS)
+                .within(0.2, 20.0)
+                .tied("rate_per_s"),
+            parameter("collective_per_s", "1/s", "largest rate of the collective")
+                .starting(3.0)
+                .tried(SLEWS)
+                .within(0.2, 20.0)
+                .tied("rate_per_s"),
+        ],
+        terms: &[],
+        swaps: &[
+            change("u1", "slew(u1, rate_per_s)"),
+            change("u2", "slew(u2, rate_per_s)"),
+            change("u3", "slew(u3, tail_per_s)"),
+            change("u4", "slew(u4, collective_per_s)"),
+        ],
+        notes: Some(Notes {
+            vehicles: HELICOPTER,
+            excitation: "full-stick reversals within a tenth of a second",
+            confusable_with: &["cyclic_lag", "ctrl_nonlin"],
+            would_tell_apart: "the same step at a tenth and at the whole of the stick: a lag takes as long for both, a limit does not",
+            source: "model servos: 60 degrees in 0.05 to 0.15 s unloaded",
             searched: true,
         }),
     },
@@ -52,10 +95,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         terms: &[],
         swaps: &[
-            SwapDefinition { name: "u1", with: "lag(u1, tau_x_s)", within: CYCLIC_MOMENTS },
-            SwapDefinition { name: "u2", with: "lag(u2, tau_y_s)", within: CYCLIC_MOMENTS },
-            SwapDefinition { name: "wx", with: "(1 - share) * wx + share * lag(wx, tau_x_s)", within: &["rate_damping"] },
-            SwapDefinition { name: "wy", with: "(1 - share) * wy + share * lag(wy, tau_y_s)", within: &["rate_damping"] },
+            change("u1", "lag(u1, tau_x_s)"),
+            change("u2", "lag(u2, tau_y_s)"),
+            change("wx", "(1 - share) * wx + share * lag(wx, tau_x_s)").within(&["rate_damping"]),
+            change("wy", "(1 - share) * wy + share * lag(wy, tau_y_s)").within(&["rate_damping"]),
         ],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -75,7 +118,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
             .within(0.0, 0.5)],
         terms: &[],
-        swaps: &[SwapDefinition { name: "u3", with: "lag(u3, tau_s)", within: &[] }],
+        swaps: &[change("u3", "lag(u3, tau_s)")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick tail inputs",
@@ -94,37 +137,13 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             .tried(&[0.004, 0.012, 0.03, 0.06, 0.12])
             .within(0.0, 0.5)],
         terms: &[],
-        swaps: &[SwapDefinition { name: "u4", with: "lag(u4, tau_s)", within: &[] }],
+        swaps: &[change("u4", "lag(u4, tau_s)")],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "quick collective inputs",
             confusable_with: &["ctrl_delay", "inflow_lag", "rotor_droop"],
             would_tell_apart: "3-2-1-1 inputs on the collective in hover",
             source: "Gavrilets: servos of 36 rad/s, damping 0.5, with a slow pole",
-            searched: true,
-        }),
-    },
-    Definition {
-        kind: "servo_rate_limit",
-        meaning: "servos turn no faster than they can, so quick inputs arrive as ramps",
-        coefficients: &[],
-        parameters: &[parameter("rate_per_s", "1/s", "largest rate, in full sticks per second")
-            .starting(3.0)
-            .tried(&[1.0, 2.0, 3.0, 4.5, 7.0, 12.0])
-            .within(0.2, 20.0)],
-        terms: &[],
-        swaps: &[
-            SwapDefinition { name: "u1", with: "slew(u1, rate_per_s)", within: &[] },
-            SwapDefinition { name: "u2", with: "slew(u2, rate_per_s)", within: &[] },
-            SwapDefinition { name: "u3", with: "slew(u3, rate_per_s)", within: &[] },
-            SwapDefinition { name: "u4", with: "slew(u4, rate_per_s)", within: &[] },
-        ],
-        notes: Some(Notes {
-            vehicles: HELICOPTER,
-            excitation: "full-stick reversals within a tenth of a second",
-            confusable_with: &["cyclic_lag", "ctrl_nonlin"],
-            would_tell_apart: "the same step at a tenth and at the whole of the stick: a lag takes as long for both, a limit does not",
-            source: "model servos: 60 degrees in 0.05 to 0.15 s unloaded",
             searched: true,
         }),
     },
@@ -138,13 +157,13 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("k_c", "m/s²", "collective").within(-30.0, 30.0).usually(-2.0, 2.0),
         ],
         parameters: &[parameter("exponent", "1", "power of the travel").starting(3.0).tried(&[2.0, 3.0]).within(2.0, 4.0)],
-        terms: &[
-            (3, Some("k_x"), "sign(u1) * abs(u1)^exponent"),
-            (4, Some("k_y"), "sign(u2) * abs(u2)^exponent"),
-            (5, Some("k_z"), "sign(u3) * abs(u3)^exponent"),
-            (2, Some("k_c"), "sign(u4) * abs(u4)^exponent"),
+        terms: &[],
+        swaps: &[
+            change("rotor_roll", "rotor_roll + k_x * sign(u1) * abs(u1)^exponent"),
+            change("rotor_pitch", "rotor_pitch + k_y * sign(u2) * abs(u2)^exponent"),
+            change("tail_thrust", "tail_thrust + k_z * sign(u3) * abs(u3)^exponent"),
+            change("thrust", "thrust + k_c * sign(u4) * abs(u4)^exponent"),
         ],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "each stick over most of its travel",
@@ -176,17 +195,16 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("z_u2", "rad/s²", "yaw by longitudinal cyclic").within(-40.0, 40.0).usually(-3.0, 3.0),
         ],
         parameters: &[],
+        // The cyclic's cross-coupling turns the disc's tilt; what tail and collective do to roll and pitch does not pass through it.
         terms: &[
-            (3, Some("x_u2"), "u2"),
             (3, Some("x_u3"), "u3"),
             (3, Some("x_u4"), "u4"),
-            (4, Some("y_u1"), "u1"),
             (4, Some("y_u3"), "u3"),
             (4, Some("y_u4"), "u4"),
             (5, Some("z_u1"), "u1"),
             (5, Some("z_u2"), "u2"),
         ],
-        swaps: &[],
+        swaps: &[change("rotor_roll", "rotor_roll + x_u2 * u2"), change("rotor_pitch", "rotor_pitch + y_u1 * u1")],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "each stick moved on its own",

@@ -144,7 +144,7 @@ proptest! {
 
     #[test]
     fn thrust_off_the_centre_of_mass_turns(state in states(), ahead in -0.05..0.05f64, starboard in -0.05..0.05f64) {
-        let thrust = 4.58 * (-20.0 * state[Column::U4 as usize] - 0.51);
+        let thrust = 4.58 * (-20.0 * state[Column::U4 as usize] - 0.51 - 1.42 * state[Column::Vz as usize]);
         let moment = cross([-ahead, -starboard, 0.0], [0.0, 0.0, thrust]);
         let expected: [f64; 3] = std::array::from_fn(|axis| moment[axis] / INERTIA[axis]);
         assert_near(&added(effect("cg_offset", &[ahead, starboard])?, state)?[3..], &expected, EXACT);

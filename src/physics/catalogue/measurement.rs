@@ -1,14 +1,13 @@
 //! What an instrument makes of the motion: where it sits, how it is mounted, its bias and its delay.
 //!
-//! Recorded quantities enter the model in place of the true ones, so each regressor is model(true) - model(recorded), to first order
-//! in the error.
+//! The rest of the model is made of the true motion: each effect here turns what was recorded into it, and adds what the recorded
+//! derivative has beside that of the true quantity.
 
-use super::super::definition::{Definition, Notes, coefficient};
+use super::super::definition::{Definition, Notes, change, coefficient};
 use super::ANY;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
-    // The recorded velocity is v + w x r. With v put back, v' = -w x v + g + A v + f becomes
-    // v'_rec = -w x v_rec + g + A v_rec + f + w' x r + w x (w x r) - A (w x r).
+    // The recorded velocity is v + w x r, so v = v_rec - w x r, and v'_rec = v' + w' x r. What turning axes do to v gives w x (w x r).
     Definition {
         kind: "imu_lever",
         meaning: "velocity is recorded at a point away from the centre of mass: w' x r + w x (w x r) - A (w x r)",
@@ -19,17 +18,18 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("r_x"), "-(wy^2 + wz^2)"),
-            (0, Some("r_y"), concat!("wx * wy - ", predicted!(wz), " + linear_drag_a_x * wz")),
-            (0, Some("r_z"), concat!("wx * wz + ", predicted!(wy), " - linear_drag_a_x * wy")),
-            (1, Some("r_x"), concat!("wx * wy + ", predicted!(wz), " - linear_drag_a_y * wz")),
-            (1, Some("r_y"), "-(wx^2 + wz^2)"),
-            (1, Some("r_z"), concat!("wy * wz - ", predicted!(wx), " + linear_drag_a_y * wx")),
-            (2, Some("r_x"), concat!("wx * wz - ", predicted!(wy), " + linear_drag_a_z * wy")),
-            (2, Some("r_y"), concat!("wy * wz + ", predicted!(wx), " - linear_drag_a_z * wx")),
-            (2, Some("r_z"), "-(wx^2 + wy^2)"),
+            (0, Some("r_y"), "-predicted_wz"),
+            (0, Some("r_z"), "predicted_wy"),
+            (1, Some("r_x"), "predicted_wz"),
+            (1, Some("r_z"), "-predicted_wx"),
+            (2, Some("r_x"), "-predicted_wy"),
+            (2, Some("r_y"), "predicted_wx"),
         ],
-        swaps: &[],
+        swaps: &[
+            change("vx", "vx - (wy * r_z - wz * r_y)"),
+            change("vy", "vy - (wz * r_x - wx * r_z)"),
+            change("vz", "vz - (wx * r_y - wy * r_x)"),
+        ],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "quick rolls, flips and pirouettes",
@@ -49,15 +49,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("d_z", "rad", "turn about body down").within(-0.12, 0.12).usually(-0.03, 0.03),
         ],
         parameters: &[],
-        terms: &[
-            (0, Some("d_y"), "-g_z"),
-            (0, Some("d_z"), "g_y"),
-            (1, Some("d_x"), "g_z"),
-            (1, Some("d_z"), "-g_x"),
-            (2, Some("d_x"), "-g_y"),
-            (2, Some("d_y"), "g_x"),
+        terms: &[],
+        swaps: &[
+            change("g_x", "g_x + g_y * d_z - g_z * d_y"),
+            change("g_y", "g_y + g_z * d_x - g_x * d_z"),
+            change("g_z", "g_z + g_x * d_y - g_y * d_x"),
         ],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "banks beyond 30 degrees",
@@ -67,10 +64,9 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             searched: true,
         }),
     },
-    // -(w - b_w) x (v - b_v) = -w x v + w x b_v + b_w x v; A and B act on the recorded values less their bias.
     Definition {
         kind: "sensor_bias",
-        meaning: "velocity and rates are recorded with a constant bias: + w x b_v - A b_v + b_w x v, and - B b_w with its gyroscopic part",
+        meaning: "velocity and rates are recorded with a constant bias",
         coefficients: &[
             coefficient("b_vx", "m/s", "recorded minus true forward velocity")
                 .within(-1.5, 1.5)
@@ -89,33 +85,15 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("b_wz", "rad/s", "recorded minus true yaw rate").within(-0.2, 0.2).usually(-0.03, 0.03).each_flight(0.02),
         ],
         parameters: &[],
-        terms: &[
-            (0, Some("b_vx"), "-linear_drag_a_x"),
-            (1, Some("b_vx"), "wz"),
-            (2, Some("b_vx"), "-wy"),
-            (0, Some("b_vy"), "-wz"),
-            (1, Some("b_vy"), "-linear_drag_a_y"),
-            (2, Some("b_vy"), "wx"),
-            (0, Some("b_vz"), "wy"),
-            (1, Some("b_vz"), "-wx"),
-            (2, Some("b_vz"), "-linear_drag_a_z"),
-            (1, Some("b_wx"), "-vz"),
-            (2, Some("b_wx"), "vy"),
-            (3, Some("b_wx"), "-rate_damping_b_x"),
-            (4, Some("b_wx"), "-(iz - ix) / iy * wz"),
-            (5, Some("b_wx"), "-(ix - iy) / iz * wy"),
-            (0, Some("b_wy"), "vz"),
-            (2, Some("b_wy"), "-vx"),
-            (3, Some("b_wy"), "-(iy - iz) / ix * wz"),
-            (4, Some("b_wy"), "-rate_damping_b_y"),
-            (5, Some("b_wy"), "-(ix - iy) / iz * wx"),
-            (0, Some("b_wz"), "-vy"),
-            (1, Some("b_wz"), "vx"),
-            (3, Some("b_wz"), "-(iy - iz) / ix * wy"),
-            (4, Some("b_wz"), "-(iz - ix) / iy * wx"),
-            (5, Some("b_wz"), "-rate_damping_b_z"),
+        terms: &[],
+        swaps: &[
+            change("vx", "vx - b_vx"),
+            change("vy", "vy - b_vy"),
+            change("vz", "vz - b_vz"),
+            change("wx", "wx - b_wx"),
+            change("wy", "wy - b_wy"),
+            change("wz", "wz - b_wz"),
         ],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "several flights, each with turns at speed",
@@ -135,26 +113,15 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("attitude_s"), "wz * g_y - wy * g_z"),
-            (1, Some("attitude_s"), "wx * g_z - wz * g_x"),
-            (2, Some("attitude_s"), "wy * g_x - wx * g_y"),
-            (
-                0,
-                Some("velocity_s"),
-                concat!("wz * ", predicted!(vy), " - wy * ", predicted!(vz), " + linear_drag_a_x * ", predicted!(vx)),
-            ),
-            (
-                1,
-                Some("velocity_s"),
-                concat!("wx * ", predicted!(vz), " - wz * ", predicted!(vx), " + linear_drag_a_y * ", predicted!(vy)),
-            ),
-            (
-                2,
-                Some("velocity_s"),
-                concat!("wy * ", predicted!(vx), " - wx * ", predicted!(vy), " + linear_drag_a_z * ", predicted!(vz)),
-            ),
+            (0, Some("velocity_s"), "wz * predicted_vy - wy * predicted_vz + linear_drag_a_x * predicted_vx"),
+            (1, Some("velocity_s"), "wx * predicted_vz - wz * predicted_vx + linear_drag_a_y * predicted_vy"),
+            (2, Some("velocity_s"), "wy * predicted_vx - wx * predicted_vy + linear_drag_a_z * predicted_vz"),
         ],
-        swaps: &[],
+        swaps: &[
+            change("g_x", "g_x + attitude_s * (wz * g_y - wy * g_z)"),
+            change("g_y", "g_y + attitude_s * (wx * g_z - wz * g_x)"),
+            change("g_z", "g_z + attitude_s * (wy * g_x - wx * g_y)"),
+        ],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "quick rolls and flips",

@@ -2,38 +2,12 @@
 //! for and the manoeuvre that would tell. Data, in the order of its subjects; how one is found missing is the critique's business.
 //!
 //! Notation: v = (vx, vy, vz) m/s, w = (wx, wy, wz) rad/s, u1 lateral, u2 longitudinal, u3 tail, u4 collective; body axes point forward,
-//! to starboard and down, so an upright rotor's thrust is negative. The specific thrust T along body z is written
-//! `collective_thrust_c_z * u4 + vertical_bias_d_z`, and accelerations that a formula needs are written out as the baseline predicts
-//! them, with its calibrated coefficients: a measured acceleration as an input would answer the question with itself.
-
-/// Specific thrust along body z, m/s², up negative.
-macro_rules! thrust {
-    () => {
-        "(collective_thrust_c_z * u4 + vertical_bias_d_z)"
-    };
-}
-
-/// An acceleration as the baseline predicts it: m/s² along body x, y, z, then rad/s² about them.
-macro_rules! predicted {
-    (vx) => {
-        "(vy * wz - vz * wy + g_x + linear_drag_a_x * vx)"
-    };
-    (vy) => {
-        "(vz * wx - vx * wz + g_y + linear_drag_a_y * vy)"
-    };
-    (vz) => {
-        "(vx * wy - vy * wx + g_z + linear_drag_a_z * vz + collective_thrust_c_z * u4 + vertical_bias_d_z)"
-    };
-    (wx) => {
-        "((iy - iz) / ix * wy * wz + rate_damping_b_x * wx + control_moment_c_x * u1 + moment_bias_d_x)"
-    };
-    (wy) => {
-        "((iz - ix) / iy * wz * wx + rate_damping_b_y * wy + control_moment_c_y * u2 + moment_bias_d_y)"
-    };
-    (wz) => {
-        "((ix - iy) / iz * wx * wy + rate_damping_b_z * wz + control_moment_c_z * u3 + moment_bias_d_z)"
-    };
-}
+//! to starboard and down, so an upright rotor's thrust is negative. Formulas read and change the signals of the model (`SIGNALS`), so that
+//! effects see each other: what the air does reads the velocity against the air, what the rotor does its thrust. Accelerations that a
+//! formula needs are those that the model predicts: a measured acceleration as an input would answer the question with itself.
+//!
+//! The order of the list is the order in which effects change one signal: a delay comes before a servo's limit, that before a lag,
+//! and the shape of the linkage last.
 
 mod aerodynamics;
 mod body;
@@ -52,10 +26,10 @@ const ANY: &[Vehicle] = &Vehicle::ALL;
 /// Every effect of the catalogue.
 pub fn definitions() -> impl Iterator<Item = &'static Definition> {
     let subjects = [
+        control::DEFINITIONS,
         aerodynamics::DEFINITIONS,
         thrust::DEFINITIONS,
         rotor::DEFINITIONS,
-        control::DEFINITIONS,
         body::DEFINITIONS,
         measurement::DEFINITIONS,
     ];

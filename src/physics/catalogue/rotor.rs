@@ -1,13 +1,13 @@
 //! The main rotor as a whole: its torque, its speed, and the tilt of its disc.
 
-use super::super::definition::{Definition, Notes, Origin, coefficient, parameter};
+use super::super::definition::{Definition, Notes, Origin, change, coefficient, parameter};
 use super::HELICOPTER;
 
-/// Power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum theory: T (v_i + v_c), the induced part as
-/// thrust to the 3/2, the climbing part with the speed along the thrust.
-macro_rules! slow_power {
+/// Speed squared of the rotor, relative: power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum
+/// theory: T (v_i + v_c), the induced part as thrust to the 3/2, the climbing part with the speed along the thrust.
+macro_rules! speed_squared {
     () => {
-        concat!("lag(abs(", thrust!(), " / 9.80665)^1.5 + ", thrust!(), " / 9.80665 * vz / induced_m_s - 1, tau_s)")
+        "max(1 + k * lag(abs(thrust / 9.80665)^1.5 + thrust / 9.80665 * air_vz / induced_m_s - 1, tau_s), 0.04)"
     };
 }
 
@@ -17,7 +17,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "the torque that drives the main rotor turns the fuselage the other way",
         coefficients: &[coefficient("k", "rad/s²", "yaw acceleration at 1 g of thrust").within(-60.0, 60.0).usually(-6.0, 6.0)],
         parameters: &[parameter("exponent", "1", "power of the thrust").starting(1.5).tried(&[1.0, 1.5, 2.0]).within(1.0, 2.0)],
-        terms: &[(5, Some("k"), concat!("abs(", thrust!(), " / 9.80665)^exponent"))],
+        terms: &[(5, Some("k"), "abs(thrust / 9.80665)^exponent")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -34,7 +34,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[coefficient("n_w", "rad/(m s)", "yaw by descent at 1 g of thrust").within(-20.0, 20.0).usually(-6.0, 6.0)],
         parameters: &[],
         // Power is thrust times climb: inverted, the sign turns over.
-        terms: &[(5, Some("n_w"), concat!("-", thrust!(), " / 9.80665 * vz"))],
+        terms: &[(5, Some("n_w"), "-thrust / 9.80665 * air_vz")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -58,13 +58,14 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .within(0.03, 4.0),
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
-        terms: &[
-            (2, Some("k"), concat!(thrust!(), " * ", slow_power!())),
-            (3, Some("k"), concat!("control_moment_c_x * u1 * ", slow_power!())),
-            (4, Some("k"), concat!("control_moment_c_y * u2 * ", slow_power!())),
-            (5, Some("k"), concat!("control_moment_c_z * u3 * ", slow_power!())),
+        terms: &[],
+        swaps: &[
+            change("rotor_speed", concat!("rotor_speed * sqrt(", speed_squared!(), ")")),
+            change("thrust", concat!("thrust * ", speed_squared!())),
+            change("rotor_roll", concat!("rotor_roll * ", speed_squared!())),
+            change("rotor_pitch", concat!("rotor_pitch * ", speed_squared!())),
+            change("tail_thrust", concat!("tail_thrust * ", speed_squared!())),
         ],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "collective pulses of half a second and longer",
@@ -82,7 +83,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             searched: true,
         }),
     },
-    // The moment that a stick makes tells which way it tilts the disc: signs hold for any convention of the sticks.
+    // The disc's tilt makes the moment, so the moment tells the tilt, whatever tilted it: signs hold for any convention of the sticks.
     Definition {
         kind: "flap_tilt",
         meaning: "the thrust tilts with the disc: with the cyclic, and behind the fuselage when it turns",
@@ -92,10 +93,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("tilt"), concat!("sign(control_moment_c_y) * u2 * ", thrust!())),
-            (1, Some("tilt"), concat!("-sign(control_moment_c_x) * u1 * ", thrust!())),
-            (0, Some("lag_s"), concat!("-wy * ", thrust!())),
-            (1, Some("lag_s"), concat!("wx * ", thrust!())),
+            (0, Some("tilt"), "rotor_pitch / max(abs(control_moment_c_y), 1e-3) * thrust"),
+            (1, Some("tilt"), "-rotor_roll / max(abs(control_moment_c_x), 1e-3) * thrust"),
+            (0, Some("lag_s"), "-wy * thrust"),
+            (1, Some("lag_s"), "wx * thrust"),
         ],
         swaps: &[],
         notes: Some(Notes {

@@ -1,9 +1,9 @@
 //! What holds for every entry of the catalogue: it is whole, it can be stored, and it gives numbers on any state.
 
-use super::super::{Model, standard_names};
+use super::super::{Model, SIGNALS, standard_names};
 use super::*;
 use crate::flight::{Column, Flight, Targets};
-use crate::physics::{Effect, Origin};
+use crate::physics::{Columns, Effect, Origin, Wanted};
 use crate::{Error, Result};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
@@ -41,6 +41,13 @@ fn with_everything() -> Model {
         model.effects.push(effect);
     }
     model
+}
+
+fn blanked(model: &mut Model) {
+    for coefficient in model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients) {
+        coefficient.value = 0.0;
+        coefficient.by_flight = coefficient.by_flight.take().map(|_| std::collections::BTreeMap::new());
+    }
 }
 
 #[test]
@@ -98,9 +105,6 @@ fn every_entry_is_whole() -> Result<()> {
             assert!(!standard_names().contains(&name) && !Model::CONSTANTS.contains(&name), "{kind}.{name}");
         }
         assert!(combinations <= 15, "{kind}: {combinations} columns");
-        if !entry.swaps.is_empty() {
-            assert!(entry.coefficients.is_empty(), "{kind}: a swap has no free coefficient");
-        }
         for within in entry.swaps.iter().flat_map(|swap| swap.within) {
             assert!(definition(within).is_some(), "{kind} swaps within {within}");
         }
@@ -112,10 +116,11 @@ fn every_entry_is_whole() -> Result<()> {
 fn every_name_in_a_formula_is_known() -> Result<()> {
     let model = with_everything();
     for effect in &model.effects {
-        for term in &effect.terms {
-            let constants = term.regressor.names().into_iter().filter(|name| model.constant(effect, name).is_some());
-            let known: Vec<&str> = standard_names().into_iter().chain(constants).collect();
-            term.regressor.check_names(&known)?;
+        for formula in effect.formulas() {
+            let numbers = formula.names().into_iter().filter(|name| model.gives(effect, name));
+            let known: Vec<&str> =
+                standard_names().into_iter().chain(numbers).chain(SIGNALS.iter().map(|signal| signal.name)).collect();
+            formula.check_names(&known)?;
         }
     }
     Ok(())
@@ -144,7 +149,7 @@ proptest! {
         let mut model = with_everything();
         if blank {
             // Uncalibrated: every thrust and moment in the formulas is zero.
-            model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients).for_each(|coefficient| coefficient.value = 0.0);
+            blanked(&mut model);
         }
         let flight = flight(&wild)?;
         let predicted = model.predict(&flight)?;
@@ -158,4 +163,127 @@ proptest! {
             }
         }
     }
+}
+
+/// A flight of smooth random motion of a helicopter's size, well away from the ground.
+pub(in super::super) fn motion(seed: u64, samples: usize) -> Result<Flight> {
+    let size = [30.0, 30.0, 5.0, 0.8, 0.5, 3.0, 9.0, 6.0, 4.0, 3.0, 3.0, 3.0, 0.8, 0.8, 0.8, 0.5];
+    let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; samples]);
+    for (index, (column, size)) in columns.iter_mut().zip(size).enumerate() {
+        let stream = phyture_kernels::random::Stream::new(seed, index as u64, 0, 0);
+        let waves: Vec<[f64; 2]> =
+            (0..3).map(|wave| [1.0 + 9.0 * stream.uniform(2 * wave), 6.28 * stream.uniform(2 * wave + 1)]).collect();
+        for (sample, value) in column.iter_mut().enumerate() {
+            let time_s = STEP_S * sample as f64;
+            *value = size / 3.0 * waves.iter().map(|[rate, phase]| (rate * time_s + phase).sin()).sum::<f64>();
+        }
+    }
+    columns[Column::Z as usize].iter_mut().for_each(|z| *z -= 20.0);
+    columns[Column::U4 as usize].iter_mut().for_each(|u4| *u4 += 0.45);
+    Flight::new("a", "made_up", 0.0, STEP_S, columns, Targets::Recorded)
+}
+
+/// The helicopter with some effects of the catalogue at about their usual sizes.
+fn with_some(chosen: &[bool], size: f64) -> Model {
+    let mut model = helicopter();
+    for (definition, _) in definitions().zip(chosen).filter(|(_, chosen)| **chosen) {
+        let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
+        for (coefficient, known) in effect.coefficients.iter_mut().zip(definition.coefficients) {
+            let [low, high] = known.expected.unwrap_or([-1.0, 1.0]);
+            coefficient.value = 0.5 * (low + high) + size * 0.4 * (high - low);
+        }
+        // A delay of whole samples lies on a corner of the straight line between them.
+        effect.parameters.iter_mut().filter(|parameter| !parameter.fixed).for_each(|parameter| parameter.value *= 1.07);
+        model.effects.push(effect);
+    }
+    model
+}
+
+/// Of every number of a model the largest difference between its columns and a central difference of the prediction, over the
+/// largest value of the column.
+fn deviation_of_columns(model: &Model, flight: &Flight) -> Result<Vec<(String, f64)>> {
+    let mut columns = Columns::default();
+    let regressors = columns.regressors(model, Wanted { parameters: true, ..Wanted::default() })?;
+    let nodes: Vec<_> = regressors.iter().map(|regressor| regressor.node).collect();
+    let mut numbers: Vec<(usize, usize)> = regressors.iter().filter_map(|r| Some((r.effect, r.number?))).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let mut found = Vec::new();
+    for place in numbers {
+        let mut slope = vec![vec![0.0; flight.len()]; 6];
+        columns.evaluate(&nodes, flight, flight.len(), &mut |range, block| {
+            for (index, regressor) in
+                regressors.iter().enumerate().filter(|(_, r)| (r.effect, r.number) == (place.0, Some(place.1)))
+            {
+                slope[regressor.channel][range.clone()].iter_mut().zip(block.column(index)).for_each(|(sum, value)| *sum += value);
+            }
+            Ok(())
+        })?;
+        let number = model.effects[place.0].number(place.1).map_or(0.0, |number| number.value);
+        // Where a servo's limit begins within the step, a difference sees both sides, and a lag carries it on: then a short step tells.
+        let typical = [1e-4, 1e-6].map(|share| difference(model, flight, place, &slope, share * number.abs().max(1e-2)));
+        let [long, short] = typical;
+        let typical = long?.min(short?);
+        found.push((format!("{}.{place:?}", model.effects[place.0].name), typical));
+    }
+    Ok(found)
+}
+
+/// The difference of a slope to that of the prediction over steps of a number, exceeded at 2 % of the samples, over the largest slope.
+fn difference(model: &Model, flight: &Flight, place: (usize, usize), slope: &[Vec<f64>], step: f64) -> Result<f64> {
+    let moved = |by: f64| {
+        let mut moved = model.clone();
+        if let Some((value, _)) = moved.effects[place.0].number_mut(place.1) {
+            *value += by;
+        }
+        moved.predict(flight)
+    };
+    let [far_up, up, down, far_down] = [moved(2.0 * step)?, moved(step)?, moved(-step)?, moved(-2.0 * step)?];
+    // A servo that is fast enough has no slope; differences then are rounding.
+    let largest = slope.iter().flatten().fold(0.1_f64, |largest, value| largest.max(value.abs()));
+    let mut differences: Vec<f64> = Vec::new();
+    for channel in 0..6 {
+        for sample in 0..flight.len() {
+            let four =
+                far_down[channel][sample] - 8.0 * down[channel][sample] + 8.0 * up[channel][sample] - far_up[channel][sample];
+            differences.push((slope[channel][sample] - four / (12.0 * step)).abs() / largest);
+        }
+    }
+    differences.sort_by(f64::total_cmp);
+    Ok(differences[differences.len() * 98 / 100])
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn columns_are_derivatives_by_every_number_of_every_effect(
+        seed in any::<u64>(),
+        chosen in prop::collection::vec(any::<bool>(), 34),
+        size in -1.0..1.0f64,
+    ) {
+        for (number, deviation) in deviation_of_columns(&with_some(&chosen, size), &motion(seed, 120)?)? {
+            prop_assert!(deviation < 1e-6, "{number}: {deviation:.1e}");
+        }
+    }
+}
+
+#[test]
+fn with_everything_off_the_model_is_the_baseline_to_the_bit() -> Result<()> {
+    let flight = motion(5, 300)?;
+    let mut model = with_everything();
+    let names: Vec<String> = helicopter().effects.iter().map(|effect| effect.name.clone()).collect();
+    model.effects.iter_mut().for_each(|effect| effect.enabled = names.contains(&effect.name));
+    let (found, expected) = (model.predict(&flight)?, helicopter().predict(&flight)?);
+    assert_eq!(found, expected);
+    // The sums of the paper's equations, term after term.
+    let of = |column: Column| flight.column(column);
+    for sample in 0..flight.len() {
+        let at = |column: Column| of(column)[sample];
+        let gravity = crate::flight::attitude::gravity_body(at(Column::Roll), at(Column::Pitch))[2];
+        let turning = at(Column::Vx) * at(Column::Wy) - at(Column::Vy) * at(Column::Wx);
+        let sum = gravity + turning + -1.42 * at(Column::Vz) + -20.0 * at(Column::U4) + -0.51;
+        assert_eq!(expected[2][sample].to_bits(), sum.to_bits());
+    }
+    Ok(())
 }

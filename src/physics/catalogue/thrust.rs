@@ -1,12 +1,12 @@
 //! What the main rotor's thrust depends on beside the collective: ground, speed, climb, descent, stall.
 
-use super::super::definition::{Definition, Notes, Origin, SwapDefinition, coefficient, parameter};
+use super::super::definition::{Definition, Notes, Origin, change, coefficient, parameter};
 use super::{ANY, HELICOPTER};
 
 /// Square of the induced velocity that the thrust of the moment has in hover, m²/s².
 macro_rules! hover_flow {
     () => {
-        concat!("(induced_m_s^2 * abs(", thrust!(), " / 9.80665))")
+        "(induced_m_s^2 * abs(thrust) / 9.80665)"
     };
 }
 
@@ -23,15 +23,11 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .within(0.0, 0.6),
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
-        terms: &[(
-            2,
-            Some("k"),
-            concat!(
-                thrust!(),
-                " * (1 / (1 - (radius_m / (4 * max(height + hub_m, 0.5 * radius_m)))^2 / (1 + (airspeed / induced_m_s)^2)) - 1)"
-            ),
+        terms: &[],
+        swaps: &[change(
+            "thrust",
+            "thrust * (1 + k * (1 / (1 - (radius_m / (4 * max(height + hub_m, 0.5 * radius_m)))^2 / (1 + (airspeed / induced_m_s)^2)) - 1))",
         )],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "flight below two rotor radii",
@@ -56,25 +52,19 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             .within(0.1, 30.0)],
         // Glauert's flow in level flight, solved for the induced velocity: v_i = v_h^2 / sqrt(sqrt(V^4/4 + v_h^4) + V^2/2), with
         // v_h the induced velocity that this thrust has in hover. The guard is for no thrust and no speed.
-        terms: &[
-            (
-                2,
-                Some("k"),
-                concat!(
-                    "sign",
-                    thrust!(),
-                    " * (sqrt",
-                    hover_flow!(),
-                    " - ",
-                    hover_flow!(),
-                    " / sqrt(max(hypot(0.5 * (vx^2 + vy^2), ",
-                    hover_flow!(),
-                    ") + 0.5 * (vx^2 + vy^2), 1e-6)))"
-                ),
+        terms: &[],
+        swaps: &[change(
+            "thrust",
+            concat!(
+                "thrust + k * sign(thrust) * (sqrt",
+                hover_flow!(),
+                " - ",
+                hover_flow!(),
+                " / sqrt(max(hypot(0.5 * (air_vx^2 + air_vy^2), ",
+                hover_flow!(),
+                ") + 0.5 * (air_vx^2 + air_vy^2), 1e-6))) + k_mu * thrust * (hypot(air_vx, air_vy) / induced_m_s)^2"
             ),
-            (2, Some("k_mu"), concat!(thrust!(), " * (hypot(vx, vy) / induced_m_s)^2")),
-        ],
-        swaps: &[],
+        )],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "speeds from hover to three times the induced velocity",
@@ -101,11 +91,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .within(0.3, 8.0),
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
-        terms: &[
-            (2, Some("k_speed"), "vz * hypot(vx, vy) / (hypot(vx, vy) + ratio * induced_m_s)"),
-            (2, Some("k_climb"), "vz * abs(vz)"),
-        ],
-        swaps: &[],
+        terms: &[],
+        swaps: &[change(
+            "thrust",
+            "thrust + k_speed * air_vz * hypot(air_vx, air_vy) / (hypot(air_vx, air_vy) + ratio * induced_m_s) \
+             + k_climb * air_vz * abs(air_vz)",
+        )],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "climbs and descents in hover and above 6 m/s",
@@ -130,17 +121,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
         // Descent is motion against the thrust: along +z for an upright rotor.
-        terms: &[(
-            2,
-            Some("k"),
-            concat!(
-                thrust!(),
-                " * exp(-((-sign",
-                thrust!(),
-                " * vz / induced_m_s - centre) / width)^2) * exp(-(hypot(vx, vy) / induced_m_s)^2)"
-            ),
+        terms: &[],
+        swaps: &[change(
+            "thrust",
+            "thrust * (1 + k * exp(-((-sign(thrust) * air_vz / induced_m_s - centre) / width)^2) \
+             * exp(-(hypot(air_vx, air_vy) / induced_m_s)^2))",
         )],
-        swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "steep descents faster than half the induced velocity",
@@ -160,8 +146,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             .starting(1.3)
             .tried(&[1.1, 1.3, 1.6, 2.0])
             .within(1.0, 4.0)],
-        terms: &[(2, Some("k"), concat!("sign", thrust!(), " * max(abs", thrust!(), " - knee_g * 9.80665, 0)"))],
-        swaps: &[],
+        terms: &[],
+        swaps: &[change("thrust", "thrust + k * sign(thrust) * max(abs(thrust) - knee_g * 9.80665, 0)")],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "collective to the ends of its range, right way up and inverted",
@@ -186,10 +172,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .within(0.0, 2.0),
         ],
         terms: &[],
-        swaps: &[
-            SwapDefinition { name: "u4", with: "u4 + overshoot * (u4 - lag(u4, tau_s))", within: &["collective_thrust"] },
-            SwapDefinition { name: "vz", with: "vz + overshoot * (vz - lag(vz, tau_s))", within: &["linear_drag"] },
-        ],
+        swaps: &[change("thrust", "thrust + overshoot * (thrust - lag(thrust, tau_s))")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick collective inputs",

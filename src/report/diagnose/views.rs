@@ -17,7 +17,7 @@ use crate::critique::{Row, compare};
 use crate::error::{Error, Result};
 use crate::flight::windows::windows;
 use crate::flight::{Accelerations, Column, Flight, Span, Window, split};
-use crate::physics::{Effect, evaluate_blocks};
+use crate::physics::Effect;
 
 /// Samples that maps and binned residuals look at, at most; of more every k-th is taken.
 const SAMPLES: usize = 150_000;
@@ -256,7 +256,8 @@ impl Seen<'_> {
 
     /// Added effects that act in a channel.
     fn added(&self, channel: usize) -> impl Iterator<Item = (usize, &Effect)> {
-        self.report.added().filter(move |(_, effect)| effect.terms.iter().any(|term| term.channel == channel))
+        let acts = move |index: usize| self.report.after.acts(index).is_ok_and(|acts| acts[channel]);
+        self.report.added().filter(move |(index, _)| acts(*index))
     }
 
     /// For each of the variables the contribution of the first added effect that reads it, binned as the residual is.
@@ -278,7 +279,7 @@ impl Seen<'_> {
             if wanted.is_empty() {
                 continue;
             }
-            let contribution = self.contribution(index, effect, channel)?;
+            let contribution = self.contribution(index, channel)?;
             let flights = self.report.flights;
             // As if the effect were all that the model misses: its residual is the contribution.
             let predicted = |window: &Window| {
@@ -302,27 +303,16 @@ impl Seen<'_> {
         Ok(curves)
     }
 
-    /// What the terms of an effect of the model after add to a channel, flight by flight; empty where a flight is in no span.
-    fn contribution(&self, index: usize, effect: &Effect, channel: usize) -> Result<Vec<Vec<f64>>> {
-        let regressors = self.report.after.regressors(|other| other == index)?;
-        let regressors: Vec<_> = regressors.into_iter().filter(|regressor| regressor.channel == channel).collect();
-        let formulas: Vec<_> = regressors.iter().map(|regressor| regressor.formula.clone()).collect();
+    /// What an effect of the model after adds to a channel, flight by flight; empty where a flight is in no span.
+    fn contribution(&self, index: usize, channel: usize) -> Result<Vec<Vec<f64>>> {
+        let mut without = self.report.after.clone();
+        without.effects[index].enabled = false;
         let of = |(number, flight): (usize, &Flight)| {
             if !self.report.searched.iter().any(|span| span.flight == number) {
                 return Ok(Vec::new());
             }
-            let size = |coefficient: Option<usize>| {
-                coefficient.and_then(|index| effect.coefficients.get(index)).map_or(1.0, |c| c.in_flight(&flight.name))
-            };
-            let mut sum = vec![0.0; flight.len()];
-            evaluate_blocks(&formulas, flight, flight.len(), &mut |range, columns| {
-                for (regressor, values) in regressors.iter().zip(columns) {
-                    let size = size(regressor.coefficient);
-                    sum[range.clone()].iter_mut().zip(values).for_each(|(sum, value)| *sum += size * value);
-                }
-                Ok(())
-            })?;
-            Ok(sum)
+            let (with, without) = (self.report.after.predict(flight)?, without.predict(flight)?);
+            Ok(with[channel].iter().zip(&without[channel]).map(|(with, without)| with - without).collect())
         };
         self.report.flights.iter().enumerate().map(of).collect()
     }
@@ -478,9 +468,14 @@ fn determined<T>(found: Result<T>) -> Result<Option<T>> {
 
 /// Whether an effect acts on a channel without memory and reads the variable there.
 fn reads(effect: &Effect, channel: usize, variable: Variable) -> bool {
-    let terms = || effect.terms.iter().filter(|term| term.channel == channel);
-    let stands_for = |name: &str| name == variable.name() || (variable == Variable::Height && name == Column::Z.name());
-    terms().all(|term| !term.regressor.remembers()) && terms().any(|term| term.regressor.names().into_iter().any(stands_for))
+    let formulas = || {
+        let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
+        terms.chain(effect.swaps.iter().map(|swap| &swap.with))
+    };
+    let stands_for = |name: &str| {
+        name.strip_prefix("air_").unwrap_or(name) == variable.name() || (variable == Variable::Height && name == Column::Z.name())
+    };
+    formulas().all(|formula| !formula.remembers()) && formulas().any(|formula| formula.names().into_iter().any(stands_for))
 }
 
 /// A region and, indented, its parts.

@@ -1,11 +1,11 @@
-//! `effect list`, `effect show` and `effect add`: the catalogue for a person, and the way of an effect into a model file.
+//! `effect list`, `effect signals`, `effect show` and `effect add`: the catalogue for a person, and the way of an effect into a model file.
 
 use super::Context;
 use crate::arguments::EffectCommand;
 use phyture::flight::Column;
 use phyture::formula::Formula;
 use phyture::physics::catalogue::{definition, definitions};
-use phyture::physics::{Definition, Effect, Model, Origin, standard_names};
+use phyture::physics::{Definition, Effect, Model, Origin, SIGNALS, Signal, signal_named, standard_names};
 use phyture::suggest::did_you_mean;
 use phyture::{Error, Result};
 use serde_json::{Value, json};
@@ -20,6 +20,7 @@ const ADDED_BY: &str = "effect add";
 pub fn run(context: &Context, command: &EffectCommand) -> Result<ExitCode> {
     match command {
         EffectCommand::List => list(context),
+        EffectCommand::Signals => signals(context),
         EffectCommand::Show { effect } => show(context, effect),
         EffectCommand::Add { effect, model, output } => add(context, effect, model, output),
     }
@@ -38,23 +39,41 @@ pub fn find(id: &str) -> Result<&'static Definition> {
     })
 }
 
-/// Names of the accelerations that an effect adds to or, by what it swaps in the baseline, changes.
+/// Names of the accelerations that an effect changes in the paper's baseline.
 fn channels(definition: &Definition) -> Vec<&'static str> {
-    let mut touched = [false; 6];
-    for &(channel, _, _) in definition.terms {
-        touched[channel] = true;
-    }
-    // A swap changes those terms of the paper's baseline that read the name.
-    for effect in Model::paper("", 1.0, [1.0; 3], 1.0).effects {
-        for term in &effect.terms {
-            let read = |swap: &&phyture::physics::SwapDefinition| {
-                (swap.within.is_empty() || swap.within.contains(&effect.name.as_str()))
-                    && term.regressor.names().contains(&swap.name)
-            };
-            touched[term.channel] |= definition.swaps.iter().find(read).is_some();
-        }
-    }
+    let mut model = Model::paper("", 1.0, [1.0; 3], 1.0);
+    model.effects.push(definition.effect(1.0, 1.0));
+    let touched = model.acts(model.effects.len() - 1).expect("a built-in effect goes with the baseline");
     Column::TARGETS.into_iter().zip(touched).filter(|(_, touched)| *touched).map(|(column, _)| column.name()).collect()
+}
+
+/// Names of signals, one after the other.
+fn names(signals: &[&Signal]) -> String {
+    let names: Vec<&str> = signals.iter().map(|signal| signal.name).collect();
+    if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+fn signals(context: &Context) -> Result<ExitCode> {
+    let effects: Vec<Effect> = definitions().map(|definition| definition.effect(1.0, 1.0)).collect();
+    let changers = |signal: &Signal| -> Vec<&str> {
+        let changes = |effect: &&Effect| effect.changes().iter().any(|changed| changed.name == signal.name);
+        effects.iter().filter(changes).map(|effect| effect.kind.as_str()).collect()
+    };
+    context.print(format!("{:<12}  {:<6}  {:<60}  changed by", "signal", "unit", "what it is"));
+    for signal in &SIGNALS {
+        let changers = changers(signal);
+        let by = if changers.is_empty() { "-".into() } else { changers.join(" ") };
+        context.print(format!("{:<12}  {:<6}  {:<60}  {by}", signal.name, signal.unit, signal.meaning));
+    }
+    context.print(concat!(
+        "\na formula of your own changes a signal like this, in a model file:\n\n",
+        "  [[effect]]\n  kind = \"formula\"\n  name = \"blade_twist\"\n  changes = \"thrust\"\n  formula = \"thrust * airspeed\""
+    ));
+    let described = SIGNALS.iter().map(
+        |signal| json!({ "name": signal.name, "unit": signal.unit, "meaning": signal.meaning, "changed_by": changers(signal) }),
+    );
+    context.json(&json!({ "signals": described.collect::<Vec<_>>() }))?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn list(context: &Context) -> Result<ExitCode> {
@@ -65,7 +84,7 @@ fn list(context: &Context) -> Result<ExitCode> {
         let channels = channels(definition).join(" ");
         context.print(format!("{:<width$}  {channels:<42}  {}{aside}", definition.kind, definition.meaning));
     }
-    context.print("\n`phyture effect show EFFECT` prints formulas, sizes and what it is mistaken for");
+    context.print("\n`phyture effect show EFFECT` prints formulas, sizes and what it is mistaken for, `phyture effect signals` what they read and change");
     context.json(&json!({ "effects": definitions().map(described).collect::<Vec<_>>() }))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -93,9 +112,11 @@ fn text(definition: &Definition) -> String {
         line(2, format!("{:<6} += {product}   [{}]", column.name(), column.unit()));
     }
     for swap in definition.swaps {
-        let within = if swap.within.is_empty() { "everywhere".into() } else { format!("in {}", swap.within.join(", ")) };
-        line(2, format!("{:<6} := {}   {within}", swap.name, swap.with));
+        let within = if swap.within.is_empty() { String::new() } else { format!("   in {}", swap.within.join(", ")) };
+        line(2, format!("{:<6} := {}{within}", swap.name, swap.with));
     }
+    let effect = definition.effect(1.0, 1.0);
+    line(0, format!("\nReads signals     {}\nChanges signals   {}", names(&effect.reads()), names(&effect.changes())));
     if !definition.coefficients.is_empty() {
         line(0, "\nCoefficients".into());
     }
@@ -159,10 +180,13 @@ fn described(definition: &Definition) -> Value {
         json!({ "name": parameter.name, "unit": parameter.unit, "meaning": parameter.meaning, "origin": origin,
             "grid": parameter.grid, "bounds": parameter.bounds, "tied_to": parameter.tied_to })
     });
+    let effect = definition.effect(1.0, 1.0);
     json!({
         "effect": definition.kind,
         "meaning": definition.meaning,
         "channels": channels(definition),
+        "reads": effect.reads().iter().map(|signal| signal.name).collect::<Vec<_>>(),
+        "changes": effect.changes().iter().map(|signal| signal.name).collect::<Vec<_>>(),
         "terms": terms.collect::<Vec<_>>(),
         "swaps": swaps.collect::<Vec<_>>(),
         "coefficients": coefficients.collect::<Vec<_>>(),
@@ -202,6 +226,12 @@ fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<Exi
             "the enabled effect and coefficient of that name, as the paper's baseline has it",
         );
     }
+    if !model.acts(model.effects.len() - 1)?.contains(&true) {
+        return fault(
+            format!("nothing that reads {}, which `{id}` changes", names(&effect.changes())),
+            "an enabled effect that does, as the paper's baseline has it",
+        );
+    }
     model.write(context.ready(&target)?)?;
     context.say(format!("{id} added to {}; its coefficients are 0 until `phyture calibrate`", output.display()));
     context.json(&json!({ "effect": id, "model": output }))?;
@@ -210,6 +240,6 @@ fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<Exi
 
 /// A name in the effect's formulas that neither a column nor the model gives.
 fn unknown_name(model: &Model, effect: &Effect) -> Option<String> {
-    let known = |name: &str| standard_names().contains(&name) || model.gives(effect, name);
-    effect.terms.iter().flat_map(|term| term.regressor.names()).find(|name| !known(name)).map(str::to_owned)
+    let known = |name: &str| standard_names().contains(&name) || signal_named(name).is_some() || model.gives(effect, name);
+    effect.formulas().flat_map(|formula| formula.names()).find(|name| !known(name)).map(str::to_owned)
 }
