@@ -158,26 +158,123 @@ fn a_comparison_judges_every_sample_and_gives_stars_only_beyond_chance() -> Resu
 #[test]
 fn the_loop_ends_with_before_and_after_and_gives_each_number_once() -> Result<()> {
     let place = folder()?;
-    run(place.path(), &["simulate", "data", "--minutes", "10", "--seed", "7404", "--hide", "weathercock"])?;
-    let said = run(place.path(), &["loop", "data", "-o", "amended.toml", "--json", "loop.json"])?;
+    run(
+        place.path(),
+        &["simulate", "data", "--minutes", "10", "--seed", "7404", "--hide", "weathercock", "--explainable", "floor"],
+    )?;
+    let said = run(place.path(), &["loop", "data", "-o", "amended.toml", "--json", "loop.json", "--explainable", "floor"])?;
     fits(&said);
+    // No round by itself: one verdict and one list, then the table, the model and the ledger.
+    assert!(
+        said.matches("Verdict: ").count() == 1 && !said.contains("Round ") && said.matches("weathercock: ").count() == 1,
+        "{said}"
+    );
     let table: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("RMSE on ")).collect();
-    assert!(table.len() > 5 && table[0].contains("added: weathercock"), "{said}");
-    assert!(table.iter().any(|line| line.trim_start().starts_with("change") && line.matches('%').count() == 6), "{said}");
+    assert!(table.len() > 8 && table[0].ends_with("; one effect added"), "{said}");
+    let row = |name: &str| {
+        let line = table.iter().find(|line| line.trim_start().starts_with(name)).copied().unwrap_or_default();
+        line.trim_start().trim_start_matches(name).split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    for name in ["before", "after", "floor", "squared error removed, %", "removable error removed, %"] {
+        assert_eq!(row(name).len(), 6, "{name}: {said}");
+    }
+    let ledger = said.lines().position(|line| line == "ledger: amended.ledger.jsonl, a line for weathercock");
+    let table_at = said.lines().position(|line| line.starts_with("RMSE on "));
+    assert!(ledger > table_at && said.contains("model written to amended.toml"), "{said}");
     assert!(!said.contains("tail_lag ") && said.contains("--verbose lists them"), "candidates are counted: {said}");
     let found = json(place.path(), "loop.json")?;
+    assert_eq!(found["ledger"], "amended.ledger.jsonl");
+    assert!(found["rounds"].as_array().is_some_and(|rounds| rounds.len() == 2), "the rounds stay in the JSON");
+    // The table holds the numbers of the JSON, and the floor is that of `compare` on the same flights.
+    let together = &found["together"]["locked"];
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
+    for (place, channel) in ["vx_dot", "vy_dot", "vz_dot", "wx_dot", "wy_dot", "wz_dot"].iter().enumerate() {
+        let [before, after, floor] = ["rmse_before", "rmse_after", "floor"].map(|what| number(&together[what][channel]));
+        for (name, value) in [("before", before), ("after", after), ("floor", floor)] {
+            assert_eq!(row(name)[place], format!("{value:.4}"), "{channel}");
+        }
+        let share = (before * before - after * after) / (before * before - floor * floor);
+        let told = &together["removable_removed"][channel];
+        assert!(told.is_null() || (number(told) - share).abs() < 1e-9, "{channel}: {told} {share}");
+    }
+    // A fin is most of what was hidden from the yaw channel: nearly all that could be removed is, and the fin alone did it.
+    assert!(number(&together["removable_removed"]["wz_dot"]) > 0.9, "{together}");
+    let worth = &found["together"]["worth"][0];
+    let share = number(&worth["share"]["wz_dot"]["share"]);
+    let ci95 = [0, 1].map(|end| number(&worth["share"]["wz_dot"]["ci95"][end]));
+    assert!(ci95[0] > share - 0.2 && ci95[1] < share + 0.2, "paired with the error before, block by block: {worth}");
+    assert!(worth["effect"] == "weathercock" && (share - number(&together["mse_fall"]["wz_dot"][0])).abs() < 0.02, "{worth}");
     let amended = Model::read(place.path().join("amended.toml"))?;
     let effect = amended.effect("weathercock").ok_or_else(|| Error::Undetermined("no weathercock".into()))?;
-    let numbers = found["rounds"][0]["steps"][0]["coefficients"].as_array().cloned().unwrap_or_default();
-    assert_eq!(numbers.len(), effect.coefficients.len());
-    for (number, coefficient) in numbers.iter().zip(&effect.coefficients) {
-        assert_eq!(number["value"].as_f64().map(f64::to_bits), Some(coefficient.value.to_bits()), "{number} {coefficient:?}");
+    for steps in [&found["rounds"][0]["steps"], &found["together"]["steps"]] {
+        let numbers = steps[0]["coefficients"].as_array().cloned().unwrap_or_default();
+        assert_eq!(numbers.len(), effect.coefficients.len());
+        for (number, coefficient) in numbers.iter().zip(&effect.coefficients) {
+            assert_eq!(number["value"].as_f64().map(f64::to_bits), Some(coefficient.value.to_bits()), "{number} {coefficient:?}");
+        }
+        let formula = steps[0]["formula"].as_str().unwrap_or_default();
+        assert_eq!(formula, effect.to_string(), "the formula has the numbers that stand beside it");
     }
-    let formula = found["rounds"][0]["steps"][0]["formula"].as_str().unwrap_or_default();
-    assert_eq!(formula, effect.to_string(), "the formula has the numbers that stand beside it");
     let verbose = run(place.path(), &["diagnose", "data", "--verbose"])?;
     fits(&verbose);
     assert!(verbose.lines().any(|line| line.starts_with("tail_lag ")) && verbose.contains("could be chance: p "), "{verbose}");
+    Ok(())
+}
+
+/// The floor is beside what is found, in text, JSON and page; and what is found does not change by it.
+#[test]
+fn the_explainable_part_shows_the_floor_and_is_never_searched() -> Result<()> {
+    let place = folder()?;
+    let at = place.path();
+    run(at, &["simulate", "data", "--minutes", "10", "--seed", "7408", "--hide", "quad_drag=2", "--explainable", "floor"])?;
+    let plain = run(at, &["diagnose", "data", "--json", "plain.json"])?;
+    let said = run(at, &["diagnose", "data", "--json", "with.json", "--report", "pages", "--explainable", "floor"])?;
+    fits(&said);
+    let [plain_json, with] = [json(at, "plain.json")?, json(at, "with.json")?];
+    for same in ["accepted", "steps", "candidates", "data_sha256", "worth", "unknown"] {
+        assert_eq!(plain_json[same], with[same], "{same}");
+    }
+    assert!(plain_json["locked"].get("floor").is_none() && !plain.contains("floor"), "{plain}");
+    assert_eq!(with["locked"]["removable_removed"].as_object().map(serde_json::Map::len), Some(7));
+    let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("Of the removable error, the mean squared error before less that of the floor,"), "{said}");
+    let floor = said.lines().find(|line| line.trim_start().starts_with("floor ")).map(|line| line.split_whitespace().count());
+    assert_eq!(floor, Some(7), "{said}");
+    let page = read(at, "pages/diagnosis.html")?;
+    assert!(page.contains("of the removable") && page.contains("Effects found, the largest first"));
+    // Nothing that is searched may hold it: neither inside, nor around, nor the flights themselves.
+    let copy = |from: &str, to: &str| -> Result<()> {
+        for file in walk(&at.join(from))? {
+            let name = file.strip_prefix(at.join(from)).unwrap_or(&file);
+            let to = at.join(to).join(name);
+            let above = to.parent().unwrap_or(&to);
+            std::fs::create_dir_all(above).map_err(Error::io(above))?;
+            std::fs::copy(&file, &to).map_err(Error::io(&to))?;
+        }
+        Ok(())
+    };
+    run(at, &["calibrate", "data", "-o", "model.toml"])?;
+    copy("floor", "data/floor")?;
+    let cases = [
+        ("data/floor", "inside the folder of the flights"),
+        ("data", "the flights themselves"),
+        (".", "a folder that holds the flights"),
+    ];
+    for (folder, how) in cases {
+        for command in [&["diagnose"][..], &["loop", "-o", "amended.toml"], &["compare"]] {
+            let output = phyture(at, &[command, &["data", "-m", "model.toml", "--explainable", folder]].concat())?;
+            let text = errors(&output);
+            assert_eq!(output.status.code(), Some(2), "{command:?} {folder}: {text}");
+            assert!(text.contains(&format!("`--explainable` is {folder}, {how}, expected a folder elsewhere")), "{text}");
+        }
+    }
+    std::fs::remove_dir_all(at.join("data/floor")).map_err(Error::io("data/floor"))?;
+    // Of other flights, it is refused before the search.
+    run(at, &["simulate", "other", "--minutes", "5", "--seed", "7409", "--explainable", "other-floor"])?;
+    let output = phyture(at, &["diagnose", "data", "-m", "model.toml", "--explainable", "other-floor"])?;
+    assert!(output.status.code() == Some(2) && errors(&output).contains("explainable part"), "{}", errors(&output));
+    let output = phyture(at, &["diagnose", "data", "--of-network", "run", "--explainable", "floor"])?;
+    assert!(output.status.code() == Some(2) && errors(&output).contains("cannot be used with"), "{}", errors(&output));
     Ok(())
 }
 

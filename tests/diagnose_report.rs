@@ -7,8 +7,9 @@
 use phyture::critique::PerChannel;
 use phyture::critique::diagnose::{
     CandidateReport, Confirmation, DependsOn, Diagnosis, Kept, Locked, Method, Number, Status, Step, TriedFormula, UnknownChannel,
-    Verdict,
+    Verdict, Worth,
 };
+use phyture::critique::shares::Share;
 use phyture::flight::{Column, Flight, Span, Targets};
 use phyture::physics::{Model, catalogue};
 use phyture::report::diagnose::VIEWS;
@@ -101,6 +102,7 @@ fn found() -> Diagnosis {
             rmse_after: rmse(0.3456),
             mse_fall: [("vz_dot".to_owned(), [0.427, 0.391, 0.463])].into(),
             waterfall: vec![rmse(0.4567), rmse(0.3456)],
+            ..Locked::default()
         }),
         method: Some(Method {
             blocks: 60,
@@ -132,7 +134,17 @@ fn models() -> [Model; 2] {
 }
 
 /// The page's own text: without the embedded figure library, whose licence texts name addresses that are never opened.
-fn html(diagnoses: &[Diagnosis], absent: &[Column], [before, after]: [&Model; 2], seconds: usize) -> Result<String> {
+fn html(diagnoses: &[Diagnosis], absent: &[Column], models: [&Model; 2], seconds: usize) -> Result<String> {
+    html_of([diagnoses, &[]], absent, models, seconds)
+}
+
+/// The same with the rounds of a loop as one beside them.
+fn html_of(
+    [diagnoses, together]: [&[Diagnosis]; 2],
+    absent: &[Column],
+    [before, after]: [&Model; 2],
+    seconds: usize,
+) -> Result<String> {
     let [_, truth] = models();
     let flights = ["a", "b", EVIL].iter().enumerate();
     let mut plain = truth.clone();
@@ -147,6 +159,7 @@ fn html(diagnoses: &[Diagnosis], absent: &[Column], [before, after]: [&Model; 2]
     let report = DiagnoseReport {
         title: "Missing physics",
         diagnoses,
+        together: together.first(),
         flights: &flights,
         searched: &searched,
         locked: &locked,
@@ -157,8 +170,9 @@ fn html(diagnoses: &[Diagnosis], absent: &[Column], [before, after]: [&Model; 2]
     let html = page(&diagnose_page(&report)?);
     let Some(start) = html.find("<script type=\"text/javascript\">") else { return Ok(html) };
     let end = start + html[start..].find("</script>").unwrap_or_default();
-    if diagnoses.len() == 1 && diagnoses[0].accepted.len() == 1 {
-        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("diagnose.html");
+    if diagnoses.len() == 1 && diagnoses[0].accepted.len() == 1 || !together.is_empty() {
+        let name = if together.is_empty() { "diagnose.html" } else { "loop.html" };
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         std::fs::write(&path, &html).map_err(Error::io(&path))?;
     }
     Ok(format!("{}{}", &html[..start], &html[end..]))
@@ -249,6 +263,65 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
     Ok(())
 }
 
+/// Two rounds, and what is told of them as one: with a floor and with what each effect is worth.
+#[test]
+fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> {
+    let [before, after] = models();
+    let rmse = |value: f64| PerChannel::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)]);
+    let of = |effect: &str, bars: [f64; 2]| {
+        let mut round = found();
+        round.accepted = vec![effect.into()];
+        round.steps[0].effect = effect.into();
+        if let Some(locked) = &mut round.locked {
+            locked.waterfall = bars.map(rmse).into();
+        }
+        round
+    };
+    let rounds = [of("ground_effect", [0.8764, 0.6543]), of("wind", [0.6542, 0.4321])];
+    let worth = |effect: &str, share: f64| Worth {
+        effect: effect.into(),
+        share: [("vz_dot".to_owned(), Share { share, ci95: Some([share - 0.04, share + 0.04]) })].into(),
+        refitted: true,
+        ..Worth::default()
+    };
+    let mut locked = Locked {
+        kept: Kept::Flights,
+        duration_s: 40.0,
+        rmse_before: rmse(0.8764),
+        rmse_after: rmse(0.4321),
+        mse_fall: [("vz_dot".to_owned(), [0.757, 0.711, 0.803])].into(),
+        waterfall: [0.8764, 0.6543, 0.4321].map(rmse).into(),
+        ..Locked::default()
+    };
+    locked.set_floor(PerChannel::new([0.29, 0.29, 0.2357, 0.29, 0.29, 0.29].map(Some)));
+    let together = Diagnosis {
+        accepted: vec!["ground_effect".into(), "wind".into()],
+        steps: rounds.iter().flat_map(|round| round.steps.clone()).collect(),
+        worth: vec![worth("wind", 0.52), worth("ground_effect", 0.33)],
+        locked: Some(locked),
+        ..diagnosis(Verdict::EffectsMissing)
+    };
+    let own = html_of([&rounds, std::slice::from_ref(&together)], &[], [&before, &after], 60)?;
+    is_self_contained(&own);
+    let list = own.find("Effects found, the largest first").unwrap_or_default();
+    let place = |text: &str| own[list..].find(text).ok_or_else(|| Error::Undetermined(format!("no {text}")));
+    assert!(list > 0 && place("vz_dot 52 % [48, 56]")? < place("vz_dot 33 % [29, 37]")?);
+    assert!(own[..list].contains("Verdict: effects missing") && !own[..list].contains("Round 2"), "one verdict for all rounds");
+    // The waterfall goes on from round to round and ends with the floor, also as a line: its number is on the bar, in the table and, for
+    // each of four labels, in the line.
+    let waterfall = own.find(&format!("<h2>{}</h2>", VIEWS[7])).unwrap_or_default();
+    for text in ["0.876", "0.654", "0.432", "0.236"] {
+        assert!(own[waterfall..].contains(text), "the waterfall lacks {text}");
+    }
+    assert!(own.contains("[0.2357,0.2357,0.2357,0.2357]"), "a line at the floor below model, two effects and itself");
+    // (0.8764² − 0.4321²) / (0.8764² − 0.2357²)
+    assert!(own[waterfall..].contains("of the removable") && own[waterfall..].contains("81.6"), "share above the floor");
+    assert!(own.contains("The dashed line and the last bar are the floor"));
+    let plain = html(&rounds, &[], [&before, &after], 20)?;
+    assert!(!plain.contains("floor") && plain.contains("Round 2") && !plain.contains("Effects found"));
+    Ok(())
+}
+
 #[test]
 fn what_unseen_flights_deny_is_no_missing_effect_and_what_fails_there_is_not_suggested() -> Result<()> {
     let [before, after] = models();
@@ -293,6 +366,7 @@ fn a_page_without_a_diagnosis_or_with_a_span_elsewhere_is_refused() {
         let report = DiagnoseReport {
             title: "t",
             diagnoses,
+            together: None,
             flights: &[],
             searched: &[],
             locked,

@@ -3,7 +3,7 @@
 //! The page is left in `target/tmp/compare.html`, to be looked at.
 #![cfg(feature = "report")]
 
-use phyture::critique::{Comparison, Row, compare};
+use phyture::critique::{Comparison, PerChannel, Row, compare};
 use phyture::flight::split;
 use phyture::flight::{Column, Flight, Targets, Window};
 use phyture::report::{CompareReport, Page, Part, Section, compare_page, page};
@@ -176,13 +176,21 @@ fn a_page_of_every_other_figure_stands_too() -> Result<()> {
     let names = ["paper", "+ quadratic drag", "+ ground effect", "+ network"].map(str::to_owned);
     let fall: Vec<Vec<Option<f64>>> =
         [1.3, 0.9, 0.6, 0.4].iter().map(|error| (0..6).map(|channel| Some(error + 0.1 * f64::from(channel))).collect()).collect();
+    let floor = [Some(0.31); 6];
     let rows: Vec<String> = channels.iter().map(|(name, _)| name.clone()).collect();
     let parts =
         [("physics", 0.61), ("network", 0.29), ("noise and unknown", 0.10)].map(|(name, share)| (name.to_owned(), vec![share; 6]));
     let decay = |from: f64, to: f64| (0..80).map(|epoch| to + (from - to) * (-0.08 * f64::from(epoch)).exp()).collect::<Vec<_>>();
     let curves = [("training".to_owned(), decay(1.0, 0.02)), ("validation".to_owned(), decay(1.1, 0.05))];
     let figures = [
-        phyture::report::figures::steps("RMSE from step to step", "Each bar adds one effect.", &channels, &names, &fall),
+        phyture::report::figures::steps(
+            "RMSE from step to step",
+            "Each bar adds one effect.",
+            &channels,
+            &names,
+            &fall,
+            Some(&floor),
+        ),
         phyture::report::figures::shares(
             "What explains the error",
             "Shares of the variance of the baseline's residual.",
@@ -220,5 +228,22 @@ fn the_verdict_finds_what_was_put_there() -> Result<()> {
 fn a_focus_that_is_not_there_is_refused() -> Result<()> {
     let found = html(&case("turn_demos1")?, 3);
     assert!(matches!(found, Err(Error::Shape { message, .. }) if message.contains("no model 3")));
+    Ok(())
+}
+
+#[test]
+fn a_known_floor_stands_below_the_rmse_in_table_and_picture() -> Result<()> {
+    let mut case = case("turn_demos1")?;
+    let without = without_library(&html(&case, 0)?)?;
+    assert!(!without.contains("floor"));
+    case.comparison.floor = Some(PerChannel::new([0.1, 0.2, 0.3, 0.4, 0.5, 0.654_321].map(Some)));
+    let own = without_library(&html(&case, 0)?)?;
+    let table = own.find("RMSE, root mean square error").unwrap_or_default();
+    let table = &own[table..table + own[table..].find("</table>").unwrap_or_default()];
+    assert_eq!((table.matches("floor").count(), table.matches("0.654").count()), (1, 1), "{table}");
+    assert!(own.contains("no model can remove it") && own.contains("RMSE above the floor"));
+    assert_eq!(own.matches("data-figure=").count(), without.matches("data-figure=").count() + 1);
+    let text = case.comparison.to_string();
+    assert!(text.lines().any(|line| line.trim_start().starts_with("floor") && line.contains("0.654")), "{text}");
     Ok(())
 }

@@ -176,6 +176,18 @@ pub struct Comparison {
     pub uncertainty: Vec<Uncertainty>,
 }
 
+impl Comparison {
+    /// Notes the floor (see [`super::floor()`]), and in the shares of each network what part of the error it is.
+    pub fn set_floor(&mut self, floor: PerChannel) {
+        self.floor = Some(floor);
+        for shares in &mut self.shares {
+            if let Some(model) = self.models.iter().find(|model| model.name == shares.name) {
+                shares.set_floor(&model.rmse, &floor);
+            }
+        }
+    }
+}
+
 /// Lays the predictions of each row beside the measured targets at the last row of each window.
 ///
 /// # Errors

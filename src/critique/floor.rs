@@ -2,7 +2,7 @@
 
 use super::PerChannel;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Column, Flight, Span, Window};
 
 /// Root mean square of what was recorded less what is explainable, at the last row of each window: m/s², rad/s².
 ///
@@ -24,11 +24,29 @@ pub fn floor(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> 
     Ok(PerChannel::new(squares.map(|sum| (!windows.is_empty()).then(|| (sum / windows.len() as f64).sqrt()))))
 }
 
+/// The same over every sample of the spans.
+///
+/// # Errors
+/// As [`floor()`].
+pub fn floor_of_spans(flights: &[Flight], spans: &[Span], explainable: &[Flight]) -> Result<PerChannel> {
+    let length = |span: &Span| flights.get(span.flight).map_or(0, Flight::len);
+    let samples = |span: &Span| {
+        let flight = span.flight;
+        (span.start..span.end.min(length(span))).map(move |last| Window { flight, last })
+    };
+    floor(flights, &spans.iter().flat_map(samples).collect::<Vec<_>>(), explainable)
+}
+
 /// For each flight that has a window, its explainable part.
 fn partners<'a>(flights: &[Flight], windows: &[Window], explainable: &'a [Flight]) -> Result<Vec<Option<&'a Flight>>> {
-    let judged = |index: usize| windows.iter().any(|window| window.flight == index);
+    let mut judged = vec![false; flights.len()];
+    for window in windows {
+        if let Some(judged) = judged.get_mut(window.flight) {
+            *judged = true;
+        }
+    }
     let partner = |(index, log): (usize, &Flight)| {
-        if !judged(index) {
+        if !judged[index] {
             return Ok(None);
         }
         let fault = |found: String| Error::Log {
@@ -72,6 +90,9 @@ mod tests {
         let calm = [flight("b", 10, 4.0)?, flight("a", 10, 1.0)?];
         let windows: Vec<Window> = (0..2).flat_map(|flight| (0..10).map(move |last| Window { flight, last })).collect();
         let found = floor(&flights, &windows, &calm)?.mean.unwrap_or(f64::NAN);
+        let spans = [Span { flight: 0, start: 0, end: 10 }, Span { flight: 1, start: 0, end: 99 }];
+        assert_eq!(floor_of_spans(&flights, &spans, &calm)?.mean, Some(found));
+        assert_eq!(floor_of_spans(&flights, &spans[1..], &calm)?.vx_dot, Some(1.0));
         assert!((found - 2.5_f64.sqrt()).abs() < Tolerance::Close.relative_f64(), "{found}");
         let missing = floor(&flights, &windows, &calm[..1]).map_err(|error| error.to_string());
         assert!(matches!(&missing, Err(text) if text.contains("a: found no explainable part")), "{missing:?}");

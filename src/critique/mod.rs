@@ -17,7 +17,7 @@ pub mod yardstick;
 
 pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare, paired};
 pub use contest::{Best, Difference};
-pub use floor::floor;
+pub use floor::{floor, floor_of_spans};
 pub use regime::Regime;
 pub use shares::{Shares, shares};
 pub use uncertainty::{Uncertainty, uncertainty};

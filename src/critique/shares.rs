@@ -9,7 +9,7 @@
 //! gusts, and physics that the network did not learn: it bounds the noise from above and is not the noise.
 
 use super::Row;
-use super::compare::{check_row, measured, variation};
+use super::compare::{PerChannel, check_row, measured, variation};
 use super::table::{aligned, significant};
 use super::wrap::wrapped;
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
@@ -98,6 +98,9 @@ pub struct Shares {
     pub neither: ShareOf,
     /// The network's share in two, if the hybrid has a linear history.
     pub of_network: Option<OfNetwork>,
+    /// The part of "neither" that no model can remove, where the explainable part of the flights is known; see [`Shares::set_floor`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<ShareOf>,
 }
 
 /// Who is judged.
@@ -154,6 +157,7 @@ pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, j
         network: of(&model, &hybrid),
         neither: left(&hybrid),
         of_network: linear.map(|linear| OfNetwork { linear_history: of(&model, &linear), network_itself: of(&linear, &hybrid) }),
+        floor: None,
     })
 }
 
@@ -212,7 +216,19 @@ impl Shares {
         let mut lines = vec![("named physics", self.physics), ("network only", self.network)];
         lines.extend(parts.into_iter().flatten());
         lines.push(("neither", self.neither));
+        lines.extend(self.floor.map(|floor| ("  floor", floor)));
         lines
+    }
+
+    /// Notes the share of the floor, MSE_floor / MSE_ref = neither · (RMSE_floor / RMSE_hybrid)², from root mean square errors over the
+    /// windows of the shares. It has no interval, and none for all channels together.
+    pub(super) fn set_floor(&mut self, hybrid: &PerChannel, floor: &PerChannel) {
+        let all = self.neither.all();
+        self.floor = Some(ShareOf::new(std::array::from_fn(|index| {
+            let (hybrid, floor) = (hybrid.channels().get(index).copied()??, floor.channels().get(index).copied()??);
+            let ratio = Some((floor / hybrid).powi(2)).filter(|ratio| ratio.is_finite())?;
+            Some(Share { share: all[index]?.share * ratio, ci95: None })
+        })));
     }
 
     /// What the shares are of, in words.
@@ -366,6 +382,29 @@ mod tests {
         assert!(found.sentence().is_none() && found.to_string().contains('–'));
         let short = Stages { physics: Vec::new(), with_linear: None, hybrid: Vec::new() };
         assert!(matches!(of(&constant, None, &short), Err(Error::Shape { .. })));
+        Ok(())
+    }
+
+    #[test]
+    fn the_floor_is_a_part_of_neither() -> Result<()> {
+        let flights = flights(|flight, sample, channel| ((flight * 3 + sample * 7 + channel) % 13) as f64)?;
+        let windows = every_window(&flights);
+        let measured = measured(&flights, &windows)?;
+        let by = |error: f64| missing(&measured, move |_, _| error);
+        let stages = Stages { physics: by(2.0), with_linear: None, hybrid: by(1.0) };
+        let reference = Row { name: "base".into(), predicted: by(4.0) };
+        let mut found = of(&flights, Some(&reference), &stages)?;
+        assert!(!found.to_string().contains("floor"));
+        let mut floor = [Some(0.5); 6];
+        floor[5] = None;
+        found.set_floor(&PerChannel::new([Some(1.0); 6]), &PerChannel::new(floor));
+        // (0.5 / 4)², where the hybrid leaves (1 / 4)².
+        let shares = found.floor.map(|floor| floor.all()).unwrap_or_default();
+        assert!(close(found.neither.vx_dot, 1.0 / 16.0) && close(shares[0], 1.0 / 64.0) && close(shares[4], 1.0 / 64.0));
+        assert!(shares[5].is_none() && shares[6].is_none(), "{shares:?}");
+        let text = found.to_string();
+        let line = text.lines().find(|line| line.trim_start().starts_with("floor")).unwrap_or_default();
+        assert_eq!((line.matches("1.6").count(), line.matches('–').count()), (5, 2), "{text}");
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use super::page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, dat
 use crate::critique::compare::{Intervals, deviation};
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
 use crate::critique::shares::bars;
-use crate::critique::table::{Kind, LEGEND, MEASURES, significant};
+use crate::critique::table::{FLOOR, Kind, LEGEND, MEASURES, significant};
 use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty, paired};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};
@@ -181,7 +181,12 @@ pub(super) fn error_tables(comparison: &Comparison) -> Vec<Part> {
             });
             [Cell::from(model.name.clone())].into_iter().chain(cells).collect()
         });
-        Part::Table(Table { caption: format!("{title}, {words}"), rows: rows.collect(), columns: columns.clone() })
+        let floor = comparison.floor.filter(|_| title == "RMSE").map(|floor| {
+            let cells = with_mean(&floor).into_iter().map(|value| Cell::from(kind.text(value)));
+            [Cell::from("floor".to_owned())].into_iter().chain(cells).collect()
+        });
+        let rows = rows.chain(floor).collect();
+        Part::Table(Table { caption: format!("{title}, {words}"), rows, columns: columns.clone() })
     };
     let note =
         format!("{LEGEND} The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.");
@@ -189,6 +194,14 @@ pub(super) fn error_tables(comparison: &Comparison) -> Vec<Part> {
     parts.extend(MEASURES.into_iter().map(table));
     parts.extend(differences(comparison));
     parts.push(Part::Text(note));
+    if let Some(floor) = &comparison.floor {
+        parts.push(Part::Text(FLOOR.into()));
+        let names: Vec<String> = comparison.models.iter().map(|model| model.name.clone()).collect();
+        let values: Vec<Vec<Option<f64>>> = comparison.models.iter().map(|model| model.rmse.channels().into()).collect();
+        let caption = "The dashed line is what no model can go below; what stands above it could be explained.";
+        let (panels, floor) = (channel_panels(), floor.channels());
+        parts.push(Part::Figure(figures::steps("RMSE above the floor", caption, &panels, &names, &values, Some(&floor))));
+    }
     parts
 }
 

@@ -153,8 +153,8 @@ pub enum Command {
         /// Mean wind of every flight from anywhere, m/s [default: 3, with --baseline or --hide 0]
         #[arg(long, value_name = "M_S")]
         wind: Option<f64>,
-        /// Folder for the explainable part of each flight, without gusts, turbulence and noise: `compare --explainable` then shows the
-        /// floor that no model can go below
+        /// Folder for the explainable part of each flight, without gusts, turbulence and noise: --explainable of `compare`, `diagnose`
+        /// and `loop` then shows the floor that no model can go below
         #[arg(long, value_name = "DIR")]
         explainable: Option<PathBuf>,
     },
@@ -185,7 +185,9 @@ pub enum Command {
         division: Division,
     },
     /// Measured against predicted for each model given, per channel, manoeuvre and regime
-    #[command(after_help = "Example:\n  phyture compare flights -m n9-calibrated.toml -n run --report report")]
+    #[command(
+        after_help = "Examples:\n  phyture compare flights -m n9-calibrated.toml -n run --report report\n  phyture compare flights -m n9-calibrated.toml --explainable floor     # simulated flights: with the floor"
+    )]
     Compare {
         /// Flights.
         #[command(flatten)]
@@ -219,7 +221,12 @@ pub enum Command {
         division: Division,
     },
     /// Which physical effect is missing, and how sure that is; exit code 3 on a convention fault
-    #[command(after_help = "Example:\n  phyture diagnose flights -m n9.toml --report report --json diagnosis.json")]
+    ///
+    /// Effects that are found are one list, the largest first, each with what of the error on flights that no search has seen would come
+    /// back if it alone were taken away.
+    #[command(
+        after_help = "Examples:\n  phyture diagnose flights -m n9.toml --report report --json diagnosis.json\n  phyture diagnose flights -m n9.toml --explainable floor     # simulated flights: how much could be removed at all"
+    )]
     Diagnose {
         /// Flights.
         #[command(flatten)]
@@ -236,12 +243,21 @@ pub enum Command {
         /// Most effects to name
         #[arg(long, default_value_t = 6, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
         max_effects: usize,
+        /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
+        /// has seen, and how much of what lies above it the effects remove
+        #[arg(long, value_name = "DIR", conflicts_with = "of_network")]
+        explainable: Option<PathBuf>,
         /// What is searched and what only confirms.
         #[command(flatten)]
         division: Division,
     },
     /// Diagnose, add, calibrate, until nothing worthwhile is left; appends to a ledger beside the model
-    #[command(after_help = "Example:\n  phyture loop flights -m n9.toml -o n9-amended.toml --report report")]
+    ///
+    /// All effects that were added are one list, the largest first; the errors before and after, by channel, are the last table. Every round by
+    /// itself is in the JSON, in the page and, with --verbose, in the text.
+    #[command(
+        after_help = "Examples:\n  phyture loop flights -m n9.toml -o n9-amended.toml --report report\n  phyture loop flights -m n9.toml -o n9-amended.toml --explainable floor     # simulated flights"
+    )]
     Loop {
         /// Flights.
         #[command(flatten)]
@@ -255,6 +271,10 @@ pub enum Command {
         /// Folder for the page diagnosis.html
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
+        /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
+        /// has seen, and how much of what lies above it the effects remove
+        #[arg(long, value_name = "DIR")]
+        explainable: Option<PathBuf>,
         /// What is searched and what only confirms.
         #[command(flatten)]
         division: Division,

@@ -39,7 +39,7 @@ pub fn calibrated(model: &Model, flights: &[Flight], split: &Split) -> Result<Mo
 
 /// Puts the numbers of the model that goes on into what is said of its effects: one coefficient, one value, and that of the model
 /// file. A property of each flight keeps its mean.
-fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
+pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
     for step in &mut diagnosis.steps {
         let Some(effect) = model.effect(&step.effect) else { continue };
         for number in &mut step.coefficients {

@@ -20,17 +20,8 @@ pub(super) fn confirm(
     block_s: f64,
     correlation: f64,
 ) -> Result<Option<Locked>> {
-    let cut = blocks(flights, locked, block_s);
-    if cut.is_empty() {
-        return Ok(None);
-    }
-    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
-    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
-    let mut errors = Vec::new();
-    for model in models {
-        errors.push(errors_under(&engine, model)?);
-    }
-    let rows = engine.rows() as f64;
+    let Some((counts, errors)) = errors_on(flights, models, locked, block_s, correlation)? else { return Ok(None) };
+    let rows = counts.iter().sum::<usize>() as f64;
     let rmse = |errors: &[Vec<f64>; 6]| {
         PerChannel::new(std::array::from_fn(|channel| Some((errors[channel].iter().sum::<f64>() / rows).sqrt())))
     };
@@ -60,7 +51,31 @@ pub(super) fn confirm(
         rmse_after: rmse(last),
         mse_fall,
         waterfall: errors.iter().map(rmse).collect(),
+        floor: None,
+        removable_removed: None,
     }))
+}
+
+/// Squared errors of one model: for each channel one number a block.
+pub(super) type BlockErrors = [Vec<f64>; 6];
+
+/// The blocks that spans are cut into, as their numbers of samples, and on them the squared errors of each model under its own numbers.
+/// `None` without a sample.
+pub(super) fn errors_on(
+    flights: &[Flight],
+    models: &[Model],
+    spans: &[Span],
+    block_s: f64,
+    correlation: f64,
+) -> Result<Option<(Vec<usize>, Vec<BlockErrors>)>> {
+    let cut = blocks(flights, spans, block_s);
+    if cut.is_empty() {
+        return Ok(None);
+    }
+    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
+    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
+    let errors = models.iter().map(|model| errors_under(&engine, model)).collect::<Result<_>>()?;
+    Ok(Some((engine.blocks.iter().map(|block| block.end - block.start).collect(), errors)))
 }
 
 /// What spans are made of: whole flights, the last part of each, or pieces from anywhere.
@@ -76,7 +91,7 @@ fn kept(flights: &[Flight], locked: &[Span]) -> Kept {
 }
 
 /// Squared error of each block of each channel under a model's own numbers; properties of a flight are found from its other blocks.
-pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<[Vec<f64>; 6]> {
+pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<BlockErrors> {
     let mut design = Design::default();
     let layout = design.model(model)?;
     let grams = grams(engine.flights, &engine.blocks, &design)?;

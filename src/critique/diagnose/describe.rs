@@ -145,10 +145,13 @@ pub(super) fn dropped(found: &Found, falls: &[f64; 6]) -> CandidateReport {
     }
 }
 
+/// An effect that wins in nearly every resampled world.
+pub(super) const STABLE: &str = "stable";
+
 /// A selection frequency in a word.
 pub(super) fn stability(frequency: f64) -> &'static str {
     match frequency {
-        frequency if frequency >= 0.9 => "stable",
+        frequency if frequency >= 0.9 => STABLE,
         frequency if frequency >= 0.6 => "likely",
         _ => "tentative",
     }
@@ -160,7 +163,7 @@ pub(super) fn summary(diagnosis: &Diagnosis) -> String {
     let found = match diagnosis.verdict {
         Verdict::EffectsMissing => {
             let confirmation = diagnosis.confirmation.unwrap_or(Confirmation::NothingKept);
-            sentences::effects(&diagnosis.steps, diagnosis.locked.as_ref(), confirmation)
+            sentences::effects(diagnosis, confirmation)
         }
         Verdict::NotInCatalogue => sentences::not_in_catalogue(unknown),
         Verdict::Explained => sentences::explained(),

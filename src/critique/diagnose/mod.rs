@@ -6,6 +6,7 @@
 //!
 //! Nothing here reads a file or draws a picture, and nothing knows of the built-in simulator.
 
+mod account;
 mod amend;
 mod candidate;
 mod confirm;
@@ -30,11 +31,13 @@ mod text;
 mod textbook;
 mod verdict;
 
+pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
 pub use report::{
     CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue,
-    Status, Step, TriedFormula, UnknownChannel, Verdict,
+    Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,
 };
 pub use signs::number_remark;
+pub use text::LoopText;
 pub use textbook::{Named, textbook};
 pub use verdict::{Options, Outcome, diagnose};

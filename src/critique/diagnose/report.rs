@@ -1,6 +1,7 @@
 //! What a diagnosis holds, as data and as JSON. Its sentences are in `sentences`, its layout for a terminal in `text`; no measuring here.
 
 use crate::critique::compare::PerChannel;
+use crate::critique::shares::Share;
 use crate::physics::SignFinding;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -172,7 +173,7 @@ pub enum Confirmation {
 }
 
 /// The confirmation on the part that no search has seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Locked {
     /// `locked` flights, or `test` spans of flights.
     pub part: String,
@@ -189,6 +190,53 @@ pub struct Locked {
     pub mse_fall: BTreeMap<String, [f64; 3]>,
     /// Root mean square error with none, one, two … of the accepted effects, in order of acceptance.
     pub waterfall: Vec<PerChannel>,
+    /// Root mean square error that no model can go below, where the explainable part of the flights is known; see [`Locked::set_floor`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub floor: Option<PerChannel>,
+    /// With a floor: share of the mean squared error above it that was removed; its `mean` is that of the channels that have one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub removable_removed: Option<PerChannel>,
+}
+
+/// What one effect is worth on the part that no search has seen, all others being in: the model without it against the model with it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Worth {
+    /// Identifier.
+    pub effect: String,
+    /// What would come back without it: (mean squared error without it − with it) / mean squared error before anything was added, by
+    /// channel, with its 95 % interval from blocks; of a channel that it does not change there is nothing.
+    pub share: BTreeMap<String, Share>,
+    /// The same relative to what is left: mean squared error without it over that with it, less 1.
+    pub rise: BTreeMap<String, f64>,
+    /// Whether the other effects were fitted again without it; otherwise they stayed as they were.
+    pub refitted: bool,
+}
+
+impl Worth {
+    /// Its share in the channel where that is largest.
+    pub fn largest(&self) -> f64 {
+        self.share.values().map(|share| share.share).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
+
+/// Least share of the mean squared error that must lie above the floor before shares of it are given: of less, a share says nothing.
+const LEAST_REMOVABLE: f64 = 0.05;
+
+impl Locked {
+    /// Notes the floor (a root mean square error by channel) and the share removed of what lies above it:
+    /// (before² − after²) / (before² − floor²) of root mean square errors. A channel with less than 5 % of its error above the floor has none.
+    pub fn set_floor(&mut self, floor: PerChannel) {
+        let square = |of: &PerChannel, channel: usize| of.channels()[channel].map(|rmse| rmse * rmse);
+        let share = |channel: usize| {
+            let [before, after] = [&self.rmse_before, &self.rmse_after].map(|rmse| square(rmse, channel));
+            let (before, after, floor) = (before?, after?, square(&floor, channel)?);
+            (before - floor > LEAST_REMOVABLE * before).then(|| (before - after) / (before - floor))
+        };
+        let mut removed = PerChannel::new(std::array::from_fn(share));
+        let known: Vec<f64> = removed.channels().into_iter().flatten().collect();
+        removed.mean = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
+        (self.floor, self.removable_removed) = (Some(floor), Some(removed));
+    }
 }
 
 /// What the search looked at and how it decided.
@@ -235,6 +283,9 @@ pub struct Diagnosis {
     pub unknown: Option<Vec<UnknownChannel>>,
     /// The confirmation.
     pub locked: Option<Locked>,
+    /// What each accepted effect is worth there with all others in, the largest first; empty where it was not measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub worth: Vec<Worth>,
     /// How it was searched.
     pub method: Option<Method>,
     /// What a person should know besides.
@@ -323,6 +374,14 @@ pub struct DependsOn {
 }
 
 impl Diagnosis {
+    /// The accepted effects in the order of what they are worth, the largest first; in order of acceptance where that was not measured.
+    pub fn by_worth(&self) -> Vec<(&Step, Option<&Worth>)> {
+        let place = |step: &Step| self.worth.iter().position(|worth| worth.effect == step.effect);
+        let mut steps: Vec<&Step> = self.steps.iter().collect();
+        steps.sort_by_key(|step| place(step).unwrap_or(usize::MAX));
+        steps.into_iter().map(|step| (step, place(step).and_then(|place| self.worth.get(place)))).collect()
+    }
+
     /// One that says nothing but its verdict, by this version of the program.
     pub fn nothing(verdict: Verdict, summary: String) -> Self {
         Self {
@@ -335,6 +394,7 @@ impl Diagnosis {
             failure: None,
             unknown: None,
             locked: None,
+            worth: Vec::new(),
             method: None,
             notes: Vec::new(),
             seconds: 0.0,
@@ -392,5 +452,40 @@ impl Status {
             Self::Implausible => "implausible",
             Self::SamePhysics => "same physics",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_removable_share_is_of_what_lies_above_the_floor() {
+        let all = |value: f64| PerChannel::new([Some(value); 6]);
+        let mut locked = Locked { rmse_before: all(5.0), rmse_after: all(4.0), ..Locked::default() };
+        // Above the floor lie 25 - 9 = 16, of which 9 were removed; in the last channel nothing to speak of lies above it.
+        let mut floor = all(3.0).channels();
+        floor[5] = Some(4.999);
+        locked.set_floor(PerChannel::new(floor));
+        let removed = locked.removable_removed.unwrap_or_default();
+        assert_eq!((removed.vx_dot, removed.wz_dot, removed.mean), (Some(9.0 / 16.0), None, Some(9.0 / 16.0)));
+        // A model below its floor is impossible but for chance; it is shown as it is.
+        locked.rmse_after = all(2.0);
+        locked.set_floor(all(3.0));
+        assert_eq!(locked.removable_removed.and_then(|removed| removed.vy_dot), Some(21.0 / 16.0));
+    }
+
+    #[test]
+    fn steps_come_in_the_order_of_their_worth_and_those_without_come_last() {
+        let step = |effect: &str| Step { effect: effect.into(), ..Step::default() };
+        let worth = |effect: &str| Worth { effect: effect.into(), ..Worth::default() };
+        let diagnosis = Diagnosis {
+            steps: ["a", "b", "c"].map(step).into(),
+            worth: ["c", "a"].map(worth).into(),
+            ..Diagnosis::nothing(Verdict::EffectsMissing, String::new())
+        };
+        let order: Vec<(&str, bool)> =
+            diagnosis.by_worth().into_iter().map(|(step, worth)| (step.effect.as_str(), worth.is_some())).collect();
+        assert_eq!(order, [("c", true), ("a", true), ("b", false)]);
     }
 }

@@ -2,7 +2,9 @@
 //! words fit a number. Text, JSON and page take their sentences from here, so that they cannot contradict each other.
 
 use super::gates::SMALLEST_FALL;
-use super::report::{Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict};
+use super::report::{Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict, Worth};
+use crate::critique::shares::Share;
+use crate::flight::Column;
 
 /// What an interval of a share removed says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,20 +66,98 @@ pub fn headline(diagnosis: &Diagnosis) -> String {
     }
 }
 
-/// `` `weathercock` (61 % of the error of wz_dot), then … ``
-pub fn names(steps: &[Step]) -> String {
+/// As many effects are named in a sentence; more are a list.
+const NAMED: usize = 3;
+
+/// `` `weathercock` (61 % of the error of wz_dot), then … ``; of more than three their number, and those that are worth most.
+pub fn names(diagnosis: &Diagnosis) -> String {
     let one = |step: &Step| {
         let best = step.held_out_mse_fall.iter().max_by(|left, right| left.1.total_cmp(right.1));
         let share = best.map(|(channel, fall)| format!(" ({} % of the error of {channel})", percent(*fall))).unwrap_or_default();
         format!("`{}`{share}", step.effect)
     };
-    steps.iter().map(one).collect::<Vec<_>>().join(", then ")
+    let steps = &diagnosis.steps;
+    if steps.len() <= NAMED {
+        return steps.iter().map(one).collect::<Vec<_>>().join(", then ");
+    }
+    let first: Vec<String> = diagnosis.by_worth().iter().take(NAMED).map(|(step, _)| format!("`{}`", step.effect)).collect();
+    let how = if diagnosis.worth.is_empty() { "first" } else { "above all" };
+    format!("{} effects, {how} {}", steps.len(), listed(&first))
+}
+
+/// `a, b and c`.
+fn listed(items: &[String]) -> String {
+    match items.split_last() {
+        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
+        _ => items.concat(),
+    }
+}
+
+/// What a list of effects is sorted by; `of` says of which flights.
+pub fn worth(of: &str, all_refitted: bool) -> String {
+    let others =
+        if all_refitted { "and the others were fitted again" } else { "and the others, where that is possible, fitted again" };
+    format!(
+        "the largest share first. Share: how much of the mean squared error before would come back on {of} if that effect alone were taken away \
+         {others}."
+    )
+}
+
+/// `wx_dot 42 % [38, 46], wy_dot 30 % [27, 33]`: what one effect is worth, the largest first. Of the other channels only those of half a
+/// percent and more, and more than chance.
+pub fn share(worth: &Worth) -> String {
+    const SHOWN: f64 = 0.005;
+    let sure = |share: &Share| share.ci95.is_none_or(|[low, high]| low > 0.0 || high < 0.0);
+    let mut shares: Vec<(&String, &Share)> = worth.share.iter().filter(|(_, share)| share.share.abs() >= SHOWN).collect();
+    shares.sort_by(|left, right| right.1.share.total_cmp(&left.1.share));
+    let shown = shares.into_iter().enumerate().filter(|(place, (_, share))| *place == 0 || sure(share));
+    let interval =
+        |share: &Share| share.ci95.map(|[low, high]| format!(" [{}, {}]", percent(low), percent(high))).unwrap_or_default();
+    let one =
+        |(_, (channel, share)): (usize, (&String, &Share))| format!("{channel} {} %{}", percent(share.share), interval(share));
+    let list: Vec<String> = shown.map(one).collect();
+    let list = if list.is_empty() { "less than 0.5 % of every channel".to_owned() } else { list.join(", ") };
+    if worth.refitted { list } else { format!("{list} (the others as they were: without it the flights do not determine them)") }
+}
+
+/// More than all of what is removable: by a fiftieth and less a model may be below the floor by chance.
+const BELOW: f64 = 1.02;
+
+/// What the effects removed together of what could be removed; nothing without a floor.
+pub fn removable(locked: &Locked) -> Option<String> {
+    let removed = locked.removable_removed?;
+    let mean = removed.mean?;
+    let channels = || Column::TARGETS.iter().map(|column| column.name()).zip(removed.channels());
+    let worst = channels().filter_map(|(name, share)| Some((name, share?))).min_by(|left, right| left.1.total_cmp(&right.1))?;
+    let below: Vec<String> =
+        channels().filter(|(_, share)| share.is_some_and(|share| share > BELOW)).map(|(name, _)| name.to_owned()).collect();
+    let below = if below.is_empty() {
+        String::new()
+    } else {
+        format!(
+            " In {} the error is below the floor: numbers that each flight has for itself, and a pilot's answers, take up gusts that last.",
+            listed(&below)
+        )
+    };
+    Some(format!(
+        "Of the removable error, the mean squared error before less that of the floor, {} % is removed on the mean of the channels, {} % in the \
+         worst ({}). The floor is what gusts, turbulence and noise leave.{below}",
+        percent(mean),
+        percent(worst.1),
+        worst.0
+    ))
+}
+
+/// Effects that the last search of a loop named and the kept part did not confirm.
+pub fn not_added(effects: &[String], on: &str) -> String {
+    let names: Vec<String> = effects.iter().map(|effect| format!("`{effect}`")).collect();
+    format!("found besides, but not confirmed on {on}, and so not added: {}", names.join(", "))
 }
 
 /// What was named, and what the part that no search has seen says of it.
-pub fn effects(steps: &[Step], locked: Option<&Locked>, confirmation: Confirmation) -> String {
-    let names = names(steps);
-    let Some(locked) = locked else { return format!("The model lacks {names}. No flights were kept to confirm it on.") };
+pub fn effects(diagnosis: &Diagnosis, confirmation: Confirmation) -> String {
+    let (names, steps) = (names(diagnosis), &diagnosis.steps);
+    let Some(locked) = &diagnosis.locked else { return format!("The model lacks {names}. No flights were kept to confirm it on.") };
     let of_steps = |channel: &&String| steps.iter().any(|step| step.channels.contains(channel));
     let changes: Vec<String> = locked
         .mse_fall
@@ -133,10 +213,7 @@ pub fn failure(failure: &Failure) -> Option<String> {
         .iter()
         .map(|channel| format!("{} (error {} % of the channel's variance)", channel.channel, percent(channel.unexplained)))
         .collect();
-    let list = match list.split_last() {
-        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
-        _ => list.concat(),
-    };
+    let list = listed(&list);
     let how_much = match total {
         total if total >= 0.9 => "Nearly all the error is",
         total if total >= 0.6 => "Most of the error is",
@@ -235,10 +312,8 @@ mod tests {
             part: "locked".into(),
             kept: Kept::Flights,
             duration_s: 251.4,
-            rmse_before: PerChannel::default(),
-            rmse_after: PerChannel::default(),
             mse_fall: [(channel.to_owned(), fall)].into(),
-            waterfall: Vec::new(),
+            ..Locked::default()
         }
     }
 
@@ -260,7 +335,12 @@ mod tests {
     #[test]
     fn what_unseen_flights_deny_is_not_called_missing() {
         let steps = [step("collective_lag", "vz_dot", 0.094)];
-        let said = effects(&steps, Some(&locked("vz_dot", GROWS)), Confirmation::Contradicted);
+        let with = |locked: Option<Locked>| Diagnosis {
+            steps: steps.clone().into(),
+            locked,
+            ..Diagnosis::nothing(Verdict::EffectsMissing, String::new())
+        };
+        let said = effects(&with(Some(locked("vz_dot", GROWS))), Confirmation::Contradicted);
         assert_eq!(
             said,
             "On the searched part `collective_lag` (9.4 % of the error of vz_dot) would help, but on 251 s of flights that no search has \
@@ -271,11 +351,65 @@ mod tests {
             ..Diagnosis::nothing(Verdict::EffectsMissing, String::new())
         };
         assert!(headline(&diagnosis).starts_with("nothing to add") && !headline(&diagnosis).contains("missing"));
-        let said = effects(&steps, Some(&locked("vz_dot", FALLS)), Confirmation::Confirmed);
+        let said = effects(&with(Some(locked("vz_dot", FALLS))), Confirmation::Confirmed);
         assert!(said.starts_with("The model lacks `collective_lag`") && said.ends_with("vz_dot falls by 36 % [24, 46]."), "{said}");
-        let said = effects(&steps, Some(&locked("vz_dot", OPEN)), Confirmation::Open);
+        let said = effects(&with(Some(locked("vz_dot", OPEN))), Confirmation::Open);
         assert!(said.ends_with("which may be none: not confirmed."), "{said}");
-        assert!(effects(&steps, None, Confirmation::NothingKept).contains("No flights were kept"));
+        assert!(effects(&with(None), Confirmation::NothingKept).contains("No flights were kept"));
+    }
+
+    #[test]
+    fn many_effects_are_counted_and_those_that_are_worth_most_named() {
+        let of = |count: usize, worth: &[&str]| {
+            let steps = ["a", "b", "c", "d", "e"].iter().take(count).map(|name| step(name, "vz_dot", 0.1));
+            names(&Diagnosis {
+                steps: steps.collect(),
+                worth: worth.iter().map(|name| Worth { effect: (*name).into(), ..Worth::default() }).collect(),
+                ..Diagnosis::nothing(Verdict::EffectsMissing, String::new())
+            })
+        };
+        assert_eq!(of(2, &["b", "a"]), "`a` (10 % of the error of vz_dot), then `b` (10 % of the error of vz_dot)");
+        assert!(of(3, &[]).contains(", then `c`"));
+        assert_eq!(of(5, &["e", "c", "a", "b", "d"]), "5 effects, above all `e`, `c` and `a`");
+        assert_eq!(of(4, &[]), "4 effects, first `a`, `b` and `c`");
+    }
+
+    #[test]
+    fn a_share_names_its_channels_largest_first_and_says_where_the_others_stayed() {
+        let of = |share: f64, half: f64| Share { share, ci95: Some([share - half, share + half]) };
+        let shares = [
+            ("vx_dot", of(0.304, 0.03)),
+            ("vy_dot", of(0.1, 0.2)),
+            ("wx_dot", of(0.42, 0.5)),
+            ("wy_dot", of(0.004, 0.001)),
+            ("wz_dot", of(-0.01, 0.002)),
+        ];
+        let mut worth =
+            Worth { share: shares.map(|(channel, share)| (channel.to_owned(), share)).into(), refitted: true, ..Worth::default() };
+        assert_eq!(share(&worth), "wx_dot 42 % [-8.0, 92], vx_dot 30 % [27, 33], wz_dot -1.0 % [-1.2, -0.8]");
+        worth.refitted = false;
+        assert!(share(&worth).ends_with("(the others as they were: without it the flights do not determine them)"));
+        worth = Worth { share: [("vx_dot".to_owned(), of(0.001, 0.0))].into(), refitted: true, ..Worth::default() };
+        assert_eq!(share(&worth), "less than 0.5 % of every channel");
+    }
+
+    #[test]
+    fn the_removable_share_is_said_with_its_worst_channel() {
+        let of = |values: [f64; 6]| PerChannel::new(values.map(Some));
+        let mut found = Locked {
+            rmse_before: of([1.0, 1.0, 1.0, 1.0, 1.0, 2.0]),
+            rmse_after: of([0.6, 0.6, 0.6, 0.6, 0.6, 2.0]),
+            ..Locked::default()
+        };
+        assert_eq!(removable(&found), None, "nothing is said of a floor that is not known");
+        found.set_floor(of([0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        let said = removable(&found).unwrap_or_default();
+        assert!(said.contains("53 % is removed on the mean of the channels, 0.0 % in the worst (wz_dot)"), "{said}");
+        assert!(!said.contains("below the floor"), "{said}");
+        found.set_floor(of([0.605, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        assert!(removable(&found).is_some_and(|said| !said.contains("below the floor")), "within a fiftieth");
+        found.set_floor(of([0.7, 0.0, 0.0, 0.0, 0.0, 1.0]));
+        assert!(removable(&found).is_some_and(|said| said.contains("In vx_dot the error is below the floor")));
     }
 
     #[test]

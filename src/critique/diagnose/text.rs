@@ -1,8 +1,9 @@
 //! A diagnosis as text for a person at a terminal: `{}` folds the effects that were not named into counts, `{:#}` lists them. Lines of
 //! at most 120 characters. No words of its own but labels; sentences are in `sentences`.
 
-use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel};
-use super::sentences;
+use super::describe::STABLE;
+use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Worth};
+use super::sentences::{self, percent};
 use super::signs::number_remark;
 use crate::critique::compare::PerChannel;
 use crate::critique::wrap::{clipped, wrapped};
@@ -15,12 +16,30 @@ fn falls(falls: &BTreeMap<String, f64>) -> String {
     if parts.is_empty() { "-".into() } else { parts.join(", ") }
 }
 
-/// A coefficient with interval, unit, usual values and what there is to say of its sign.
-fn number_text(number: &Number) -> String {
+/// A unit after its number; a pure number has none.
+fn unit_text(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" {unit}") }
+}
+
+/// A coefficient with interval, unit and what there is to say of its sign. At length with what is usual, a remark after the other; in short
+/// with what is usual where the number lies outside, in brackets.
+fn number_text(number: &Number, long: bool) -> String {
     let ci = number.ci95.map(|[low, high]| format!(" [{low:.4}, {high:.4}]")).unwrap_or_default();
-    let usual = number.expected.map(|[low, high]| format!("; usual {low} to {high}")).unwrap_or_default();
-    let spread = number.rms_over_flights.map(|rms| format!("; rms over flights {rms:.4}")).unwrap_or_default();
-    format!("{} = {:.4}{ci} {}{usual}{spread}{}", number.name, number.value, number.unit, number_remark(number))
+    let outside = |[low, high]: [f64; 2]| !(low..=high).contains(&number.value);
+    let usual = match number.expected {
+        Some([low, high]) if long => Some(format!("usual {low} to {high}")),
+        Some([low, high]) if outside([low, high]) => Some(format!("outside the usual {low} to {high}")),
+        _ => None,
+    };
+    let spread = number.rms_over_flights.map(|rms| format!("rms over flights {rms:.4}"));
+    let remark = Some(number_remark(number).trim_start_matches("; ").to_owned()).filter(|remark| !remark.is_empty());
+    let remarks: Vec<String> = [usual, spread, remark].into_iter().flatten().collect();
+    let value = format!("{} = {:.4}{ci}{}", number.name, number.value, unit_text(&number.unit));
+    match remarks.join("; ") {
+        remarks if remarks.is_empty() => value,
+        remarks if long => format!("{value}; {remarks}"),
+        remarks => format!("{value} ({remarks})"),
+    }
 }
 
 fn parameter_text(parameter: &ParameterValue) -> String {
@@ -29,22 +48,56 @@ fn parameter_text(parameter: &ParameterValue) -> String {
     } else {
         parameter.profile.map_or("fitted".into(), |[low, high]| format!("fitted, {low:.4} to {high:.4}"))
     };
-    format!("{} = {:.4} {} ({how})", parameter.name, parameter.value, parameter.unit)
+    format!("{} = {:.4}{} ({how})", parameter.name, parameter.value, unit_text(&parameter.unit))
 }
 
-fn step(f: &mut fmt::Formatter<'_>, number: usize, step: &Step) -> fmt::Result {
-    writeln!(f, "\n{}", wrapped(&format!("{number}. "), &format!("{}: {}", step.effect, step.meaning)))?;
-    let mut line = |text: &str| writeln!(f, "{}", wrapped("   ", text));
-    line(&format!("held-out error falls: {}", falls(&step.held_out_mse_fall)))?;
-    let wins = 100.0 * step.selection_frequency;
-    line(&format!("p = {:.4}; wins in {wins:.0} % of resampled worlds ({})", step.p_value, step.stability))?;
-    step.coefficients.iter().try_for_each(|number| line(&number_text(number)))?;
-    step.parameters.iter().try_for_each(|parameter| line(&parameter_text(parameter)))?;
-    if step.indistinguishable.is_empty() {
-        line("nothing else fits as well")?;
+/// As many effects are told at length without being asked; of more, each takes few lines.
+const AT_LENGTH: usize = 3;
+
+/// All effects that were found, as one list.
+fn effects(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis) -> fmt::Result {
+    let steps = diagnosis.by_worth();
+    let long = f.alternate() || steps.len() <= AT_LENGTH;
+    if let Some(locked) = diagnosis.locked.as_ref().filter(|_| !diagnosis.worth.is_empty()) {
+        let on = sentences::unseen(locked.kept, locked.duration_s);
+        let all_refitted = diagnosis.worth.iter().all(|worth| worth.refitted);
+        writeln!(f, "\n{}", wrapped("", &format!("Effects found, {}", sentences::worth(&on, all_refitted))))?;
+    }
+    steps.into_iter().enumerate().try_for_each(|(number, (one, worth))| step(f, number + 1, one, worth, long))
+}
+
+fn step(f: &mut fmt::Formatter<'_>, number: usize, step: &Step, worth: Option<&Worth>, long: bool) -> fmt::Result {
+    let first = format!("{number}. ");
+    let indent = " ".repeat(first.len());
+    writeln!(f, "\n{}", wrapped(&first, &format!("{}: {}", step.effect, step.meaning)))?;
+    let mut line = |text: &str| writeln!(f, "{}", wrapped(&indent, text));
+    if let Some(worth) = worth {
+        line(&format!("share: {}", sentences::share(worth)))?;
+    }
+    if long || worth.is_none() {
+        line(&format!("held-out error falls: {}", falls(&step.held_out_mse_fall)))?;
+    }
+    let wins = format!("wins in {:.0} % of resampled worlds ({})", 100.0 * step.selection_frequency, step.stability);
+    let numbers = step.coefficients.iter().map(|number| number_text(number, long));
+    let mut numbers = numbers.chain(step.parameters.iter().map(parameter_text));
+    if long {
+        line(&format!("p = {:.4}; {wins}", step.p_value))?;
+        numbers.try_for_each(|number| line(&number))?;
     } else {
-        let others = step.indistinguishable.join(", ");
-        line(&format!("these flights cannot tell it from {others}; to tell: {}", step.would_tell_apart))?;
+        let list: Vec<String> = numbers.collect();
+        if !list.is_empty() {
+            line(&list.join(", "))?;
+        }
+        if step.stability != STABLE {
+            line(&wins)?;
+        }
+    }
+    match step.indistinguishable.as_slice() {
+        [] if long => line("nothing else fits as well")?,
+        [] => {}
+        others => {
+            line(&format!("these flights cannot tell it from {}; to tell: {}", others.join(", "), step.would_tell_apart))?;
+        }
     }
     match &step.rests_on_flight {
         Some(flight) => line(&format!("CAUTION: rests on flight `{flight}` alone")),
@@ -71,23 +124,66 @@ fn unknown(f: &mut fmt::Formatter<'_>, unknown: &UnknownChannel, locked: Option<
     )
 }
 
+/// A table of the six channels: rows of texts under the channels' names.
+fn table(f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, [String; 6])]) -> fmt::Result {
+    let line = |cells: &[String; 6]| cells.iter().map(|cell| format!("{cell:>13}")).collect::<String>();
+    writeln!(f, "   {head:<28}{}", line(&Column::TARGETS.map(|column| column.name().to_owned())))?;
+    rows.iter().try_for_each(|(name, cells)| writeln!(f, "   {:<28}{}", clipped(name, 28), line(cells)))
+}
+
+/// What was removed on the kept part by channel: its share with interval and, with a floor, the floor and the share of what lies above it.
+fn removed(locked: &Locked) -> Vec<(String, [String; 6])> {
+    let fall = |channel: usize| locked.mse_fall.get(Column::TARGETS[channel].name());
+    let row = |name: &str, cell: &dyn Fn(usize) -> Option<String>| {
+        (name.to_owned(), std::array::from_fn(|channel| cell(channel).unwrap_or_else(|| "–".into())))
+    };
+    let mut rows = Vec::new();
+    if let Some(floor) = &locked.floor {
+        rows.push(row("floor", &|channel| Some(format!("{:.4}", floor.channels()[channel]?))));
+    }
+    if !locked.mse_fall.is_empty() {
+        rows.push(row("squared error removed, %", &|channel| Some(percent(fall(channel)?[0]))));
+        rows.push(row("   95 % interval", &|channel| {
+            fall(channel).map(|[_, low, high]| format!("[{}, {}]", percent(*low), percent(*high)))
+        }));
+    }
+    if let Some(share) = locked.removable_removed.as_ref().filter(|_| !locked.mse_fall.is_empty()) {
+        rows.push(row("removable error removed, %", &|channel| Some(percent(share.channels()[channel]?))));
+    }
+    rows
+}
+
+fn rmse_row(name: String, values: &PerChannel) -> (String, [String; 6]) {
+    (name, values.channels().map(|value| value.map_or_else(|| "–".into(), |value| format!("{value:.4}"))))
+}
+
+/// The errors on the kept part with none, one, two … of the effects.
 fn confirmation(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Locked) -> fmt::Result {
     writeln!(f, "\nOn {} ({}):", sentences::unseen(locked.kept, locked.duration_s), locked.part)?;
-    let cell = |value: &Option<f64>| value.map_or_else(|| format!("{:>9}", "-"), |value| format!("{value:>9.4}"));
-    let row = |values: &PerChannel| values.channels().iter().map(cell).collect::<String>();
-    writeln!(f, "   {:<28}{}", "RMSE", Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat())?;
-    for (step, values) in locked.waterfall.iter().enumerate() {
+    let bar = |(step, values): (usize, &PerChannel)| {
         let name = match step {
             0 => "model".into(),
             step => diagnosis.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}")),
         };
-        writeln!(f, "   {:<28}{}", clipped(&name, 28), row(values))?;
-    }
-    for (channel, fall) in &locked.mse_fall {
-        let [share, low, high] = fall.map(|share| 100.0 * share);
-        writeln!(f, "   {channel}: error removed {share:.1} % [{low:.1}, {high:.1}]")?;
-    }
-    Ok(())
+        rmse_row(name, values)
+    };
+    let rows: Vec<_> = locked.waterfall.iter().enumerate().map(bar).chain(removed(locked)).collect();
+    table(f, "RMSE", &rows)?;
+    sentences::removable(locked)
+        .filter(|_| !locked.mse_fall.is_empty())
+        .map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))
+}
+
+/// What a loop did to the errors on the kept part, by channel.
+fn before_and_after(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Locked) -> fmt::Result {
+    let units = ("".to_owned(), Column::TARGETS.map(|column| column.unit().to_owned()));
+    let rows = [units, rmse_row("before".into(), &locked.rmse_before), rmse_row("after".into(), &locked.rmse_after)];
+    let rows: Vec<_> = rows.into_iter().chain(removed(locked)).collect();
+    let count = diagnosis.accepted.len();
+    let added = if count == 1 { "one effect added".into() } else { format!("{count} effects added") };
+    writeln!(f, "\n{}", wrapped("", &format!("RMSE on {}; {added}", sentences::unseen(locked.kept, locked.duration_s))))?;
+    table(f, "", &rows)?;
+    sentences::removable(locked).map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))
 }
 
 /// The effects that were tried: in short as counts, at length one a line with the reason that decided.
@@ -137,20 +233,61 @@ fn method_text(method: &Method) -> String {
     )
 }
 
+/// Verdict, effects and what no effect explains.
+fn findings(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis) -> fmt::Result {
+    writeln!(f, "{}", wrapped("Verdict: ", &format!("{}. {}", sentences::headline(diagnosis), diagnosis.summary)))?;
+    effects(f, diagnosis)?;
+    diagnosis.unknown.iter().flatten().try_for_each(|one| unknown(f, one, diagnosis.locked.as_ref()))
+}
+
+/// How it was searched, and what there is to say besides.
+fn remarks(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis) -> fmt::Result {
+    candidates(f, &diagnosis.candidates)?;
+    if let Some(method) = &diagnosis.method {
+        writeln!(f, "{}{}", if f.alternate() { "\n" } else { "" }, wrapped("", &method_text(method)))?;
+    }
+    diagnosis.notes.iter().try_for_each(|note| writeln!(f, "{}", wrapped("note: ", note)))?;
+    write!(f, "{:.1} s", diagnosis.seconds)
+}
+
 impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", wrapped("Verdict: ", &format!("{}. {}", sentences::headline(self), self.summary)))?;
-        self.steps.iter().enumerate().try_for_each(|(number, one)| step(f, number + 1, one))?;
-        self.unknown.iter().flatten().try_for_each(|one| unknown(f, one, self.locked.as_ref()))?;
+        findings(f, self)?;
         if let Some(locked) = &self.locked {
             confirmation(f, self, locked)?;
         }
-        candidates(f, &self.candidates)?;
-        if let Some(method) = &self.method {
-            writeln!(f, "{}{}", if f.alternate() { "\n" } else { "" }, wrapped("", &method_text(method)))?;
+        remarks(f, self)
+    }
+}
+
+/// The end of a loop as text: its rounds as one diagnosis (see [`super::together`]), with the errors before and after last of all.
+#[derive(Clone, Copy, Debug)]
+pub struct LoopText<'a>(pub &'a Diagnosis);
+
+impl fmt::Display for LoopText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(whole) = *self;
+        findings(f, whole)?;
+        match &whole.locked {
+            // Nothing was added: what was tried, and why not.
+            Some(locked) if !whole.is_confirmed() => {
+                confirmation(f, whole, locked)?;
+                remarks(f, whole)?;
+                write!(f, "\n\nNothing was added: the model is the one given, calibrated")
+            }
+            Some(locked) => {
+                if f.alternate() {
+                    confirmation(f, whole, locked)?;
+                }
+                remarks(f, whole)?;
+                writeln!(f)?;
+                before_and_after(f, whole, locked)
+            }
+            None => {
+                remarks(f, whole)?;
+                write!(f, "\n\nNothing was added: no flights were kept to confirm anything on")
+            }
         }
-        self.notes.iter().try_for_each(|note| writeln!(f, "{}", wrapped("note: ", note)))?;
-        write!(f, "{:.1} s", self.seconds)
     }
 }
 
@@ -158,6 +295,7 @@ impl fmt::Display for Diagnosis {
 mod tests {
     use super::super::report::{Confirmation, Kept, Verdict};
     use super::*;
+    use crate::critique::shares::Share;
 
     fn candidate(effect: &str, status: Status, reason: &str) -> CandidateReport {
         CandidateReport {
@@ -207,9 +345,9 @@ mod tests {
             rms_over_flights: None,
         };
         use crate::physics::SignFinding::{NotDetermined, Physical};
-        assert!(number_text(&number(Some(NotDetermined), false)).ends_with("rad/(m s); sign not determined"));
-        assert!(number_text(&number(Some(Physical), false)).ends_with("rad/(m s)"));
-        assert!(number_text(&number(Some(NotDetermined), true)).contains("held at the sign that physics gives it"));
+        assert!(number_text(&number(Some(NotDetermined), false), true).ends_with("rad/(m s); sign not determined"));
+        assert!(number_text(&number(Some(Physical), false), true).ends_with("rad/(m s)"));
+        assert!(number_text(&number(Some(NotDetermined), true), true).contains("held at the sign that physics gives it"));
     }
 
     #[test]
@@ -220,15 +358,107 @@ mod tests {
                 part: "test".into(),
                 kept: Kept::Segments,
                 duration_s: 60.0,
-                rmse_before: PerChannel::default(),
-                rmse_after: PerChannel::default(),
                 mse_fall: [("vz_dot".to_owned(), [-0.083, -0.199, -0.044])].into(),
                 waterfall: vec![PerChannel::default()],
+                ..Locked::default()
             }),
             ..Diagnosis::nothing(Verdict::EffectsMissing, "Said.".into())
         };
         let text = denied.to_string();
         assert!(text.starts_with("Verdict: nothing to add") && !text.contains("effects missing"), "{text}");
         assert!(text.contains("On 60 s of segments that no search has seen (test)"), "{text}");
+    }
+
+    fn many(count: usize) -> Diagnosis {
+        let name = |place: usize| format!("effect_{place}");
+        let share = |place: usize| Share { share: 0.1 * place as f64, ci95: Some([0.09 * place as f64, 0.11 * place as f64]) };
+        let number = Number {
+            name: "k".into(),
+            value: 7.5,
+            ci95: Some([7.0, 8.0]),
+            unit: "1".into(),
+            expected: Some([1.0, 2.0]),
+            sign: None,
+            held: false,
+            rms_over_flights: None,
+        };
+        let step = |place: usize| Step {
+            effect: name(place),
+            meaning: "what it is".into(),
+            channels: vec!["vx_dot".into()],
+            coefficients: vec![number.clone()],
+            stability: if place == 1 { "likely" } else { "stable" }.into(),
+            ..Step::default()
+        };
+        let worth = |place: usize| Worth {
+            effect: name(place),
+            share: [("vx_dot".to_owned(), share(place))].into(),
+            refitted: true,
+            ..Worth::default()
+        };
+        let rmse = |value: f64| PerChannel::new([Some(value); 6]);
+        let mut locked = Locked {
+            part: "locked".into(),
+            duration_s: 60.0,
+            rmse_before: rmse(2.0),
+            rmse_after: rmse(1.0),
+            mse_fall: [("vx_dot".to_owned(), [0.75, 0.7, 0.8])].into(),
+            waterfall: (0..=count).map(|place| rmse(2.0 - place as f64 / count as f64)).collect(),
+            ..Locked::default()
+        };
+        locked.set_floor(rmse(0.5));
+        Diagnosis {
+            accepted: (1..=count).map(name).collect(),
+            steps: (1..=count).map(step).collect(),
+            worth: (1..=count).rev().map(worth).collect(),
+            locked: Some(locked),
+            candidates: vec![candidate("wind", Status::NotSignificant, "could be chance: p 0.5000, 0.0026 is asked")],
+            ..Diagnosis::nothing(Verdict::EffectsMissing, "Said.".into())
+        }
+    }
+
+    #[test]
+    fn effects_are_one_list_the_largest_first_with_the_floor_below_the_waterfall() {
+        let text = many(12).to_string();
+        let list: Vec<&str> = text.lines().filter(|line| line.contains(": what it is")).collect();
+        assert_eq!(list.len(), 12, "{text}");
+        assert!(list[0].starts_with("1. effect_12: ") && list[11].starts_with("12. effect_1: "), "{text}");
+        assert!(
+            text.contains("   share: vx_dot 120 % [108, 132]\n   k = 7.5000 [7.0000, 8.0000] (outside the usual 1 to 2)\n\n2."),
+            "{text}"
+        );
+        // At length only a few or on request; a doubt is said anyway.
+        assert!(!text.contains("p = ") && text.matches("wins in").count() == 1, "{text}");
+        assert!(format!("{:#}", many(12)).matches("p = ").count() == 12 && many(3).to_string().matches("p = ").count() == 3);
+        let below: Vec<&str> = text.lines().skip_while(|line| !line.contains("+ effect_12")).take(5).collect();
+        assert!(below[1].trim_start().starts_with("floor") && below[1].matches("0.5000").count() == 6, "{text}");
+        assert!(
+            below[2].contains("squared error removed, %") && below[2].contains("75") && below[3].contains("[70, 80]"),
+            "{text}"
+        );
+        // (4 − 1) / (4 − 0.25)
+        assert!(below[4].contains("removable error removed, %") && below[4].matches("80").count() == 6, "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+    }
+
+    #[test]
+    fn a_loop_ends_with_before_and_after_and_not_with_every_bar() {
+        let whole = many(12);
+        let text = LoopText(&whole).to_string();
+        assert!(!text.contains("+ effect_") && format!("{:#}", LoopText(&whole)).contains("+ effect_12"), "{text}");
+        let table: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("RMSE on 60 s of flights")).collect();
+        assert!(table[0].ends_with("12 effects added") && table[1].contains("wz_dot") && table[2].contains("rad/s²"), "{text}");
+        assert!(table[3].contains("before") && table[3].matches("2.0000").count() == 6 && table[4].matches("1.0000").count() == 6);
+        assert!(table.iter().any(|line| line.contains("Of the removable error")), "{text}");
+        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
+        // What was not confirmed was not added, whatever fits the searched flights.
+        let denied = Diagnosis {
+            locked: Some(Locked { mse_fall: [("vx_dot".to_owned(), [0.0, -0.1, 0.1])].into(), ..Locked::default() }),
+            ..many(2)
+        };
+        let text = LoopText(&denied).to_string();
+        assert!(text.contains("Nothing was added: the model is the one given") && !text.contains("before  "), "{text}");
+        let text = LoopText(&Diagnosis { locked: None, ..many(2) }).to_string();
+        assert!(text.contains("no flights were kept"), "{text}");
     }
 }

@@ -20,6 +20,8 @@ pub struct DiagnoseReport<'a> {
     pub title: &'a str,
     /// One for a single diagnosis, one a round for a loop.
     pub diagnoses: &'a [Diagnosis],
+    /// The rounds of a loop as one (see [`crate::critique::diagnose::together`]): what is said of the whole, where it is given.
+    pub together: Option<&'a Diagnosis>,
     /// The flights that the spans point into.
     pub flights: &'a [Flight],
     /// What was searched.
@@ -49,6 +51,11 @@ pub const VIEWS: [&str; 10] = [
 ];
 
 impl DiagnoseReport<'_> {
+    /// What is said of the whole: the rounds as one, or each for itself.
+    fn told(&self) -> &[Diagnosis] {
+        self.together.map_or(self.diagnoses, std::slice::from_ref)
+    }
+
     /// The effects that the model after has and the model before has not.
     fn added(&self) -> impl Iterator<Item = (usize, &Effect)> {
         let had = |name: &str| self.before.effect(name).is_some_and(|effect| effect.enabled);
@@ -74,6 +81,10 @@ pub fn diagnose_page(report: &DiagnoseReport<'_>) -> Result<Page> {
         parts.extend(last.notes.iter().cloned().map(Part::Text));
         sections.push(Section { title: "What to set".into(), parts });
     } else {
+        let found = tables::found(report);
+        if !found.is_empty() {
+            sections.push(Section { title: "Effects found, the largest first".into(), parts: found });
+        }
         let suggested = tables::suggestions(report);
         if !suggested.is_empty() {
             sections.push(Section { title: "What to try next".into(), parts: suggested });
@@ -82,11 +93,14 @@ pub fn diagnose_page(report: &DiagnoseReport<'_>) -> Result<Page> {
         sections.extend(views.into_iter().enumerate().map(|(number, parts)| section(number, parts)));
         sections.push(section(6, tables::ranking(report)));
         sections.push(section(7, tables::waterfall(report)));
-        sections.push(section(8, tables::not_judged(last)));
+        sections.push(section(8, tables::not_judged(report.together.unwrap_or(last))));
     }
     sections.push(section(9, tables::provenance(report)?));
-    Ok(Page { title: report.title.to_owned(), summary: summary(report.diagnoses), sections })
+    Ok(Page { title: report.title.to_owned(), summary: summary(report.told()), sections })
 }
+
+/// Of as many effects the summary says what they cannot be told from; of more the list does.
+const MOST_IN_SUMMARY: usize = 3;
 
 /// The verdict in words.
 fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
@@ -94,8 +108,10 @@ fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
     for (round, diagnosis) in diagnoses.iter().enumerate() {
         let round = if diagnoses.len() > 1 { format!("Round {}: ", round + 1) } else { "Verdict: ".into() };
         out.push(format!("{round}{}. {}", sentences::headline(diagnosis), diagnosis.summary));
+        // Of many effects the list says it.
+        let listed = diagnosis.steps.len() > MOST_IN_SUMMARY;
         for step in &diagnosis.steps {
-            if !step.indistinguishable.is_empty() {
+            if !step.indistinguishable.is_empty() && !listed {
                 let others = step.indistinguishable.join(", ");
                 out.push(format!("These flights cannot tell {} from {others}. To tell: {}.", step.effect, step.would_tell_apart));
             }
@@ -104,9 +120,15 @@ fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
             }
         }
     }
-    for locked in diagnoses.iter().filter_map(|diagnosis| diagnosis.locked.as_ref()).filter(|locked| !locked.mse_fall.is_empty()) {
+    for diagnosis in diagnoses {
+        let Some(locked) = diagnosis.locked.as_ref().filter(|locked| !locked.mse_fall.is_empty()) else { continue };
         let changes: Vec<String> = locked.mse_fall.iter().map(|(channel, fall)| change(channel, *fall)).collect();
-        out.push(format!("Mean squared error on {}: {}.", unseen(locked.kept, locked.duration_s), changes.join("; ")));
+        let changes = changes.join("; ");
+        // The verdict gives those of the channels in which an effect is worth while, often all.
+        if !diagnosis.summary.contains(&changes) {
+            out.push(format!("Mean squared error on {}: {changes}.", unseen(locked.kept, locked.duration_s)));
+        }
+        out.extend(sentences::removable(locked));
     }
     out
 }

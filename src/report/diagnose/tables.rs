@@ -5,8 +5,8 @@ use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
 use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
-use crate::critique::diagnose::sentences::tried;
-use crate::critique::diagnose::{CandidateReport, Diagnosis, Status, Step, number_remark};
+use crate::critique::diagnose::sentences::{removable, share, tried, unseen, worth};
+use crate::critique::diagnose::{CandidateReport, Diagnosis, Locked, Status, Step, number_remark};
 use crate::critique::table::{Kind, significant};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Span};
@@ -61,6 +61,32 @@ fn numbers(step: &Step) -> [String; 2] {
         found.push(format!("{} = {}{} ({how})", parameter.name, significant(parameter.value, 4), with_unit(&parameter.unit)));
     }
     [found.join("; "), usual.join("; ")].map(|text| if text.is_empty() { "–".into() } else { text })
+}
+
+/// Every effect that was found with what it is worth, as one list; nothing where that was not measured.
+pub(super) fn found(report: &DiagnoseReport<'_>) -> Vec<Part> {
+    let Some(whole) = report.told().last().filter(|whole| !whole.worth.is_empty()) else { return Vec::new() };
+    let on = whole.locked.as_ref().map_or_else(String::new, |locked| unseen(locked.kept, locked.duration_s));
+    let all_refitted = whole.worth.iter().all(|worth| worth.refitted);
+    let mut order = worth(&on, all_refitted);
+    order.replace_range(..1, "T");
+    let rows = whole.by_worth().into_iter().enumerate().map(|(place, (step, of))| {
+        let others = if step.indistinguishable.is_empty() { "–".to_owned() } else { step.indistinguishable.join(", ") };
+        let [number, share] = [(place + 1).to_string(), of.map_or_else(|| "–".into(), share)];
+        let [numbers, _] = numbers(step);
+        [number, step.effect.clone(), share, numbers, others, step.meaning.clone()].map(Cell::from).into()
+    });
+    let names = [
+        ("", ""),
+        ("effect", ""),
+        ("share", "of the squared error before"),
+        ("numbers", "95 % interval"),
+        ("cannot be told from", ""),
+        ("the physics", ""),
+    ];
+    let rows = rows.collect();
+    let caption = String::new();
+    vec![Part::Text(order), Part::Table(Table { caption, columns: columns(&names), rows })]
 }
 
 /// View 7.
@@ -214,37 +240,62 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
         names.push("+ suggested formulas".into());
         values.push(with);
         words.push(Part::Text(
-            "The last bar is measured: each suggested formula, calibrated by itself on what was searched. Channels without a bar have none \
-             that held."
+            "The bar of the suggested formulas is measured: each of them, calibrated by itself on what was searched. Channels without that \
+             bar have none that held."
                 .into(),
         ));
     }
-    let rows = names.iter().zip(&values).map(|(name, values)| {
+    let floor = report.told().iter().find_map(|diagnosis| diagnosis.locked.as_ref()?.floor);
+    let floor: Option<Vec<Option<f64>>> = floor.map(|floor| floor.channels().into());
+    let last = floor.iter().map(|floor| ("floor", floor));
+    let rows = names.iter().map(String::as_str).zip(&values).chain(last).map(|(name, values)| {
         let cells = values.iter().map(|value| Cell::from(Kind::Error.text(*value)));
-        [Cell::from(name.clone())].into_iter().chain(cells).collect()
+        [Cell::from(name.to_owned())].into_iter().chain(cells).collect()
     });
     let table = Table {
         caption: "The same as numbers: RMSE on the part that no search has seen".into(),
         columns: channel_columns("model", false, false),
         rows: rows.collect(),
     };
-    let figure = figures::steps("RMSE from effect to effect", caption, &channel_panels(), &names, &values);
+    let below = if floor.is_some() {
+        " The dashed line and the last bar are the floor: what gusts, turbulence and noise leave."
+    } else {
+        ""
+    };
+    let caption = format!("{caption}{below}");
+    let figure = figures::steps("RMSE from effect to effect", &caption, &channel_panels(), &names, &values, floor.as_deref());
     let mut parts = vec![Part::Figure(figure), Part::Table(table)];
     parts.extend(words);
-    for (round, diagnosis) in report.diagnoses.iter().enumerate() {
+    let several = report.told().len() > 1;
+    for (round, diagnosis) in report.told().iter().enumerate() {
         let Some(locked) = diagnosis.locked.as_ref().filter(|locked| !locked.mse_fall.is_empty()) else { continue };
-        let round = if report.diagnoses.len() > 1 { format!(", round {}", round + 1) } else { String::new() };
-        let rows = locked.mse_fall.iter().map(|(channel, fall)| {
-            let [fall, low, high] = fall.map(|share| format!("{:.1}", 100.0 * share));
-            vec![channel.as_str().into(), fall.into(), low.into(), high.into()]
-        });
-        parts.push(Part::Table(Table {
-            caption: format!("Share of the mean squared error removed on {:.0} s ({}){round}", locked.duration_s, locked.part),
-            columns: columns(&[("channel", ""), ("removed", "%"), ("from", "% (95 %)"), ("to", "% (95 %)")]),
-            rows: rows.collect(),
-        }));
+        let round = if several { format!(", round {}", round + 1) } else { String::new() };
+        parts.push(Part::Table(removed(locked, &round)));
+        parts.extend(removable(locked).map(Part::Text));
     }
     parts
+}
+
+/// What was removed, by channel: of all the error and, with a floor, of what lies above it.
+fn removed(locked: &Locked, round: &str) -> Table {
+    let percent = |share: f64| format!("{:.1}", 100.0 * share);
+    let above = |channel: &str| {
+        let place = Column::TARGETS.iter().position(|column| column.name() == channel)?;
+        locked.removable_removed?.channels()[place]
+    };
+    let rows = locked.mse_fall.iter().map(|(channel, fall)| {
+        let mut row: Vec<Cell> = vec![channel.as_str().into()];
+        row.extend(fall.map(|share| percent(share).into()));
+        row.extend(locked.floor.map(|_| Cell::from(above(channel).map_or_else(|| "–".into(), percent))));
+        row
+    });
+    let mut names = vec![("channel", ""), ("removed", "%"), ("from", "% (95 %)"), ("to", "% (95 %)")];
+    names.extend(locked.floor.map(|_| ("of the removable", "%")));
+    Table {
+        caption: format!("Share of the mean squared error removed on {:.0} s ({}){round}", locked.duration_s, locked.part),
+        columns: columns(&names),
+        rows: rows.collect(),
+    }
 }
 
 /// View 9.

@@ -2,24 +2,45 @@
 
 use super::grid::{Grid, axis_name, set_x, set_y};
 use super::{Figure, figure, round};
+use crate::critique::table::significant;
 use crate::report::colour;
 use crate::report::page::escape;
-use plotly::common::{Marker, Orientation, TextAnchor};
+use plotly::common::{DashType, Line, Marker, Mode, Orientation, TextAnchor};
 use plotly::layout::{BarMode, TraceOrder};
-use plotly::{Bar, Traces};
+use plotly::{Bar, Scatter, Traces};
 
 /// Bars of each step in panels of channels: how an error falls from step to step (a waterfall). `values[step][panel]`; a step
-/// without a value has no bar.
-pub fn steps(title: &str, caption: &str, panels: &[(String, String)], names: &[String], values: &[Vec<Option<f64>>]) -> Figure {
+/// without a value has no bar. With a `floor`, one value a panel, the last bar is that, in another colour, and a dashed line at its height
+/// runs below the others.
+pub fn steps(
+    title: &str,
+    caption: &str,
+    panels: &[(String, String)],
+    names: &[String],
+    values: &[Vec<Option<f64>>],
+    floor: Option<&[Option<f64>]>,
+) -> Figure {
     let grid = Grid::new(panels.len(), 3, 190, 40);
     let mut traces = Traces::new();
     let labels: Vec<String> = names.iter().map(|name| escape(name)).collect();
+    let text = |heights: &[Option<f64>]| -> Vec<String> {
+        heights.iter().map(|height| height.map_or_else(String::new, |height| significant(height, 3))).collect()
+    };
     for panel in 0..grid.panels {
-        let heights: Vec<Option<f64>> = values.iter().map(|step| step.get(panel).copied().flatten().map(round)).collect();
-        let text =
-            heights.iter().map(|height| height.map_or_else(String::new, |height| crate::critique::table::significant(height, 3)));
-        let bar = Bar::new(labels.clone(), heights.clone()).show_legend(false).marker(Marker::new().color(colour::line(0)));
-        traces.push(bar.text_array(text.collect()).x_axis(axis_name('x', panel)).y_axis(axis_name('y', panel)));
+        let of = |step: &[Option<f64>]| step.get(panel).copied().flatten().map(round);
+        let [x, y] = ['x', 'y'].map(|axis| axis_name(axis, panel));
+        let bar = |labels: Vec<String>, heights: Vec<Option<f64>>, colour: &'static str| {
+            let bar = Bar::new(labels, heights.clone()).show_legend(false).marker(Marker::new().color(colour));
+            bar.text_array(text(&heights)).x_axis(x.clone()).y_axis(y.clone())
+        };
+        traces.push(bar(labels.clone(), values.iter().map(|step| of(step)).collect(), colour::line(0)));
+        if let Some(height) = floor.and_then(of) {
+            let all: Vec<String> = labels.iter().cloned().chain([FLOOR.to_owned()]).collect();
+            let line = Scatter::new(all.clone(), vec![height; all.len()]).mode(Mode::Lines).name(FLOOR).show_legend(false);
+            let line = line.line(Line::new().color(colour::MEASURED).dash(DashType::Dash).width(1.2));
+            traces.push(bar(vec![FLOOR.to_owned()], vec![Some(height)], colour::line(1)));
+            traces.push(line.x_axis(x.clone()).y_axis(y.clone()));
+        }
     }
     let mut layout = grid.layout().annotations(grid.titles(panels.iter().map(|(title, _)| title)));
     for (panel, (_, unit)) in panels.iter().enumerate().take(grid.panels) {
@@ -28,8 +49,13 @@ pub fn steps(title: &str, caption: &str, panels: &[(String, String)], names: &[S
         let y = grid.y(panel).anchor(axis_name('x', panel)).title(escape(unit));
         layout = set_y(set_x(layout, panel, x), panel, y);
     }
+    // Bars that stand at different places of one axis, not beside each other.
+    let layout = if floor.is_some() { layout.bar_mode(BarMode::Overlay) } else { layout };
     figure(title, caption, traces, layout, grid.height_px() + 60)
 }
+
+/// Label of the bar that no model can go below.
+const FLOOR: &str = "floor";
 
 /// Shares that add up to a whole, one horizontal bar a row: what physics explains, what only the network explains, what is noise.
 /// `parts` are (name, share of each row, 1 being the whole). A negative share stands to the left of zero; the others then reach
@@ -65,9 +91,17 @@ mod tests {
     #[test]
     fn bars_hold_their_data_and_negative_shares_stand_left_of_zero() {
         let names = ["paper".to_owned(), "paper + ground effect".to_owned()];
-        let found = json(&steps("t", "c", &panels(6), &names, &[vec![Some(2.0); 6], vec![Some(1.0), None]]));
+        let found = json(&steps("t", "c", &panels(6), &names, &[vec![Some(2.0); 6], vec![Some(1.0), None]], None));
         assert_eq!(found["data"][0]["y"], serde_json::json!([2.0, 1.0]));
         assert_eq!(found["data"][1]["y"], serde_json::json!([2.0, null]));
+        assert!(found["layout"].get("barmode").is_none() && !found.to_string().contains("floor"));
+        let floor = [Some(0.3126), None];
+        let found = json(&steps("t", "c", &panels(2), &names, &[vec![Some(2.0); 2], vec![Some(1.0); 2]], Some(&floor)));
+        let [bar, line] = [1, 2].map(|trace| &found["data"][trace]);
+        assert_eq!((&bar["x"], &bar["y"], &bar["text"]), (&["floor"].into(), &[0.3126].into(), &["0.313"].into()), "{bar}");
+        assert_eq!(line["y"], serde_json::json!([0.3126, 0.3126, 0.3126]), "a line below all bars: {line}");
+        assert_eq!(line["line"]["dash"], "dash");
+        assert_eq!(found["data"].as_array().map(Vec::len), Some(4), "the second panel has no floor");
         let found = json(&shares("t", "c", &names, &[("physics".into(), vec![0.6, 0.7]), ("noise".into(), vec![0.4, 0.3])]));
         assert_eq!((&found["layout"]["barmode"], &found["data"][0]["x"]), (&"stack".into(), &serde_json::json!([70.0, 60.0])));
         assert_eq!(found["layout"]["xaxis"]["range"], serde_json::json!([0.0, 100.0]));

@@ -1,7 +1,7 @@
 //! `compare`: measured against predicted for every model and network given, beside honest yardsticks.
 
 use super::predict::read_network;
-use super::{Context, data_sha256};
+use super::{Context, data_sha256, explainable};
 use crate::arguments::{Data, Division};
 use phyture::critique::shares::{self, shares};
 use phyture::critique::table::ordinal;
@@ -9,10 +9,9 @@ use phyture::critique::uncertainty::{Effort, uncertainty};
 use phyture::critique::wrap::wrapped;
 use phyture::critique::{Comparison, Row, compare, finite_difference, floor, ridge};
 use phyture::disk::{Target, write_atomically};
-use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, Span, Window};
+use phyture::flight::{DataSet, Flight, Span, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
@@ -46,6 +45,7 @@ pub struct Wanted<'a> {
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
 pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
     let page = wanted.report.map(|folder| context.new_page(folder, "comparison.html")).transpose()?;
+    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let networks = wanted.networks.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
     let models = wanted.models.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
@@ -88,8 +88,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
     };
     let mut result = contest.run(context, &set, &split)?;
     if let Some(folder) = wanted.explainable {
-        let explainable = data_set(folder, &ReadOptions::default())?;
-        result.comparison.floor = Some(floor(&set.flights, &result.windows, &explainable.flights)?);
+        result.set_floor(&set, &explainable::read(data, folder)?)?;
     }
     context.say(format!("\n{}", result.comparison));
     if let Some(target) = page {
@@ -237,6 +236,12 @@ impl Contest<'_> {
 }
 
 impl Judged {
+    /// Adds the floor, from the explainable part of the flights.
+    pub fn set_floor(&mut self, set: &DataSet, explainable: &[Flight]) -> Result<()> {
+        self.comparison.set_floor(floor(&set.flights, &self.windows, explainable)?);
+        Ok(())
+    }
+
     /// The page, to be written or put into a larger one.
     pub fn page(&self, set: &DataSet, provenance: &[(String, String)]) -> Result<Page> {
         compare_page(&CompareReport {

@@ -9,15 +9,15 @@ use super::diagnose;
 use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
 use phyture::Result;
-use phyture::critique::Comparison;
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
+use phyture::critique::{Comparison, floor_of_spans};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::write;
 use phyture::nn::PhyTureConfig;
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
-use phyture::sim::{Level, Simulation, simulate};
+use phyture::sim::{Level, Simulation, simulate_with_explainable};
 use phyture::train::{RunFolder, TrainConfig};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -35,6 +35,8 @@ const HIDDEN: [(&str, f64); 3] = [("weathercock", 0.5), ("quad_drag", 1.5), ("ta
 #[derive(Serialize)]
 struct Output {
     rounds: Vec<Diagnosis>,
+    /// The rounds as one.
+    together: Diagnosis,
     comparison: Comparison,
     report: PathBuf,
     seconds: f64,
@@ -72,7 +74,7 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     for (id, scale) in HIDDEN {
         simulation = simulation.hide(id, scale)?;
     }
-    let set = simulate(&simulation)?;
+    let (set, explainable) = simulate_with_explainable(&simulation)?;
     write::data_set_csv(&out.join("flights"), &set.flights)?;
     let hidden: Vec<String> = HIDDEN.iter().map(|(id, scale)| format!("{id} x {scale}")).collect();
     context.say(format!(
@@ -101,10 +103,13 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
 
     context.say("\n4. What is missing? Found, added, calibrated, until nothing worthwhile is left");
     let options = Options { seed: context.seed(), ..Options::default() };
-    let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options };
+    let floor = Some(floor_of_spans(&set.flights, &split.test, &explainable.flights)?);
+    let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options, floor };
     let ledger = out.join("amended.ledger.jsonl");
-    let Amended { rounds, model: amended } = diagnose::amend(context, &search, &model, &ledger)?;
-    amended.write(out.join("amended.toml"))?;
+    let found = diagnose::amend(context, &search, &model, &ledger)?;
+    found.model.write(out.join("amended.toml"))?;
+    let together = diagnose::told_together(context, &search, &model, &found)?;
+    let Amended { rounds, model: amended } = found;
 
     context.say("\n5. The residual network, trained on the baseline and on the amended model");
     let train = |model: &Model, name: &str| {
@@ -123,7 +128,8 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
         stride: 5,
         uncertainty: false,
     };
-    let judged = contest.run(context, &set, &split)?;
+    let mut judged = contest.run(context, &set, &split)?;
+    judged.set_floor(&set, &explainable.flights)?;
     context.say(format!("\n{}", judged.comparison));
     let provenance = [
         (
@@ -137,6 +143,7 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     let mut whole = diagnose_page(&DiagnoseReport {
         title: &title,
         diagnoses: &rounds,
+        together: Some(&together),
         flights: &set.flights,
         searched: &split.training,
         locked: &split.test,
@@ -151,6 +158,6 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
     folder.close()?;
     let (report, seconds) = (page.path().to_path_buf(), begun.elapsed().as_secs_f64());
     context.say(format!("report: {}   ({seconds:.0} s)", report.display()));
-    context.json(&Output { rounds, comparison: judged.comparison, report, seconds })?;
+    context.json(&Output { rounds, together, comparison: judged.comparison, report, seconds })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -2,15 +2,15 @@
 
 use super::compare::{DATA_NOTE, write_page};
 use super::predict::read_network;
-use super::{CHECK_FAILED, Context, data_sha256};
+use super::{CHECK_FAILED, Context, data_sha256, explainable};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
-use phyture::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, calibrated, searched, sentences};
-use phyture::critique::table::significant;
+use phyture::critique::diagnose::{self, Amended, Diagnosis, LoopText, Options, Outcome, Verdict, calibrated, searched};
 use phyture::critique::wrap::wrapped;
+use phyture::critique::{PerChannel, floor_of_spans};
 use phyture::disk::{Target, append_lines};
 use phyture::flight::split::{Part, Split};
-use phyture::flight::{Column, DataSet, Flight, Span};
+use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
 use phyture::physics::{Entry, Model};
 use phyture::report::{DiagnoseReport, diagnose_page};
@@ -34,6 +34,8 @@ pub struct Task<'a> {
     pub data_sha256: String,
     /// How to search.
     pub options: Options,
+    /// Root mean square error on what only confirms that no model can go below, where it is known.
+    pub floor: Option<PerChannel>,
 }
 
 impl Task<'_> {
@@ -41,8 +43,17 @@ impl Task<'_> {
     pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
         let (searched, locked) = (searched(self.split), &self.split.test);
         let mut outcome = diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options)?;
-        outcome.diagnosis.data_sha256.clone_from(&self.data_sha256);
+        self.label(&mut outcome.diagnosis);
+        diagnose::weigh(&mut outcome.diagnosis, &self.set.flights, &outcome.model, self.split)?;
         Ok(outcome)
+    }
+
+    /// Notes what the search does not know: the hash of the files and the floor.
+    fn label(&self, diagnosis: &mut Diagnosis) {
+        diagnosis.data_sha256.clone_from(&self.data_sha256);
+        if let (Some(locked), Some(floor)) = (&mut diagnosis.locked, self.floor) {
+            locked.set_floor(floor);
+        }
     }
 }
 
@@ -82,11 +93,11 @@ impl<'a> Paper<'a> {
         self.provenance.extend(notes.iter().map(|note| (DATA_NOTE.to_owned(), note.clone())));
     }
 
-    /// Writes the page.
+    /// Writes the page: of one diagnosis, or of the rounds of a loop and those together.
     fn write(
         &self,
         context: &Context,
-        diagnoses: &[Diagnosis],
+        [diagnoses, together]: [&[Diagnosis]; 2],
         flights: &[Flight],
         split: &Split,
         models: [&Model; 2],
@@ -96,6 +107,7 @@ impl<'a> Paper<'a> {
         let report = DiagnoseReport {
             title: &self.title,
             diagnoses,
+            together: together.first(),
             flights,
             searched: &searched,
             locked: &split.test,
@@ -132,7 +144,7 @@ fn prepare(
         let diagnosis = Diagnosis { notes: notes.collect(), ..convention_fault(report.summary.clone(), sha) };
         if let Some(paper) = &paper {
             let split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
-            paper.write(context, std::slice::from_ref(&diagnosis), &set.flights, &split, [model, model])?;
+            paper.write(context, [std::slice::from_ref(&diagnosis), &[]], &set.flights, &split, [model, model])?;
         }
         context.json(&diagnosis)?;
         return Ok(None);
@@ -152,6 +164,14 @@ pub struct Wanted<'a> {
     pub report: Option<&'a Path>,
     /// Most effects to name.
     pub max_effects: usize,
+    /// Folder of the explainable part of the flights.
+    pub explainable: Option<&'a Path>,
+}
+
+/// The floor on what only confirms, from the explainable part of the flights.
+fn floor(data: &Data, explainable: Option<&Path>, set: &DataSet, split: &Split) -> Result<Option<PerChannel>> {
+    let of = |folder: &Path| floor_of_spans(&set.flights, &split.test, &explainable::read(data, folder)?);
+    explainable.filter(|_| !split.test.is_empty()).map(of).transpose()
 }
 
 /// `diagnose`.
@@ -161,6 +181,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         (Some(hybrid), None) => hybrid.description().model.clone(),
         (_, model) => context.model(model, data)?,
     };
+    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let target = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
     let mut paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
     let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
@@ -186,13 +207,14 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         set = target.set;
     }
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
-    let task = Task { set: &set, split: &split, data_sha256, options };
+    let floor = floor(data, wanted.explainable, &set, &split)?;
+    let task = Task { set: &set, split: &split, data_sha256, options, floor };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", told(context, &outcome.diagnosis)));
     if let Some(paper) = paper {
         let before = calibrated(&model, &set.flights, &split)?;
         let after = if outcome.diagnosis.accepted.is_empty() { &before } else { &outcome.model };
-        paper.write(context, std::slice::from_ref(&outcome.diagnosis), &set.flights, &split, [&before, after])?;
+        paper.write(context, [std::slice::from_ref(&outcome.diagnosis), &[]], &set.flights, &split, [&before, after])?;
     }
     context.json(&outcome.diagnosis)?;
     Ok(ExitCode::SUCCESS)
@@ -201,27 +223,6 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
 /// A diagnosis as text: in short, or with every effect that was tried.
 fn told(context: &Context, diagnosis: &Diagnosis) -> String {
     if context.is_verbose() { format!("{diagnosis:#}") } else { diagnosis.to_string() }
-}
-
-/// What the loop did to the errors that no search has seen, by channel.
-fn before_and_after(before: [f64; 6], after: [f64; 6], on: &str, added: &[&str]) -> String {
-    let row = |name: &str, cells: [String; 6]| format!("  {name:<18}{}", cells.map(|cell| format!("{cell:>10}")).concat());
-    let numbers = |values: [f64; 6]| values.map(|value| significant(value, 4));
-    let change: [String; 6] = std::array::from_fn(|channel| {
-        let percent = 100.0 * (after[channel] / before[channel] - 1.0);
-        // What rounds to nothing has no sign.
-        if percent.abs() < 0.05 { "0.0 %".into() } else { format!("{percent:+.1} %") }
-    });
-    let what = if added.is_empty() { "nothing was added".to_owned() } else { format!("added: {}", added.join(", ")) };
-    [
-        wrapped("", &format!("RMSE on {on}; {what}")),
-        row("", Column::TARGETS.map(|column| column.name().to_owned())),
-        row("", Column::TARGETS.map(|column| column.unit().to_owned())),
-        row("before", numbers(before)),
-        row("after", numbers(after)),
-        row("change", change),
-    ]
-    .join("\n")
 }
 
 /// One line of the ledger.
@@ -243,19 +244,50 @@ struct LedgerLine<'a> {
 #[derive(Serialize)]
 struct LoopOutput {
     rounds: Vec<Diagnosis>,
+    /// The rounds as one: what was added, what it is worth, the errors before and after.
+    together: Diagnosis,
     model: PathBuf,
+    /// There is one once something was added to a model.
+    ledger: Option<PathBuf>,
 }
 
-/// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger.
+/// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger. A round by itself is told only in the verbose
+/// text; what all found is the caller's to tell (see [`told_together`]).
 pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
     diagnose::amend(&task.set.flights, model, task.split, &task.options, &mut |round, diagnosis| {
-        diagnosis.data_sha256.clone_from(&task.data_sha256);
-        context.say(format!("\nRound {round}\n{}", told(context, diagnosis)));
+        task.label(diagnosis);
+        if context.is_verbose() {
+            context.say(format!("\nRound {round}\n{diagnosis:#}"));
+        } else {
+            context.say(progress(diagnosis));
+        }
         if diagnosis.is_confirmed() {
             append(ledger, round, diagnosis)?;
         }
         Ok(())
     })
+}
+
+/// One line for a search of minutes; its findings are told once all are known.
+fn progress(diagnosis: &Diagnosis) -> String {
+    let found = match diagnosis.accepted.len() {
+        0 => "nothing more".to_owned(),
+        1 => "1 effect".to_owned(),
+        count => format!("{count} effects"),
+    };
+    let next = if diagnosis.is_confirmed() { "; added, and searched on" } else { "" };
+    format!("search: {found} found in {:.1} s{next}", diagnosis.seconds)
+}
+
+/// The rounds of a loop as one diagnosis, which is told: all effects as one list, and what they did to the errors. `before` is the model as
+/// it was given, calibrated.
+pub fn told_together(context: &Context, task: &Task<'_>, before: &Model, amended: &Amended) -> Result<Diagnosis> {
+    let mut together = diagnose::together(&task.set.flights, before, amended, task.split)?;
+    task.label(&mut together);
+    let text = LoopText(&together);
+    let text = if context.is_verbose() { format!("{text:#}") } else { text.to_string() };
+    context.say(format!("\n{}", text.trim_end()));
+    Ok(together)
 }
 
 /// Adds lines at the end of the ledger and never changes what is there. A round that a killed run has written stands in it once.
@@ -279,62 +311,95 @@ fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
     append_lines(ledger, &lines)
 }
 
+/// What `loop` was asked for.
+pub struct Loop<'a> {
+    /// Model file.
+    pub model: Option<&'a Path>,
+    /// Model file to write.
+    pub output: &'a Path,
+    /// Folder for the page.
+    pub report: Option<&'a Path>,
+    /// Folder of the explainable part of the flights.
+    pub explainable: Option<&'a Path>,
+}
+
 /// `loop`.
-pub fn run_loop(
-    context: &Context,
-    data: &Data,
-    model: Option<&Path>,
-    output: &Path,
-    report: Option<&Path>,
-    division: &Division,
-) -> Result<ExitCode> {
-    let target = context.new_file(output, model.as_slice())?;
-    let page = report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    let model = context.model(model, data)?;
+pub fn run_loop(context: &Context, data: &Data, wanted: &Loop<'_>, division: &Division) -> Result<ExitCode> {
+    let output = wanted.output;
+    let target = context.new_file(output, wanted.model.as_slice())?;
+    let page = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
+    let model = context.model(wanted.model, data)?;
     let mut paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
     let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
-    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options };
+    let floor = floor(data, wanted.explainable, &set, &split)?;
+    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options, floor };
     let ledger = output.with_extension("ledger.jsonl");
     let before = calibrated(&model, &set.flights, &split)?;
-    let Amended { rounds, mut model } = amend(context, &task, &model, &ledger)?;
+    let mut amended = amend(context, &task, &model, &ledger)?;
+    let model = &mut amended.model;
     model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
     model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
     model.provenance.insert("seed".into(), Entry::Text(context.seed().to_string()));
     model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
+    // Before anything else is measured: what the search found is then safe.
     model.write(context.ready(&target)?)?;
-    let added: Vec<&str> =
-        rounds.iter().filter(|round| round.is_confirmed()).flat_map(|round| &round.accepted).map(String::as_str).collect();
-    if let Some(locked) = rounds.iter().find_map(|round| round.locked.as_ref()) {
-        let errors = |model: &Model| model.rmse(&set.flights, &split.test);
-        let on = sentences::unseen(locked.kept, locked.duration_s);
-        context.say(format!("\n{}", before_and_after(errors(&before)?, errors(&model)?, &on, &added)));
+    let together = told_together(context, &task, &before, &amended)?;
+    context.say(format!("\nmodel written to {}", output.display()));
+    let ledger = ledger.exists().then_some(ledger);
+    if let Some(ledger) = &ledger {
+        context.say(wrapped("ledger: ", &written(ledger, &amended.rounds)));
     }
-    // There is a ledger once something was added to the model.
-    let beside = if ledger.exists() { format!(", ledger {}", ledger.display()) } else { String::new() };
-    context.say(format!("\nmodel written to {}{beside}", output.display()));
     if let Some(paper) = paper {
-        let after = if rounds.iter().any(Diagnosis::is_confirmed) { &model } else { &before };
-        paper.write(context, &rounds, &set.flights, &split, [&before, after])?;
+        let after = if amended.rounds.iter().any(Diagnosis::is_confirmed) { &amended.model } else { &before };
+        let told = [amended.rounds.as_slice(), std::slice::from_ref(&together)];
+        paper.write(context, told, &set.flights, &split, [&before, after])?;
     }
-    context.json(&LoopOutput { rounds, model: output.into() })?;
+    context.json(&LoopOutput { rounds: amended.rounds, together, model: output.into(), ledger })?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// `amended.ledger.jsonl: a line for each effect, in order of acceptance: wind, drag`.
+fn written(ledger: &Path, rounds: &[Diagnosis]) -> String {
+    let steps = rounds.iter().filter(|round| round.is_confirmed()).flat_map(|round| &round.steps);
+    let names: Vec<&str> = steps.map(|step| step.effect.as_str()).collect();
+    let what = match names.as_slice() {
+        [] => "nothing added; what it holds is of an earlier run".to_owned(),
+        [one] => format!("a line for {one}"),
+        many => format!("a line for each effect, in order of acceptance: {}", many.join(", ")),
+    };
+    format!("{}, {what}", ledger.display())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use phyture::critique::diagnose::{Locked, Step};
+
+    fn round(effects: &[&str], confirmed: bool) -> Diagnosis {
+        let step = |effect: &&str| Step { effect: (*effect).into(), channels: vec!["vx_dot".into()], ..Step::default() };
+        let fall = if confirmed { [0.4, 0.3, 0.5] } else { [0.0, -0.1, 0.1] };
+        Diagnosis {
+            accepted: effects.iter().map(|effect| (*effect).to_owned()).collect(),
+            steps: effects.iter().map(step).collect(),
+            locked: Some(Locked { mse_fall: [("vx_dot".to_owned(), fall)].into(), ..Locked::default() }),
+            seconds: 2.04,
+            ..Diagnosis::nothing(Verdict::EffectsMissing, String::new())
+        }
+    }
 
     #[test]
-    fn the_loop_ends_with_what_it_changed() {
-        let before = [0.30, 0.30, 0.40, 1.74, 1.55, 0.68];
-        let after = [0.30, 0.30, 0.36, 0.33, 0.33, 0.70];
-        let text = before_and_after(before, after, "120 s of flights that no search has seen", &["cyclic_lag", "weathercock"]);
-        assert!(text.starts_with("RMSE on 120 s of flights that no search has seen; added: cyclic_lag, weathercock"), "{text}");
-        assert!(text.contains("-81.0 %") && text.contains("+2.9 %") && text.contains("     0.0 %"), "{text}");
-        assert!(text.lines().all(|line| line.chars().count() <= 120), "{text}");
-        assert!(before_and_after(before, before, "x", &[]).contains("nothing was added"));
+    fn a_search_is_a_line_and_the_ledger_names_what_was_added_in_order() {
+        let rounds = [round(&["wind", "drag"], true), round(&["lag"], true), round(&["chance"], false)];
+        assert_eq!(progress(&rounds[0]), "search: 2 effects found in 2.0 s; added, and searched on");
+        assert_eq!(progress(&rounds[2]), "search: 1 effect found in 2.0 s");
+        assert_eq!(progress(&round(&[], false)), "search: nothing more found in 2.0 s");
+        let said = written(Path::new("a.ledger.jsonl"), &rounds);
+        assert_eq!(said, "a.ledger.jsonl, a line for each effect, in order of acceptance: wind, drag, lag");
+        assert_eq!(written(Path::new("l"), &rounds[1..]), "l, a line for lag");
+        assert!(written(Path::new("l"), &rounds[2..]).contains("of an earlier run"));
     }
 }

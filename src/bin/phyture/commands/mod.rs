@@ -7,6 +7,7 @@ mod compare;
 mod demo;
 mod diagnose;
 mod effect;
+mod explainable;
 mod formula;
 mod implant;
 mod manual;
@@ -89,12 +90,14 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let (model, network) = (model.as_deref(), network.as_deref());
             predict::run(&context, data, &predict::Wanted { model, network, output, stride: *stride })
         }
-        Command::Diagnose { data, model, of_network, report, max_effects, division } => {
+        Command::Diagnose { data, model, of_network, report, max_effects, explainable, division } => {
             let (model, of_network, report) = (model.as_deref(), of_network.as_deref(), report.as_deref());
-            diagnose::run(&context, data, &diagnose::Wanted { model, of_network, report, max_effects: *max_effects }, division)
+            let (max_effects, explainable) = (*max_effects, explainable.as_deref());
+            diagnose::run(&context, data, &diagnose::Wanted { model, of_network, report, max_effects, explainable }, division)
         }
-        Command::Loop { data, model, output, report, division } => {
-            diagnose::run_loop(&context, data, model.as_deref(), output, report.as_deref(), division)
+        Command::Loop { data, model, output, report, explainable, division } => {
+            let (model, report, explainable) = (model.as_deref(), report.as_deref(), explainable.as_deref());
+            diagnose::run_loop(&context, data, &diagnose::Loop { model, output, report, explainable }, division)
         }
         Command::Effect { command } => effect::run(&context, command),
         Command::Implant { data, dir, effect, formula, scale, size, model } => {
