@@ -4,7 +4,7 @@ mod flights;
 
 use flights::{Normal, STEP_S, message, random, with_targets};
 use phyture::flight::{Column, Flight, Span, Targets};
-use phyture::physics::{Effect, Model, Term, calibrate};
+use phyture::physics::{Effect, Model, Parameter, Term, calibrate};
 use phyture::{Error, Result};
 use phyture_kernels::Tolerance;
 use proptest::prelude::*;
@@ -152,6 +152,43 @@ fn intervals_cover_under_coloured_disturbances() -> Result<()> {
             assert!((FEWEST_HITS..REPLICATIONS).contains(&count), "{shape:?}, {correlation_s} s: {hits:?}");
         }
     }
+    Ok(())
+}
+
+/// A flight whose vertical acceleration is `-2 vz - 20 lag(u4, tau) + 3` plus a coloured disturbance.
+fn lagged(seed: u64, samples: usize, tau_s: f64, correlation_s: f64) -> Result<Flight> {
+    let flight = disturbed(seed, samples, correlation_s)?;
+    let stick = flight.column(Column::U4);
+    let late =
+        format!("-20 * (lag(u4, {tau_s:?}) - u4)")
+            .parse::<phyture::formula::Formula>()?
+            .evaluate(samples, STEP_S, &|name| (name == "u4").then(|| stick.into()))?;
+    let mut targets = flight.accelerations();
+    targets[2].iter_mut().zip(late).for_each(|(target, late)| *target += late);
+    with_targets(&flight, &targets)
+}
+
+#[test]
+fn the_interval_of_a_time_constant_covers_it() -> Result<()> {
+    let tau_s = 0.08;
+    let mut model = vertical()?;
+    let mut servo = Effect::change("servo", "u4", "u4", 0.0)?;
+    servo.coefficients.clear();
+    servo.swaps[0].with = "lag(u4, tau_s)".parse()?;
+    servo.parameters.push(Parameter { name: "tau_s".into(), value: 0.03, unit: "s".into(), fixed: false, ci95: None });
+    model.effects.push(servo);
+    let (mut hits, replications) = (0, 100);
+    for replication in 0..replications {
+        let flights = [lagged(7000 + replication, 6000, tau_s, 0.2)?];
+        let (found, calibration) = calibrate(&model, &flights, &whole(&flights))?;
+        let estimate = calibration.coefficients.iter().find(|estimate| estimate.name == "tau_s");
+        let interval = estimate.and_then(|estimate| estimate.ci95).ok_or_else(|| Error::Undetermined("no interval".into()))?;
+        let stored = found.effect("servo").map(|servo| (servo.parameters[0].value, servo.parameters[0].ci95));
+        assert_eq!(stored, estimate.map(|estimate| (estimate.value, estimate.ci95)));
+        hits += u32::from((interval[0]..=interval[1]).contains(&tau_s));
+    }
+    // Of 100 intervals that hold the truth with probability 0.95, 87 or fewer do with probability below 1/500, all with 0.006.
+    assert!((88..=100).contains(&hits), "{hits} of {replications}");
     Ok(())
 }
 

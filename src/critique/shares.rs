@@ -98,7 +98,7 @@ pub struct Shares {
     pub neither: ShareOf,
     /// The network's share in two, if the hybrid has a linear history.
     pub of_network: Option<OfNetwork>,
-    /// The part of "neither" that no model can remove, where the explainable part of the flights is known; see [`Shares::set_floor`].
+    /// The part of "neither" that no model can remove, where the explainable part of the flights is known; the command line sets it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<ShareOf>,
 }

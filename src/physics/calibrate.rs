@@ -545,3 +545,86 @@ fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize
     }
     merged
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::catalogue::tests::{helicopter, motion};
+    use super::*;
+    use phyture_kernels::random::Stream;
+    use proptest::prelude::*;
+
+    /// Effects that smooth motion far from the ground determines, whatever others there are.
+    const DETERMINED: [&str; 16] = [
+        "cyclic_lag",
+        "tail_lag",
+        "collective_lag",
+        "ctrl_cross",
+        "rate_cross",
+        "quad_drag",
+        "weathercock",
+        "dihedral_speedstab",
+        "speed_damping",
+        "transl_lift",
+        "stall_saturation",
+        "collective_torque",
+        "heave_torque",
+        "flap_tilt",
+        "cg_offset",
+        "tilt_misalign",
+    ];
+
+    fn machine(chosen: &[bool]) -> Model {
+        let mut model = helicopter();
+        for (kind, _) in DETERMINED.iter().zip(chosen).filter(|(_, chosen)| **chosen) {
+            let definition = catalogue::definition(kind).expect("an effect of the catalogue");
+            let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
+            for (coefficient, known) in effect.coefficients.iter_mut().zip(definition.coefficients) {
+                let [low, high] = known.expected.expect("the catalogue gives usual sizes");
+                coefficient.value = 0.25 * low + 0.75 * high;
+            }
+            model.effects.push(effect);
+        }
+        model
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 8, failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn numbers_that_are_a_third_off_are_found_again(
+            seed in any::<u64>(),
+            chosen in prop::collection::vec(any::<bool>(), DETERMINED.len()),
+        ) {
+            let truth = machine(&chosen);
+            let flights: Vec<Flight> = (0..3)
+                .map(|index| {
+                    let mut flight = motion(seed.wrapping_add(index), 2000)?;
+                    flight.name = format!("flight_{index}");
+                    flight.with_accelerations(&truth.predict(&flight)?)
+                })
+                .collect::<Result<_>>()?;
+            let spans: Vec<Span> = (0..3).map(|flight| Span { flight, start: 0, end: 2000 }).collect();
+            let mut off = truth.clone();
+            let (draws, mut draw) = (Stream::new(seed, 9, 9, 9), 0);
+            for effect in &mut off.effects {
+                for index in 0..effect.coefficients.len() + effect.parameters.len() {
+                    let is_fixed = index.checked_sub(effect.coefficients.len()).is_some_and(|place| effect.parameters[place].fixed);
+                    if let Some((value, _)) = effect.number_mut(index).filter(|_| !is_fixed) {
+                        *value *= 1.0 + 0.3 * (2.0 * draws.uniform(draw) - 1.0);
+                        draw += 1;
+                    }
+                }
+            }
+            let (found, calibration) = calibrate(&off, &flights, &spans)?;
+            for (found, truth) in found.effects.iter().zip(&truth.effects) {
+                for index in 0..truth.coefficients.len() + truth.parameters.len() {
+                    let (found, number) = (found.number(index), truth.number(index));
+                    let pair = found.zip(number).map(|(found, number)| (found.value, number.value, number.name));
+                    let (value, expected, name) = pair.expect("the same effects");
+                    let size = expected.abs().max(0.01);
+                    prop_assert!((value - expected).abs() < 1e-3 * size, "{}.{name}: {value} for {expected}\n{calibration}", truth.name);
+                }
+            }
+        }
+    }
+}

@@ -90,22 +90,33 @@ impl Columns {
             let derivatives = self.composer.graph.derivatives(&values, symbol);
             slopes.extend(derivatives.into_iter().enumerate().filter_map(|(place, node)| Some(((place, free), node?))));
         }
-        let mut found = Vec::new();
+        // One column for each number and acceleration, whatever summands it acts through; and one for the rest.
+        let mut found: Vec<Regressor> = Vec::new();
         for (place, summand) in composed.summands.iter().enumerate() {
             for &(free, _) in &numbers {
                 if let Some(&node) = slopes.get(&(place, free)) {
-                    found.push(Regressor { channel: summand.channel, effect: free.0, number: Some(free.1), node });
+                    self.add_up(&mut found, Regressor { channel: summand.channel, effect: free.0, number: Some(free.1), node });
                 }
             }
             if wanted.effect.is_none() {
                 let own: Vec<(Node, Node)> =
                     numbers.iter().filter_map(|&(free, symbol)| Some((symbol, *slopes.get(&(place, free))?))).collect();
                 if let Some(node) = self.rest(&composed, summand.node, &own) {
-                    found.push(Regressor { channel: summand.channel, effect: summand.effect, number: None, node });
+                    self.add_up(&mut found, Regressor { channel: summand.channel, effect: summand.effect, number: None, node });
                 }
             }
         }
         Ok(found)
+    }
+
+    fn add_up(&mut self, found: &mut Vec<Regressor>, part: Regressor) {
+        let same = |known: &&mut Regressor| {
+            known.channel == part.channel && known.number == part.number && (part.number.is_none() || known.effect == part.effect)
+        };
+        match found.iter_mut().find(same) {
+            Some(known) => known.node = self.composer.graph.sum(known.node, part.node),
+            None => found.push(part),
+        }
     }
 
     /// A summand less its slopes times their numbers: what is left of it where these are 0, if it is linear in them.

@@ -174,6 +174,7 @@ impl Effect {
     }
 
     /// What a user's own effect adds to the signal that it changes: the signal's name and the formula.
+    #[cfg(feature = "files")]
     pub(super) fn own_change(&self) -> Option<(&str, String)> {
         let swap = self.swaps.first().filter(|_| self.kind == FORMULA_KIND)?;
         let text = swap.with.to_string();

@@ -222,19 +222,26 @@ pub struct Truth {
 /// # Errors
 /// [`Error::Config`] for a scale, class or length out of range.
 pub fn simulate(simulation: &Simulation) -> Result<DataSet> {
-    Ok(simulate_with_explainable(simulation)?.0)
+    Ok(flown(simulation, false)?.0)
 }
 
 /// As [`simulate()`], and beside each flight its explainable part: the same instruments without noise on the same motion, the
-/// accelerations being those that the aircraft would have had at each moment without gusts, turbulence and roughness. A mean wind blows in
-/// both. What a model leaves of the recorded accelerations beyond their difference from these, it could have explained.
+/// accelerations being those that the aircraft would have had at each moment without gusts, turbulence and roughness, then and before. A mean
+/// wind blows in both. What a model leaves of the recorded accelerations beyond their difference from these, it could have explained.
 ///
 /// # Errors
 /// As [`simulate()`].
 pub fn simulate_with_explainable(simulation: &Simulation) -> Result<(DataSet, DataSet)> {
+    flown(simulation, true)
+}
+
+/// The flights, and their explainable parts if these are asked for; else the flights again.
+fn flown(simulation: &Simulation, with_explainable: bool) -> Result<(DataSet, DataSet)> {
     let plan: Vec<_> = simulation.plan()?.into_iter().enumerate().collect();
     let body = Body::new(&simulation.mechanisms);
-    let one = |&(number, (class, seconds)): &(usize, (&'static str, f64))| fly(simulation, &body, number, class, seconds);
+    let one = |&(number, (class, seconds)): &(usize, (&'static str, f64))| {
+        fly(simulation, &body, &Task { number, class, seconds, with_explainable })
+    };
     #[cfg(feature = "rayon")]
     let flights: Result<Vec<(Flight, Flight)>> = {
         use rayon::prelude::*;
@@ -250,8 +257,20 @@ pub fn simulate_with_explainable(simulation: &Simulation) -> Result<(DataSet, Da
     Ok((set(recorded, note.clone()), set(explainable, format!("{note}: explainable part"))))
 }
 
+/// Numbers of the state that say where the aircraft is and how it moves; the others are what rotor and servos remember.
+const RIGID: usize = 13;
+
+/// One flight to be flown.
+struct Task {
+    number: usize,
+    class: &'static str,
+    seconds: f64,
+    with_explainable: bool,
+}
+
 /// One flight from its first trim to its log, and the explainable part of that.
-fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds: f64) -> Result<(Flight, Flight)> {
+fn fly(simulation: &Simulation, body: &Body, task: &Task) -> Result<(Flight, Flight)> {
+    let Task { number, class, seconds, with_explainable } = *task;
     let random = |purpose| Random::new(simulation.seed, number as u64, purpose);
     let (level, mechanisms) = (&simulation.level, &simulation.mechanisms);
     let mut chance = random(0);
@@ -265,6 +284,8 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
     let mut pilot = Pilot::new(manoeuvres::start_height(class), segments, heading, trim, LOG_STEP_S, random(2));
     let mut actuators = Actuators::new(mechanisms, trim, LOG_STEP_S);
     let mut flat = state.flat();
+    // The same motion in calm air: what rotor and servos remember is then theirs, not that of the gusts before.
+    let mut calm_flat = flat;
     let mut motion = Vec::with_capacity(samples);
     let mut calm = Vec::with_capacity(samples);
     for sample in 0..settling + samples {
@@ -272,12 +293,14 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
         let disturbance = air.next();
         let state = State::from_flat(&flat);
         let mut controls = actuators.output();
-        let accelerations = |disturbance| {
-            let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(&flat, controls, disturbance, burnt);
+        let accelerations = |flat, disturbance| {
+            let [_, _, _, _, _, _, _, ax, ay, az, ap, aq, ar, ..] = body.derivative(flat, controls, disturbance, burnt);
             ([ax, ay, az], [ap, aq, ar])
         };
-        let (acceleration, angular) = accelerations(&disturbance);
-        let without = accelerations(&Disturbance::explainable(&air));
+        let (acceleration, angular) = accelerations(&flat, &disturbance);
+        calm_flat[..RIGID].copy_from_slice(&flat[..RIGID]);
+        let calm_air = Disturbance::explainable(&air);
+        let without = accelerations(&calm_flat, &calm_air);
         actuators.push(pilot.fly(&state, sample >= settling));
         if sample >= settling {
             let now = Instant {
@@ -297,10 +320,15 @@ fn fly(simulation: &Simulation, body: &Body, number: usize, class: &str, seconds
             let end = actuators.advance(substep as f64 * part, part);
             let middle = std::array::from_fn(|channel| 0.5 * (controls[channel] + end[channel]));
             body.step(&mut flat, [controls, middle, end], &disturbance, burnt, LOG_STEP_S * part);
+            if with_explainable {
+                body.step(&mut calm_flat, [controls, middle, end], &calm_air, burnt, LOG_STEP_S * part);
+            }
             controls = end;
         }
     }
     let name = format!("{class}_{number:04}");
     let record = |motion: &[Instant], level| sensors::record(&name, class, LOG_STEP_S, motion, level, mechanisms, random(3));
-    Ok((record(&motion, level)?, record(&calm, &Level { noise: 0.0, ..*level })?))
+    let recorded = record(&motion, level)?;
+    let explainable = if with_explainable { record(&calm, &Level { noise: 0.0, ..*level })? } else { recorded.clone() };
+    Ok((recorded, explainable))
 }

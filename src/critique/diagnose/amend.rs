@@ -47,6 +47,10 @@ pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
             (number.value, number.ci95) = (coefficient.value, coefficient.ci95.or(number.ci95));
             number.sign = doubt(effect, coefficient).map(|doubt| doubt.finding);
         }
+        for value in &mut step.parameters {
+            let known = effect.parameters.iter().find(|parameter| parameter.name == value.name);
+            value.value = known.map_or(value.value, |known| known.value);
+        }
         step.formula = effect.to_string();
     }
 }

@@ -17,6 +17,9 @@ pub(super) struct Design {
     known: HashMap<Node, usize>,
     /// For each channel the columns in it, in order of first use.
     pub channels: [Vec<usize>; 6],
+    /// For each of these the only model that has it, by the order in which models were added; `None` where several do, or the first.
+    pub owners: [Vec<Option<usize>>; 6],
+    models: usize,
 }
 
 /// A coefficient that a fit finds.
@@ -51,11 +54,26 @@ impl Design {
             self.labels.push(model.label(regressor));
             self.nodes.len() - 1
         });
-        let channel = &mut self.channels[regressor.channel];
-        channel.iter().position(|known| *known == column).unwrap_or_else(|| {
-            channel.push(column);
-            channel.len() - 1
-        })
+        let (channel, owners) = (&mut self.channels[regressor.channel], &mut self.owners[regressor.channel]);
+        match channel.iter().position(|known| *known == column) {
+            Some(place) => {
+                if owners[place] != Some(self.models) {
+                    owners[place] = None;
+                }
+                place
+            }
+            None => {
+                channel.push(column);
+                // The first model is what the others are held against: its columns meet all.
+                owners.push((self.models > 1).then_some(self.models));
+                channel.len() - 1
+            }
+        }
+    }
+
+    /// Lets every column meet every other, for whoever mixes those of several models.
+    pub fn mix(&mut self) {
+        self.owners.iter_mut().flatten().for_each(|owner| *owner = None);
     }
 
     /// Adds what a model needs at its present numbers and says how the model is made of it.
@@ -77,6 +95,7 @@ impl Design {
                 layout.free.push(free);
             }
         }
+        self.models += 1;
         // In the order of the model: those of an effect at its end come last.
         layout.free.sort_unstable();
         for regressor in regressors {

@@ -7,7 +7,6 @@
 use super::design::Layout;
 use super::gram::{Block, BlockGram};
 use nalgebra::{Cholesky, DMatrix, DVector};
-use ndarray::Array2;
 
 /// What is known about each coefficient of a layout.
 #[derive(Clone, Copy, Debug)]
@@ -36,8 +35,8 @@ impl Reduced {
         let blocks = grams
             .iter()
             .map(|gram| {
-                let gram: &Array2<f64> = &gram.channels[channel];
-                let target = gram.nrows() - 1;
+                let gram = &gram.channels[channel];
+                let target = gram.size() - 1;
                 // The last column: measured minus the fixed terms.
                 let mut parts: Vec<Vec<(usize, f64)>> = layout.free.iter().map(|(_, columns)| columns.clone()).collect();
                 parts.push(std::iter::once((target, 1.0)).chain(layout.fixed.iter().map(|&column| (column, -1.0))).collect());
@@ -45,7 +44,7 @@ impl Reduced {
                     let mut sum = 0.0;
                     for &(i, a) in &parts[row] {
                         for &(j, b) in &parts[column] {
-                            sum += a * b * gram[(i, j)];
+                            sum += a * b * gram.at(i, j);
                         }
                     }
                     sum

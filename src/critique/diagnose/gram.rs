@@ -4,8 +4,10 @@
 use super::design::Design;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Span};
-use ndarray::Array2;
 use ndarray::linalg::general_mat_mul;
+use ndarray::{Array2, ArrayView2, Axis, Slice};
+use std::ops::Range;
+use std::sync::Arc;
 
 /// A stretch of consecutive samples of one flight: the unit that is resampled, left out or flipped as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,12 +36,94 @@ pub(super) fn blocks(flights: &[Flight], spans: &[Span], block_s: f64) -> Vec<Bl
     blocks
 }
 
-/// Of one block: samples, and for each channel the symmetric matrix `[X | y]ᵀ [X | y]` with y the measured acceleration in the last
-/// row and column.
+/// Of one block: samples, and for each channel the products of `[X | y]` with itself, y being the measured acceleration in the last place.
 #[derive(Clone, Debug)]
 pub(super) struct BlockGram {
     pub rows: usize,
-    pub channels: [Array2<f64>; 6],
+    pub channels: [Square; 6],
+}
+
+/// `[X | y]ᵀ [X | y]` as far as any model needs it: a column that only one model has meets its own and those of several models, but not
+/// those that another model has for itself.
+#[derive(Clone, Debug)]
+pub(super) struct Square {
+    places: Arc<Places>,
+    /// Columns of several models and y, by all columns.
+    common: Array2<f64>,
+    /// Of each model that has columns of its own, these by themselves.
+    own: Vec<Array2<f64>>,
+}
+
+/// Where the columns of a channel lie: first those of several models, then y, then model after model.
+#[derive(Clone, Debug, Default)]
+struct Places {
+    /// For each column in the order of the design, y last: its row, and its group if one model alone has it.
+    of: Vec<(usize, Option<usize>)>,
+    /// Columns in the order of the rows; `None` is y.
+    order: Vec<Option<usize>>,
+    /// Rows of each group.
+    groups: Vec<Range<usize>>,
+}
+
+impl Places {
+    fn new(owners: &[Option<usize>]) -> Self {
+        let mut models: Vec<usize> = owners.iter().flatten().copied().collect();
+        models.sort_unstable();
+        models.dedup();
+        let mut places = Self { of: vec![(0, None); owners.len() + 1], ..Self::default() };
+        let of_owner = |owner: Option<usize>| (0..owners.len()).filter(move |&column| owners[column] == owner);
+        places.order.extend(of_owner(None).map(Some));
+        places.order.push(None);
+        for &model in &models {
+            let start = places.order.len();
+            places.order.extend(of_owner(Some(model)).map(Some));
+            places.groups.push(start..places.order.len());
+        }
+        for (row, column) in places.order.iter().enumerate() {
+            let group = places.groups.iter().position(|group| group.contains(&row));
+            places.of[column.unwrap_or(owners.len())] = (row, group);
+        }
+        places
+    }
+
+    fn common(&self) -> usize {
+        self.groups.first().map_or(self.order.len(), |group| group.start)
+    }
+}
+
+impl Square {
+    fn zeros(places: &Arc<Places>) -> Self {
+        let common = Array2::zeros((places.common(), places.order.len()));
+        let own = places.groups.iter().map(|group| Array2::zeros((group.len(), group.len()))).collect();
+        Self { places: Arc::clone(places), common, own }
+    }
+
+    /// Adds some samples; `rows` holds the columns in the order of [`Places::order`].
+    fn add(&mut self, rows: &ArrayView2<'_, f64>) {
+        let common = rows.slice_axis(Axis(0), Slice::from(..self.places.common()));
+        general_mat_mul(1.0, &common, &rows.t(), 1.0, &mut self.common);
+        for (group, own) in self.places.groups.iter().zip(&mut self.own) {
+            let part = rows.slice_axis(Axis(0), Slice::from(group.clone()));
+            general_mat_mul(1.0, &part, &part.t(), 1.0, own);
+        }
+    }
+
+    /// Columns, y included.
+    pub fn size(&self) -> usize {
+        self.places.of.len()
+    }
+
+    /// The product of two columns, by their places in the design; y is the last.
+    pub fn at(&self, row: usize, column: usize) -> f64 {
+        match (self.places.of[row], self.places.of[column]) {
+            ((row, None), (column, _)) | ((column, _), (row, None)) => self.common[(row, column)],
+            ((row, Some(left)), (column, Some(right))) => {
+                assert_eq!(left, right, "columns of two models meet in no fit");
+                let start = self.places.groups[left].start;
+                self.own[left][(row - start, column - start)]
+            }
+        }
+    }
 }
 
 /// The Gram matrices of all blocks, in their order.
@@ -66,8 +150,8 @@ pub(super) fn grams(flights: &[Flight], blocks: &[Block], design: &Design) -> Re
 }
 
 fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Vec<BlockGram>> {
-    let size = |channel: usize| design.channels[channel].len() + 1;
-    let empty = || BlockGram { rows: 0, channels: std::array::from_fn(|channel| Array2::zeros((size(channel), size(channel)))) };
+    let places: [Arc<Places>; 6] = std::array::from_fn(|channel| Arc::new(Places::new(&design.owners[channel])));
+    let empty = || BlockGram { rows: 0, channels: std::array::from_fn(|channel| Square::zeros(&places[channel])) };
     let mut found: Vec<BlockGram> = blocks.iter().map(|_| empty()).collect();
     let end = blocks.iter().map(|block| block.end).max().unwrap_or(0);
     let mut scratch = Vec::new();
@@ -81,20 +165,22 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
             let part = start - range.start..end - range.start;
             for ((columns, target), sum) in design.channels.iter().zip(Column::TARGETS).zip(&mut gram.channels) {
                 scratch.clear();
-                for &column in columns {
-                    scratch.extend_from_slice(&values.column(column)[part.clone()]);
+                for column in &sum.places.order {
+                    scratch.extend_from_slice(match column {
+                        Some(column) => &values.column(columns[*column])[part.clone()],
+                        None => &flight.column(target)[start..end],
+                    });
                 }
-                scratch.extend_from_slice(&flight.column(target)[start..end]);
                 let shape = (columns.len() + 1, part.len());
-                let Ok(matrix) = ndarray::ArrayView2::from_shape(shape, &scratch) else { continue };
-                general_mat_mul(1.0, &matrix, &matrix.t(), 1.0, sum);
+                let rows = ArrayView2::from_shape(shape, &scratch).expect("as many columns as rows of the square");
+                sum.add(&rows);
             }
         }
         Ok(())
     })?;
     for (block, gram) in blocks.iter().zip(&found) {
         for (columns, matrix) in design.channels.iter().zip(&gram.channels) {
-            if let Some(column) = matrix.diag().iter().position(|value| !value.is_finite()) {
+            if let Some(column) = (0..matrix.size()).find(|&column| !matrix.at(column, column).is_finite()) {
                 let label = columns.get(column).map(|&column| &design.labels[column]);
                 return Err(Error::Undetermined(format!(
                     "{} is not a finite number somewhere between t = {:.2} s and {:.2} s of flight `{}`; guard the formula, for example \
@@ -171,12 +257,43 @@ pub(super) mod tests {
             let parts = grams(&flights, &blocks(&flights, &whole(&flights), block_s), &design).map_err(failed)?;
             prop_assert_eq!(parts.iter().map(|part| part.rows).sum::<usize>(), one[0].rows);
             for channel in 0..6 {
-                let mut total = Array2::<f64>::zeros(one[0].channels[channel].dim());
-                parts.iter().for_each(|part| total += &part.channels[channel]);
-                let expected: Vec<f64> = one[0].channels[channel].iter().copied().collect();
+                let size = one[0].channels[channel].size();
+                let entries = |gram: &BlockGram| Array2::from_shape_fn((size, size), |(i, j)| gram.channels[channel].at(i, j));
+                let mut total = Array2::<f64>::zeros((size, size));
+                parts.iter().for_each(|part| total += &entries(part));
+                let expected: Vec<f64> = entries(&one[0]).iter().copied().collect();
                 prop_assert!(near(&total.iter().copied().collect::<Vec<_>>(), &expected));
             }
         }
+    }
+
+    #[test]
+    fn columns_of_each_model_meet_what_they_are_fitted_with() -> Result<()> {
+        let flights = noise(4, &[1500]);
+        let with = |formula: &str| -> Result<Model> {
+            let mut model = model();
+            model.effects.push(crate::physics::Effect::formula("more", 2, formula, 0.0)?);
+            Ok(model)
+        };
+        let models = [model(), with("vx * u4")?, with("wx * wz")?, with("lag(vy, 0.1)")?];
+        let (mut apart, mut mixed) = (Design::default(), Design::default());
+        let layouts: Vec<_> = models.iter().map(|model| apart.model(model)).collect::<Result<_>>()?;
+        models.iter().try_for_each(|model| mixed.model(model).map(drop))?;
+        mixed.mix();
+        let block = [Block { flight: 0, start: 0, end: 1500 }];
+        let (apart, mixed) = (grams(&flights, &block, &apart)?, grams(&flights, &block, &mixed)?);
+        let [left, right] = [&apart[0].channels[2], &mixed[0].channels[2]];
+        assert_eq!(left.own.iter().map(|own| own.dim()).collect::<Vec<_>>(), [(1, 1); 3]);
+        for layout in layouts {
+            let columns: Vec<usize> =
+                layout.channels[2].free.iter().flat_map(|entry| entry.1.iter().map(|column| column.0)).collect();
+            for &i in columns.iter().chain(&[left.size() - 1]) {
+                for &j in columns.iter().chain(&[left.size() - 1]) {
+                    assert!(near(&[left.at(i, j)], &[right.at(i, j)]));
+                }
+            }
+        }
+        Ok(())
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::engine::Trial;
 use super::score::{Scored, gains, paired};
 use super::search::Search;
 use crate::error::Result;
-use crate::physics::Model;
+use crate::physics::{Effect, Model};
 use std::collections::BTreeMap;
 
 impl Search<'_> {
@@ -42,7 +42,7 @@ impl Search<'_> {
                 let models: Vec<Model> = values
                     .iter()
                     .map(|&value| {
-                        let mut variant = effect.clone();
+                        let mut variant = switched_off(&effect);
                         if let Some(parameter) = variant.parameters.get_mut(index) {
                             parameter.value = value;
                         }
@@ -74,4 +74,15 @@ impl Search<'_> {
         }
         Ok((best, profiles))
     }
+}
+
+/// The effect with its coefficients at zero, where its columns stand beside those of the model as they are; one without coefficients
+/// changes them whatever it is.
+fn switched_off(effect: &Effect) -> Effect {
+    let mut effect = effect.clone();
+    for coefficient in &mut effect.coefficients {
+        coefficient.value = 0.0;
+        coefficient.by_flight = coefficient.by_flight.take().map(|_| BTreeMap::new());
+    }
+    effect
 }

@@ -52,6 +52,7 @@ pub fn textbook(flights: &[Flight], model: &Model, searched: &[Span], dynamic: b
             }
         }
     }
+    design.mix();
     let all = grams(flights, &engine.blocks, &design)?;
     let (mut stepped, mut sparse) = (Vec::new(), Vec::new());
     for (channel, library) in libraries.iter().enumerate() {
@@ -95,11 +96,11 @@ impl<'a> Problem<'a> {
         let count = order.len();
         order.extend(library.iter().map(|entry| entry.0));
         let sum = |wanted: &dyn Fn(usize) -> bool| {
-            let target = grams.first().map_or(0, |gram| gram.channels[channel].nrows() - 1);
+            let target = grams.first().map_or(0, |gram| gram.channels[channel].size() - 1);
             let mut total = Array2::<f64>::zeros((target + 1, target + 1));
             let mut rows = 0;
             for (gram, _) in grams.iter().zip(fold).filter(|(_, fold)| wanted(**fold)) {
-                total += &gram.channels[channel];
+                total.indexed_iter_mut().for_each(|((i, j), sum)| *sum += gram.channels[channel].at(i, j));
                 rows += gram.rows;
             }
             let parts = |index: usize| -> Vec<(usize, f64)> {

@@ -49,4 +49,4 @@ pub fn kinds() -> impl Iterator<Item = &'static str> {
 #[cfg(test)]
 mod derivations;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
