@@ -8,7 +8,7 @@ use super::catalogue;
 use super::columns::{Columns, Wanted};
 use super::compose::Free;
 use super::effect::Effect;
-use super::evaluate::standard_names;
+use super::evaluate::{composed_for, standard_names};
 use super::layout::Layout;
 use super::least_squares::{Cluster, Failure, Hold, residual, solve, step};
 use super::model::Model;
@@ -163,6 +163,7 @@ pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(M
         return Err(Error::Config { place: "calibrate".into(), field: "span.flight".into(), found, expected });
     }
     let rows = Rows::of(flights, spans)?;
+    rows.jobs.iter().try_for_each(|&(flight, _)| composed_for(model, &flights[flight]).map(drop))?;
     let mut current = started(model, &rows)?;
     let mut pass = Pass::at(&current, &rows)?;
     if pass.is_linear {

@@ -188,13 +188,22 @@ pub(super) fn not_finite(model: &Model, flight: &Flight, (effect, channel): (usi
     ))
 }
 
-/// Predicted accelerations of a whole flight.
-pub(super) fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
+/// A model put together for a flight, which carries all that it reads.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub(super) fn composed_for(model: &Model, flight: &Flight) -> Result<(Composer, Composed)> {
     model.check()?;
     let mut composer = Composer::new();
     let extra: Vec<&str> = flight.extra.keys().map(String::as_str).collect();
     let composed = composer.add(model, Some(&extra), false)?;
     check_flight(model, &composer, &composed, flight)?;
+    Ok((composer, composed))
+}
+
+/// Predicted accelerations of a whole flight.
+pub(super) fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
+    let (composer, composed) = composed_for(model, flight)?;
     let nodes: Vec<Node> = composed.channels.iter().copied().chain(composed.summands.iter().map(|summand| summand.node)).collect();
     let mut predicted: Accelerations = std::array::from_fn(|_| vec![0.0; flight.len()]);
     Bound::new(&composer, &nodes, flight.step_s, Some(flight))?.run(flight, flight.len(), &mut |range, block| {
