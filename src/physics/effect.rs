@@ -1,4 +1,5 @@
-//! An effect: one named piece of physics, as terms in the formula grammar. Data only; evaluation is in `evaluate`.
+//! An effect: one named piece of physics, as terms and changes of signals in the formula grammar. Data only; how effects are put together is
+//! in `compose`.
 
 use super::compose::check_changeable;
 use super::evaluate::standard_names;
@@ -112,9 +113,9 @@ pub struct Effect {
     pub terms: Vec<Term>,
     /// Numbers that calibration finds.
     pub coefficients: Vec<Coefficient>,
-    /// Numbers that it leaves alone.
+    /// Numbers inside the formulas: geometry, which is known, and shapes and times, which calibration finds.
     pub parameters: Vec<Parameter>,
-    /// Changes to the signals of other effects.
+    /// Changes to the signals that other effects read.
     pub swaps: Vec<Swap>,
     /// Whether it takes part.
     pub enabled: bool,

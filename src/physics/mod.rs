@@ -1,7 +1,8 @@
 //! What we claim to know: effects, models, calibration. Nothing here knows of windows, networks or critique.
 //!
-//! A [`Model`] is a list of [`Effect`]s; an effect is a list of [`Term`]s `coefficient * formula`. Baseline, later additions and
-//! a user's own formulas are therefore one type: they evaluate on whole flights or one sample at a time, and print as formulas.
+//! A [`Model`] is a list of [`Effect`]s; an effect adds [`Term`]s `coefficient * formula` to accelerations and changes [signals](SIGNALS) that others
+//! read. Baseline, later additions and a user's own formulas are therefore one type: they evaluate on whole flights or one sample at a time,
+//! and print as formulas.
 
 mod baseline;
 mod by_flight;
