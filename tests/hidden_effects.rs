@@ -59,6 +59,24 @@ fn level(seed: u64) -> Level {
     if seed.is_multiple_of(2) { Level::ONE } else { Level::TWO }
 }
 
+/// Effects worth a fiftieth of the floor of some channel are asked for, 85 % of them, and no more than one name in twenty that is not
+/// in the truth. Of six that are hidden large, wind beside them, five names at least, and at most one more.
+#[test]
+fn many_effects_hidden_at_once_are_named_from_both_ends() -> Result<()> {
+    let hidden = ["ctrl_cross", "cyclic_lag", "collective_torque", "dihedral_speedstab", "weathercock", "transl_lift"];
+    let diagnosis = search(&session(15.0, &hidden, Level::TWO, 1190)?, 1190)?;
+    let named = named(&diagnosis, Level::TWO);
+    assert!(diagnosis.both_roads && diagnosis.accepted.iter().any(|name| name == "wind"), "{diagnosis}");
+    let right = named.iter().filter(|name| hidden.contains(name)).count();
+    assert!(right >= 5 && named.len() - right <= 1, "{diagnosis}");
+    let locked = diagnosis.locked.expect("a part is kept");
+    assert!(locked.own_from_first_half, "the wind of a flight that was kept is found from its first half");
+    for channel in ["wx_dot", "wy_dot", "wz_dot"] {
+        assert!(locked.mse_fall.get(channel).is_some_and(|fall| fall[1] > 0.5), "{channel}: {:?}", locked.mse_fall);
+    }
+    Ok(())
+}
+
 /// Of the twelve the search is to name 97 % first: eleven or more then with a probability of 95 %, ten or more with 99.5 %. Ten are
 /// asked. A name drawn from the catalogue would be right once in thirty.
 #[test]

@@ -109,6 +109,41 @@ impl Columns {
         Ok(found)
     }
 
+    /// What a model predicts, by acceleration.
+    ///
+    /// # Errors
+    /// As [`Columns::regressors`].
+    pub fn predictions(&mut self, model: &Model) -> Result<[Node; 6]> {
+        model.check()?;
+        Ok(self.composer.add(model, None, false)?.channels)
+    }
+
+    /// What an effect's absence changes, as the model near its present numbers has it: by acceleration, `a(θ₀ without it) - a(θ₀)` and its own
+    /// part `Σ θ₀ ∂a/∂θ`, which is in `regressors`. With this added and its numbers left out, the sum is the model without the effect, the
+    /// others' columns being what they were beside it.
+    ///
+    /// # Errors
+    /// As [`Columns::regressors`].
+    pub fn absence(&mut self, model: &Model, regressors: &[Regressor], effect: usize) -> Result<Vec<Regressor>> {
+        let whole = self.composer.add(model, None, true)?;
+        let mut without = model.clone();
+        without.effects[effect].enabled = false;
+        let without = self.composer.add(&without, None, true)?;
+        let mut found = Vec::new();
+        for channel in (0..whole.channels.len()).filter(|&channel| whole.channels[channel] != without.channels[channel]) {
+            let mut node = self.composer.graph.difference(without.channels[channel], whole.channels[channel]);
+            for own in regressors.iter().filter(|own| own.effect == effect && own.channel == channel) {
+                let symbol = own.number.and_then(|number| whole.numbers.iter().find(|known| known.0 == (effect, number)));
+                if let Some(&(_, symbol)) = symbol {
+                    let part = self.composer.graph.product(symbol, own.node);
+                    node = self.composer.graph.sum(node, part);
+                }
+            }
+            found.push(Regressor { channel, effect, number: None, node: self.composer.graph.settled(&[node])[0] });
+        }
+        Ok(found)
+    }
+
     fn add_up(&mut self, found: &mut Vec<Regressor>, part: Regressor) {
         let same = |known: &&mut Regressor| {
             known.channel == part.channel && known.number == part.number && (part.number.is_none() || known.effect == part.effect)

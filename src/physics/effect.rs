@@ -197,13 +197,13 @@ impl Effect {
     }
 
     /// A number by index, as a coefficient.
-    pub(super) fn number(&self, index: usize) -> Option<Coefficient> {
+    pub(crate) fn number(&self, index: usize) -> Option<Coefficient> {
         let parameter = || self.parameters.get(index - self.coefficients.len()).map(Parameter::as_coefficient);
         self.coefficients.get(index).cloned().or_else(parameter)
     }
 
     /// Value and interval of a number by index, to change them.
-    pub(super) fn number_mut(&mut self, index: usize) -> Option<(&mut f64, &mut Option<[f64; 2]>)> {
+    pub(crate) fn number_mut(&mut self, index: usize) -> Option<(&mut f64, &mut Option<[f64; 2]>)> {
         let coefficients = self.coefficients.len();
         if let Some(coefficient) = self.coefficients.get_mut(index) {
             return Some((&mut coefficient.value, &mut coefficient.ci95));

@@ -240,9 +240,10 @@ pub enum Command {
         /// Folder for the page diagnosis.html
         #[arg(long, value_name = "DIR")]
         report: Option<PathBuf>,
-        /// Most effects to name
-        #[arg(long, default_value_t = 6, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
-        max_effects: usize,
+        /// Stop after so many effects, one found after the other; without it, where much is missing, all effects that apply are fitted at once
+        /// and the needless left out
+        #[arg(long, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
+        max_effects: Option<usize>,
         /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
         /// has seen, and how much of what lies above it the effects remove
         #[arg(long, value_name = "DIR", conflicts_with = "of_network")]

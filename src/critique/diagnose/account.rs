@@ -2,11 +2,13 @@
 //! loop as one. Nothing is searched or decided here; errors are measured as in `confirm`, and models fitted as in the search.
 
 use super::amend::{Amended, as_in_the_model, searched};
-use super::confirm::{BlockErrors, confirm, errors_on};
+use super::confirm::confirm;
 use super::describe::{accepted, summary};
 use super::engine::{Engine, FOLDS};
 use super::gates::{BLOCK_S, CORRELATION_S};
 use super::gram::blocks;
+use super::joint::{Errors, Point, undetermined};
+use super::own::Halves;
 use super::report::{Diagnosis, Locked, Status, Step, Verdict, Worth};
 use super::sentences;
 use crate::blocks::{BlockMean, BlockSum};
@@ -18,18 +20,15 @@ use crate::flight::{Column, Flight, Span};
 use crate::physics::Model;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Time of flight that a model without one of its effects is fitted to, s, where more was searched: a fit for each effect would take as
-/// long as the search, and half an hour settles the others' numbers well enough to tell what comes back.
-const REFIT_S: f64 = 1800.0;
-
-/// Flights that are kept for it at least, where there are as many.
-const REFIT_FLIGHTS: usize = 20;
+/// Time of flight that a model without one of its effects is fitted to, s, where more was searched, and flights at least: half an hour settles the
+/// others' numbers well enough to tell what comes back.
+const REFIT: (f64, usize) = (1800.0, 20);
 
 /// Measures what each accepted effect is worth on the part that no search has seen, and notes it in the diagnosis. `after` is the model
 /// with all of them. Nothing is noted where nothing was accepted or nothing kept.
 ///
-/// For each effect the others are fitted again without it, on what was searched or on an even selection of at least 1800 s of its flights;
-/// the model that it is compared with is fitted to the same.
+/// For each effect the others are fitted again without it, on what was searched or on an even selection of at least 1800 s of its flights; the
+/// model that it is compared with is fitted to the same. What the effect itself changes is exact, the others move along their derivatives.
 ///
 /// # Errors
 /// As [`Model::predict`]; where the flights do not determine the others without an effect, they stay as they are.
@@ -46,55 +45,71 @@ pub fn weigh(diagnosis: &mut Diagnosis, flights: &[Flight], after: &Model, split
 fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, before: &PerChannel) -> Result<Vec<Worth>> {
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
     let correlation = 2.0 * CORRELATION_S / step_s;
-    let cut = blocks(flights, &selection(flights, &searched(split)), BLOCK_S);
-    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
-    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
-    let again = |model: Model| match engine.pass(&model, &[]) {
-        Ok(pass) => Ok((pass.base.model, true)),
-        Err(Error::Undetermined(_)) => Ok((model, false)),
-        Err(error) => Err(error),
-    };
-    let named: Vec<&str> = effects.iter().copied().filter(|effect| after.effect(effect).is_some()).collect();
     let all = Model { effects: after.effects.iter().filter(|effect| effect.enabled).cloned().collect(), ..after.clone() };
-    let without = |effect: &&str| {
-        let mut model = all.clone();
-        model.effects.retain(|other| other.name != **effect);
-        again(model)
+    let cut = blocks(flights, &selection(flights, &searched(split), REFIT), BLOCK_S);
+    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
+    let searched = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
+    let halves = Halves::of(flights, std::slice::from_ref(&all), &split.test);
+    let kept = halves.engine(flights, BLOCK_S, correlation);
+    if effects.is_empty() || kept.blocks.is_empty() {
+        return Ok(Vec::new());
+    }
+    let named: Vec<&str> = effects.iter().copied().filter(|effect| all.effect(effect).is_some()).collect();
+    let place = |name: &&str| all.effects.iter().position(|effect| effect.name == **name);
+    let optional: Vec<usize> = named.iter().filter_map(place).collect();
+    let near = Point::at(&searched, all.clone(), optional.clone())?;
+    let there = Point::at(&kept, halves.met(flights, &all, correlation)?, optional)?;
+    let judged: Vec<usize> = (0..kept.blocks.len()).filter(|&block| kept.fold[block] == 0).collect();
+    let rows = judged.iter().map(|&block| kept.blocks[block].end - kept.blocks[block].start).sum::<usize>() as f64;
+    // Errors there under the others' numbers without some effects, found here; as they are where the flights do not determine them.
+    let errors = |absent: &[usize]| {
+        let refitted = near.refitted(&searched, absent);
+        let numbers = refitted.clone().unwrap_or_else(|| there.unchanged(absent));
+        let halves = there.first_halves(&kept, absent).ok_or_else(undetermined)?;
+        let errors = there.errors_under(&kept, &halves, &numbers);
+        let errors: Errors = std::array::from_fn(|channel| judged.iter().map(|&block| errors[channel][block]).collect());
+        Ok::<_, Error>((errors, refitted.is_some()))
     };
-    let (whole, whole_refitted) = again(all.clone())?;
-    let parts: Vec<(Model, bool)> = named.iter().map(without).collect::<Result<_>>()?;
-    let mut bare = all.clone();
-    bare.effects.retain(|effect| !named.contains(&effect.name.as_str()));
-    let (bare, _) = again(bare)?;
-    // Where the others could not be fitted again, neither may be what the effect is held against.
-    let models: Vec<Model> = [bare, whole, all].into_iter().chain(parts.iter().map(|part| part.0.clone())).collect();
-    let found = errors_on(flights, &models, &split.test, BLOCK_S, correlation)?;
-    let Some((counts, errors)) = found else { return Ok(Vec::new()) };
-    let [bare, fitted, as_it_was, errors @ ..] = errors.as_slice() else { return Ok(Vec::new()) };
-    let rows = counts.iter().sum::<usize>() as f64;
-    let of = |((effect, part), errors): ((&&str, &(Model, bool)), &BlockErrors)| {
-        let refitted = part.1 && whole_refitted;
-        let with = if refitted { fitted } else { as_it_was };
-        let (share, rise) = held_against(with, errors, &whole_error(bare, before, rows));
-        Worth { effect: (*effect).to_owned(), share, rise, refitted }
+    let (with, with_refitted) = errors(&[])?;
+    let (bare, _) = errors(&(0..named.len()).collect::<Vec<_>>())?;
+    let whole = whole_error(&bare, before, rows);
+    let of = |(place, effect): (usize, &&str)| {
+        let (without, refitted) = errors(&[place])?;
+        let (share, rise) = held_against(&with, &without, &whole);
+        Ok(Worth { effect: (*effect).to_owned(), share, rise, refitted: refitted && with_refitted })
     };
-    let mut worth: Vec<Worth> = named.iter().zip(&parts).zip(errors).map(of).collect();
+    let mut worth: Vec<Worth> = named.iter().enumerate().map(of).collect::<Result<_>>()?;
     worth.sort_by(|left, right| right.largest().total_cmp(&left.largest()));
     Ok(worth)
 }
 
-/// Flights to fit to: all of them, or every second, third … of the flights where they are longer than [`REFIT_S`].
-fn selection(flights: &[Flight], spans: &[Span]) -> Vec<Span> {
+/// Some seconds of flight out of the spans: every second, third … flight as long as some flights are left, and the first part of each. What
+/// remembers runs from the start of a flight, so a part from its middle would take as long.
+pub(super) fn selection(flights: &[Flight], spans: &[Span], (seconds, fewest): (f64, usize)) -> Vec<Span> {
     let length = |span: &Span| flights.get(span.flight).map_or(0.0, |flight| (span.end - span.start) as f64 * flight.step_s);
     let total: f64 = spans.iter().map(length).sum();
     let used: Vec<usize> = spans.iter().map(|span| span.flight).collect::<BTreeSet<_>>().into_iter().collect();
-    let every = ((total / REFIT_S) as usize).min(used.len() / REFIT_FLIGHTS).max(1);
-    let kept = |span: &&Span| used.binary_search(&span.flight).is_ok_and(|place| place % every == 0);
-    spans.iter().filter(kept).copied().collect()
+    let every = ((total / seconds) as usize).min(used.len() / fewest).max(1);
+    let chosen: Vec<usize> = used.into_iter().step_by(every).collect();
+    let whole: f64 = spans.iter().filter(|span| chosen.contains(&span.flight)).map(length).sum();
+    let share = (seconds / whole).min(1.0);
+    let mut kept = Vec::new();
+    for flight in chosen {
+        let mut own: Vec<Span> = spans.iter().filter(|span| span.flight == flight).copied().collect();
+        own.sort_unstable_by_key(|span| span.start);
+        let samples: usize = own.iter().map(|span| span.end - span.start).sum();
+        let mut left = (share * samples as f64).ceil() as usize;
+        for span in own {
+            let end = span.start + left.min(span.end - span.start);
+            left -= end - span.start;
+            kept.extend((span.start < end).then_some(Span { end, ..span }));
+        }
+    }
+    kept
 }
 
 /// Squared error of each block before anything was added: of the model without all that was found, brought to the sum that was measured.
-fn whole_error(bare: &BlockErrors, before: &PerChannel, rows: f64) -> BlockErrors {
+fn whole_error(bare: &Errors, before: &PerChannel, rows: f64) -> Errors {
     std::array::from_fn(|channel| {
         let measured = before.channels()[channel].map_or(0.0, |rmse| rmse * rmse * rows);
         let sum: f64 = bare[channel].iter().sum();
@@ -105,11 +120,7 @@ fn whole_error(bare: &BlockErrors, before: &PerChannel, rows: f64) -> BlockError
 
 /// By channel that differs, the share of the error `before` that comes back without an effect, and the rise. The interval of a share pairs
 /// both block by block, so that a hard block does not count as scatter twice.
-fn held_against(
-    with: &BlockErrors,
-    without: &BlockErrors,
-    before: &BlockErrors,
-) -> (BTreeMap<String, Share>, BTreeMap<String, f64>) {
+fn held_against(with: &Errors, without: &Errors, before: &Errors) -> (BTreeMap<String, Share>, BTreeMap<String, f64>) {
     let (mut shares, mut rises) = (BTreeMap::new(), BTreeMap::new());
     for (channel, column) in Column::TARGETS.into_iter().enumerate() {
         let (with, without) = (&with[channel], &without[channel]);
@@ -271,7 +282,7 @@ mod tests {
             model.effects.push(Effect { enabled: false, ..formula(name, text)? });
         }
         let without = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
-        let options = Options { without, max_effects: 1, ..Options::default() };
+        let options = Options { without, max_effects: Some(1), ..Options::default() };
         let before = calibrated(&model, &flights, &split)?;
         let amended = amend(&flights, &model, &split, &options, &mut |_, _| Ok(()))?;
         assert!(amended.rounds.len() == 3, "an effect a round, and one that finds nothing");
@@ -293,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn a_selection_keeps_twenty_flights_and_all_where_there_are_few() -> Result<()> {
+    fn a_selection_keeps_twenty_flights_or_all_and_the_first_part_of_each() -> Result<()> {
         let flight = |name: usize, samples: usize| {
             let columns = std::array::from_fn(|_| vec![0.0; samples]);
             Flight::new(name.to_string(), "rest", 0.0, 1.0, columns, crate::flight::Targets::Recorded)
@@ -301,7 +312,13 @@ mod tests {
         for (count, samples, kept) in [(19, 1000, 19), (100, 10, 100), (100, 100, 20), (60, 50, 60), (60, 60, 30), (45, 1000, 23)] {
             let flights: Vec<Flight> = (0..count).map(|name| flight(name, samples)).collect::<Result<_>>()?;
             let spans: Vec<Span> = (0..count).map(|flight| Span { flight, start: 0, end: samples }).collect();
-            assert_eq!(selection(&flights, &spans).len(), kept, "{count} of {samples} s");
+            let selected = selection(&flights, &spans, REFIT);
+            assert_eq!(selected.len(), kept, "{count} of {samples} s");
+            // No more than was asked for, but for the rounding of each; and from the start of each flight.
+            let total: usize = selected.iter().map(|span| span.end).sum();
+            let asked = (count * samples).min(REFIT.0 as usize);
+            assert!((asked..=asked.max(1800) + kept).contains(&total), "{total} s of {count} of {samples} s");
+            assert!(selected.iter().all(|span| span.start == 0));
         }
         Ok(())
     }

@@ -50,6 +50,7 @@ pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
         for value in &mut step.parameters {
             let known = effect.parameters.iter().find(|parameter| parameter.name == value.name);
             value.value = known.map_or(value.value, |known| known.value);
+            value.profile = known.and_then(|known| known.ci95).or(value.profile);
         }
         step.formula = effect.to_string();
     }
@@ -77,13 +78,16 @@ pub fn amend(
         if confirmed {
             let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
             let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
-            model = calibrated(&outcome.model, flights, split)?;
+            // Where everything was fitted at once, it is calibrated, with what is known of the numbers beforehand.
+            model = if outcome.diagnosis.both_roads { outcome.model } else { calibrated(&outcome.model, flights, split)? };
             as_in_the_model(&mut outcome.diagnosis, &model);
             model.effects.extend(off);
         }
         told(round, &mut outcome.diagnosis)?;
+        // Everything that applies has then been judged beside everything else.
+        let is_last = !confirmed || outcome.diagnosis.both_roads;
         rounds.push(outcome.diagnosis);
-        if !confirmed {
+        if is_last {
             break;
         }
     }

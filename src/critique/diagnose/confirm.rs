@@ -1,9 +1,6 @@
 //! The confirmation: errors on flights that no search has seen, with none, one, two … of the accepted effects.
 
-use super::design::Design;
-use super::engine::{Engine, FOLDS, priors};
-use super::fit::{Reduced, Solution, components};
-use super::gram::{blocks, grams};
+use super::own::{Halves, Judgement, judged_errors};
 use super::report::{Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
 use crate::critique::compare::PerChannel;
@@ -20,7 +17,9 @@ pub(super) fn confirm(
     block_s: f64,
     correlation: f64,
 ) -> Result<Option<Locked>> {
-    let Some((counts, errors)) = errors_on(flights, models, locked, block_s, correlation)? else { return Ok(None) };
+    let halves = Halves::of(flights, models, locked);
+    let judged = judged_errors(flights, models, &halves, block_s, correlation)?;
+    let Some(Judgement { counts, errors }) = judged else { return Ok(None) };
     let rows = counts.iter().sum::<usize>() as f64;
     let rmse = |errors: &[Vec<f64>; 6]| {
         PerChannel::new(std::array::from_fn(|channel| Some((errors[channel].iter().sum::<f64>() / rows).sqrt())))
@@ -46,6 +45,8 @@ pub(super) fn confirm(
     Ok(Some(Locked {
         part: part.into(),
         kept: kept(flights, locked),
+        own_from_first_half: !halves.first.is_empty(),
+        spans: halves.judged(),
         duration_s: rows * step_s,
         rmse_before: rmse(first),
         rmse_after: rmse(last),
@@ -54,28 +55,6 @@ pub(super) fn confirm(
         floor: None,
         removable_removed: None,
     }))
-}
-
-/// Squared errors of one model: for each channel one number a block.
-pub(super) type BlockErrors = [Vec<f64>; 6];
-
-/// The blocks that spans are cut into, as their numbers of samples, and on them the squared errors of each model under its own numbers.
-/// `None` without a sample.
-pub(super) fn errors_on(
-    flights: &[Flight],
-    models: &[Model],
-    spans: &[Span],
-    block_s: f64,
-    correlation: f64,
-) -> Result<Option<(Vec<usize>, Vec<BlockErrors>)>> {
-    let cut = blocks(flights, spans, block_s);
-    if cut.is_empty() {
-        return Ok(None);
-    }
-    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
-    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
-    let errors = models.iter().map(|model| errors_under(&engine, model)).collect::<Result<_>>()?;
-    Ok(Some((engine.blocks.iter().map(|block| block.end - block.start).collect(), errors)))
 }
 
 /// What spans are made of: whole flights, the last part of each, or pieces from anywhere.
@@ -88,41 +67,6 @@ fn kept(flights: &[Flight], locked: &[Span]) -> Kept {
         () if locked.iter().all(to_end) => Kept::Ends,
         () => Kept::Segments,
     }
-}
-
-/// Squared error of each block of each channel under a model's own numbers; properties of a flight are found from its other blocks.
-pub(super) fn errors_under(engine: &Engine<'_>, model: &Model) -> Result<BlockErrors> {
-    let mut design = Design::default();
-    let layout = design.model(model)?;
-    let grams = grams(engine.flights, &engine.blocks, &design)?;
-    let priors = priors(model, &layout, &engine.held);
-    let mut errors: [Vec<f64>; 6] = std::array::from_fn(|_| Vec::new());
-    for (channels, members) in components(&layout) {
-        let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &grams)).collect();
-        let value = |free: usize| {
-            let free = layout.free[free];
-            let effect = model.effects.get(free.effect);
-            effect.and_then(|effect| effect.coefficients.get(free.coefficient)).map_or(0.0, |coefficient| coefficient.value)
-        };
-        // Weights of channels that share a property of a flight: their inverse error without it.
-        let weights: [f64; 6] = std::array::from_fn(|channel| {
-            let position = channels.iter().position(|&other| other == channel);
-            let global = |free: usize| if priors[free].by_flight.is_some() { 0.0 } else { value(free) };
-            let error =
-                position.map(|position| (0..engine.blocks.len()).map(|block| reduced[position].error(block, &global)).sum::<f64>());
-            error.map_or(1.0, |error| engine.rows() as f64 / error.max(f64::MIN_POSITIVE))
-        });
-        let component = engine.component(&channels, &members, &reduced, &weights, &priors);
-        let solution = Solution {
-            values: members.iter().map(|&member| if priors[member].by_flight.is_some() { 0.0 } else { value(member) }).collect(),
-            bound: vec![false; members.len()],
-            by_flight: Vec::new(),
-        };
-        for (channel, found) in component.errors_under(&solution, FOLDS, &|block| engine.fold[block]) {
-            errors[channel] = found;
-        }
-    }
-    Ok(errors)
 }
 
 #[cfg(test)]

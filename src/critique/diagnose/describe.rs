@@ -1,80 +1,88 @@
 //! From what a search found to what is said of it. No measuring here.
 
+use super::backward::Judged;
 use super::candidate::Candidate;
-use super::engine::Trial;
+use super::engine::{Engine, Trial};
 use super::gates::SMALLEST_FALL;
 use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
-use super::score::Scored;
+use super::resample::{RESAMPLES, draw};
+use super::score::{Scored, by_flight_of};
 use super::search::{Found, Search};
 use super::sentences;
 use crate::flight::Column;
-use crate::physics::{Coefficient, Parameter};
+use crate::physics::{Coefficient, Definition, Effect, Model, Parameter, catalogue};
 use std::collections::BTreeMap;
 
 impl Search<'_> {
     pub(super) fn step(&self, chosen: &Scored<'_>, refined: &Trial, indistinguishable: Vec<String>) -> Step {
-        let definition = chosen.candidate.definition;
-        let empty = Vec::new();
-        let effect = refined.model.effects.last();
-        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
-        let worthy = chosen.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
-        let number = |coefficient: &Coefficient| {
-            let known = definition.and_then(|definition| definition.coefficient(&coefficient.name));
-            let rms = coefficient
-                .by_flight
-                .as_ref()
-                .map(|values| (values.values().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt());
-            Number {
-                name: coefficient.name.clone(),
-                value: coefficient.value,
-                ci95: None,
-                unit: coefficient.unit.clone(),
-                // Usual values are those of one size of vehicle.
-                expected: known.and_then(|known| known.expected).filter(|_| refined.model.is_usual()),
-                sign: None,
-                held: false,
-                rms_over_flights: rms,
-            }
-        };
+        let effect = refined.model.effects.last().unwrap_or(&chosen.candidate.effect);
+        let told = told_of(effect, chosen.candidate.definition, refined.model.is_usual(), &chosen.falls);
         Step {
             effect: chosen.candidate.id.clone(),
-            meaning: chosen.candidate.effect.meaning.clone(),
-            channels: worthy.map(|(&channel, _)| name(channel)).collect(),
-            held_out_mse_fall: chosen.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
             p_value: chosen.p_value,
-            selection_frequency: 0.0,
-            stability: String::new(),
             indistinguishable,
-            coefficients: effect.map_or(&empty, |effect| &effect.coefficients).iter().map(number).collect(),
-            parameters: effect.map_or_else(Vec::new, |effect| {
-                let value = |parameter: &Parameter| ParameterValue {
-                    name: parameter.name.clone(),
-                    value: parameter.value,
-                    fixed: parameter.fixed,
-                    unit: parameter.unit.clone(),
-                    profile: None,
-                };
-                effect.parameters.iter().map(value).collect()
-            }),
-            would_tell_apart: definition
-                .and_then(|definition| definition.notes)
-                .map_or_else(String::new, |notes| notes.would_tell_apart.into()),
-            formula: effect.map_or_else(String::new, ToString::to_string),
-            rests_on_flight: self.decisive_flight(&chosen.gains),
+            rests_on_flight: decisive_flight(&self.engine, &chosen.gains),
+            ..told
         }
     }
 
-    /// A flight without which the gain would be gone.
-    pub(super) fn decisive_flight(&self, gains: &[f64]) -> Option<String> {
-        let total: f64 = gains.iter().sum();
-        let mut flights: Vec<usize> = self.engine.blocks.iter().map(|block| block.flight).collect();
-        flights.dedup();
-        let flight = flights.iter().zip(self.by_flight(gains)).find(|(_, gain)| total - gain <= 0.0)?.0;
-        self.engine.flights.get(*flight).map(|flight| flight.name.clone()).filter(|_| flights.len() > 1)
+    /// An effect that the backward road keeps, in the model with all that it keeps.
+    pub(super) fn needed(&self, judged: &Judged, model: &Model) -> Option<Found> {
+        let effect = model.effect(&judged.effect)?;
+        let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
+        let selection_frequency = self.frequency(&judged.gains);
+        let step = Step {
+            p_value: judged.p_value,
+            selection_frequency,
+            stability: stability(selection_frequency).into(),
+            rests_on_flight: judged.rests_on.clone(),
+            ..told_of(effect, definition, model.is_usual(), &judged.falls)
+        };
+        Some(Found {
+            step,
+            gain: judged.gain(),
+            model: model.clone(),
+            channels: judged.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).map(|(&channel, _)| channel).collect(),
+            confusable: definition.and_then(|definition| definition.notes).map_or(&[][..], |notes| notes.confusable_with),
+            mse_before: [0.0; 6],
+            removed: [0.0; 6],
+        })
+    }
+
+    /// Share of resampled block sets in which the model with an effect is better than that without.
+    fn frequency(&self, gains: &[f64]) -> f64 {
+        let better =
+            |world: &usize| draw(gains.len(), self.options.seed, *world).iter().map(|&block| gains[block]).sum::<f64>() > 0.0;
+        (0..RESAMPLES).filter(better).count() as f64 / RESAMPLES as f64
+    }
+
+    /// What is said of an effect that the backward road leaves out.
+    pub(super) fn needless(&self, judged: &Judged) -> CandidateReport {
+        let status = match () {
+            () if !judged.is_excited() => Status::NotExcited,
+            () if judged.largest_fall() < SMALLEST_FALL => Status::Negligible,
+            () => Status::NotSignificant,
+        };
+        let best = judged.falls.iter().max_by(|left, right| left.1.total_cmp(right.1));
+        let too_little = || best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(channel_name(channel), fall));
+        let notes = catalogue::definition(&judged.effect).and_then(|definition| definition.notes);
+        CandidateReport {
+            effect: judged.effect.clone(),
+            status,
+            held_out_mse_fall: judged.falls.iter().map(|(&channel, &fall)| (channel_name(channel).to_owned(), fall)).collect(),
+            p_value: Some(judged.p_value),
+            detection_limit_mse_fall: None,
+            reason: match status {
+                Status::NotExcited => sentences::loose(judged.looseness),
+                Status::Negligible => too_little(),
+                _ => sentences::could_be_chance(judged.p_value, self.largest_p),
+            },
+            note: notes.filter(|_| status == Status::NotExcited).map(|notes| format!("wanted: {}", notes.excitation)),
+        }
     }
 
     pub(super) fn reports(&self, open: &[&Candidate], scored: &[Scored<'_>]) -> Vec<CandidateReport> {
-        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
+        let name = |channel: usize| channel_name(channel).to_owned();
         let mut reports: Vec<CandidateReport> = open
             .iter()
             .map(|candidate| match scored.iter().find(|scored| scored.candidate.id == candidate.id) {
@@ -108,6 +116,62 @@ impl Search<'_> {
         let largest = |report: &CandidateReport| report.held_out_mse_fall.values().copied().fold(f64::NEG_INFINITY, f64::max);
         reports.sort_by(|left, right| largest(right).total_cmp(&largest(left)));
         reports
+    }
+}
+
+/// A flight without which the gain would be gone.
+pub(super) fn decisive_flight(engine: &Engine<'_>, gains: &[f64]) -> Option<String> {
+    let total: f64 = gains.iter().sum();
+    let mut flights: Vec<usize> = engine.blocks.iter().map(|block| block.flight).collect();
+    flights.dedup();
+    let flight = flights.iter().zip(by_flight_of(engine, gains)).find(|(_, gain)| total - gain <= 0.0)?.0;
+    engine.flights.get(*flight).map(|flight| flight.name.clone()).filter(|_| flights.len() > 1)
+}
+
+fn channel_name(channel: usize) -> &'static str {
+    Column::TARGETS.get(channel).map_or("?", |column| column.name())
+}
+
+/// What there is to tell of an accepted effect as it stands in a model.
+fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, falls: &BTreeMap<usize, f64>) -> Step {
+    let number = |coefficient: &Coefficient| {
+        let known = definition.and_then(|definition| definition.coefficient(&coefficient.name));
+        let rms = coefficient
+            .by_flight
+            .as_ref()
+            .map(|values| (values.values().map(|value| value * value).sum::<f64>() / values.len().max(1) as f64).sqrt());
+        Number {
+            name: coefficient.name.clone(),
+            value: coefficient.value,
+            ci95: coefficient.ci95,
+            unit: coefficient.unit.clone(),
+            // Usual values are those of one size of vehicle.
+            expected: known.and_then(|known| known.expected).filter(|_| is_usual),
+            sign: None,
+            held: false,
+            rms_over_flights: rms,
+        }
+    };
+    let value = |parameter: &Parameter| ParameterValue {
+        name: parameter.name.clone(),
+        value: parameter.value,
+        fixed: parameter.fixed,
+        unit: parameter.unit.clone(),
+        profile: parameter.ci95,
+    };
+    let worthy = falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
+    Step {
+        effect: effect.name.clone(),
+        meaning: effect.meaning.clone(),
+        channels: worthy.map(|(&channel, _)| channel_name(channel).to_owned()).collect(),
+        held_out_mse_fall: falls.iter().map(|(&channel, &fall)| (channel_name(channel).to_owned(), fall)).collect(),
+        coefficients: effect.coefficients.iter().map(number).collect(),
+        parameters: effect.parameters.iter().map(value).collect(),
+        would_tell_apart: definition
+            .and_then(|definition| definition.notes)
+            .map_or_else(String::new, |notes| notes.would_tell_apart.into()),
+        formula: effect.to_string(),
+        ..Step::default()
     }
 }
 

@@ -48,7 +48,8 @@ pub(super) struct Layout {
 }
 
 impl Design {
-    fn column(&mut self, model: &Model, regressor: &Regressor) -> usize {
+    /// The place of a column in its channel.
+    pub fn column(&mut self, model: &Model, regressor: &Regressor) -> usize {
         let column = *self.known.entry(regressor.node).or_insert_with(|| {
             self.nodes.push(regressor.node);
             self.labels.push(model.label(regressor));

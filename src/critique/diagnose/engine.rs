@@ -6,9 +6,17 @@ use super::gram::{Block, BlockGram, grams};
 use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
 use crate::physics::{Model, Regressor, Wanted, calibrate, catalogue};
+use phyture_kernels::random::permutation;
 
 /// Folds over the blocks.
 pub(super) const FOLDS: usize = 10;
+
+/// The fold of each of so many blocks, at random.
+pub(super) fn permuted_folds(blocks: usize, seed: u64) -> Vec<usize> {
+    let mut fold = vec![0; blocks];
+    permutation(blocks, seed, 0).iter().enumerate().for_each(|(position, &block)| fold[block as usize] = position % FOLDS);
+    fold
+}
 
 /// Flights, and what they are cut into.
 pub(super) struct Engine<'a> {

@@ -235,15 +235,6 @@ impl Component<'_> {
         (a_ll, a_lg, DVector::from_fn(local.len(), |row, _| side[local[row]]))
     }
 
-    /// The properties of one flight given the other coefficients, from the blocks with a weight.
-    fn local(&self, flight: usize, weight: &dyn Fn(usize) -> f64, global: &[f64]) -> Option<Vec<f64>> {
-        let local: Vec<usize> = (0..self.members.len()).filter(|&member| self.is_local(member)).collect();
-        let (matrix, side) = self.of_flight(flight, weight);
-        let (a_ll, a_lg, b_l) = self.split(&matrix, &side, &local);
-        let values = Cholesky::new(a_ll)?.solve(&(b_l - a_lg * DVector::from_column_slice(global)));
-        Some(values.iter().copied().collect())
-    }
-
     /// Solves `matrix θ = side` within the bounds: the worst offender is put on its bound until none is left.
     fn bounded(&self, matrix: &DMatrix<f64>, side: &DVector<f64>) -> Option<(Vec<f64>, Vec<bool>)> {
         let size = self.members.len();
@@ -296,29 +287,6 @@ impl Component<'_> {
             }
         }
         Some(errors)
-    }
-
-    /// Squared errors of the blocks under coefficients found elsewhere; the properties of a flight are found from its blocks of other
-    /// folds, and are zero where no number fits.
-    pub fn errors_under(&self, solution: &Solution, folds: usize, fold: &dyn Fn(usize) -> usize) -> Vec<(usize, Vec<f64>)> {
-        let mut errors: Vec<(usize, Vec<f64>)> =
-            self.channels.iter().map(|(channel, ..)| (*channel, vec![0.0; self.blocks.len()])).collect();
-        let any_local = (0..self.members.len()).any(|member| self.is_local(member));
-        for held in 0..folds {
-            let weight = |block: usize| if fold(block) == held { 0.0 } else { 1.0 };
-            let mut solution = solution.clone();
-            if any_local {
-                solution.by_flight = self
-                    .flights()
-                    .into_iter()
-                    .filter_map(|flight| Some((flight, self.local(flight, &weight, &solution.values)?)))
-                    .collect();
-            }
-            for index in (0..self.blocks.len()).filter(|&index| fold(index) == held) {
-                self.block_errors(&solution, index, &mut errors);
-            }
-        }
-        errors
     }
 
     fn block_errors(&self, solution: &Solution, index: usize, errors: &mut [(usize, Vec<f64>)]) {

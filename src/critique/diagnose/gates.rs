@@ -36,3 +36,8 @@ pub(super) const SMALLEST_SHARE_OF_RIVAL: f64 = 0.2;
 pub(super) const CONTENDER: f64 = 0.7;
 /// … and of those the best so many are refined.
 pub(super) const MOST_CONTENDERS: usize = 3;
+/// An effect of which no number is known better than to this share of its usual size is not shown by the flights.
+pub(super) const LOOSE: f64 = 0.5;
+/// With so many effects missing a search that adds one after the other is held against one that begins with all: forms interact, and each
+/// that is missing hides the others.
+pub(super) const MANY: usize = 3;

@@ -8,6 +8,7 @@
 
 mod account;
 mod amend;
+mod backward;
 mod candidate;
 mod confirm;
 mod describe;
@@ -17,6 +18,8 @@ mod failure;
 mod fit;
 mod gates;
 mod gram;
+mod joint;
+mod own;
 mod refine;
 mod report;
 mod resample;

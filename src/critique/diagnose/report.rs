@@ -2,6 +2,7 @@
 
 use crate::critique::compare::PerChannel;
 use crate::critique::shares::Share;
+use crate::flight::Span;
 use crate::physics::SignFinding;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -180,8 +181,15 @@ pub struct Locked {
     /// What it is made of.
     #[serde(default)]
     pub kept: Kept,
-    /// Length, s.
+    /// Length of what is judged, s.
     pub duration_s: f64,
+    /// Whether some model has numbers of each flight (wind, biases): flights that no fit has seen are then judged on their second halves, those
+    /// numbers being found from the first; every model of the table is judged on the same.
+    #[serde(default)]
+    pub own_from_first_half: bool,
+    /// What is judged.
+    #[serde(skip)]
+    pub spans: Vec<Span>,
     /// Root mean square error before.
     pub rmse_before: PerChannel,
     /// And with the accepted effects.
@@ -286,6 +294,9 @@ pub struct Diagnosis {
     /// What each accepted effect is worth there with all others in, the largest first; empty where it was not measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<Worth>,
+    /// Whether all effects were fitted at once and the needless left out, after a search that adds one after the other.
+    #[serde(default)]
+    pub both_roads: bool,
     /// How it was searched.
     pub method: Option<Method>,
     /// What a person should know besides.
@@ -395,6 +406,7 @@ impl Diagnosis {
             unknown: None,
             locked: None,
             worth: Vec::new(),
+            both_roads: false,
             method: None,
             notes: Vec::new(),
             seconds: 0.0,

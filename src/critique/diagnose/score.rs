@@ -1,7 +1,7 @@
 //! One step of the search: every candidate tried beside a model, with its gain, its share of the error and its p-value.
 
 use super::candidate::{Candidate, with};
-use super::engine::{Pass, Trial};
+use super::engine::{Engine, Pass, Trial};
 use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, LARGEST_GAIN, SMALLEST_FALL, SMALLEST_MOVEMENT};
 use super::report::Status;
 use super::search::Search;
@@ -186,16 +186,7 @@ impl Search<'_> {
     }
 
     pub(super) fn by_flight(&self, gains: &[f64]) -> Vec<f64> {
-        let mut sums: Vec<f64> = Vec::new();
-        let mut last = None;
-        for (block, gain) in self.engine.blocks.iter().zip(gains) {
-            match sums.last_mut() {
-                Some(sum) if last == Some(block.flight) => *sum += gain,
-                _ => sums.push(*gain),
-            }
-            last = Some(block.flight);
-        }
-        sums
+        by_flight_of(&self.engine, gains)
     }
 
     pub(super) fn movement(&self, candidate: &Candidate, trial: &Trial, raw: &Raw) -> Movement {
@@ -236,18 +227,29 @@ impl Search<'_> {
 
 /// A block's gain: half the logarithm of the ratio of its held-out errors, over the channels, within bounds.
 pub(super) fn gains(base: &Trial, trial: &Trial) -> Vec<f64> {
-    (0..base.errors[0].len())
+    gains_of(&base.errors, &trial.errors, &trial.changed)
+}
+
+/// The same of squared errors before and after, by channel and block, over some channels.
+pub(super) fn gains_of(before: &[Vec<f64>; 6], after: &[Vec<f64>; 6], channels: &[bool; 6]) -> Vec<f64> {
+    (0..before[0].len())
         .map(|block| {
             (0..6)
-                .filter(|&channel| trial.changed[channel])
+                .filter(|&channel| channels[channel])
                 .map(|channel| {
-                    let (before, after) = (base.errors[channel][block], trial.errors[channel][block]);
-                    let gain = 0.5 * (before / after).ln();
+                    let gain = 0.5 * (before[channel][block] / after[channel][block]).ln();
                     if gain.is_finite() { gain.clamp(-LARGEST_GAIN, LARGEST_GAIN) } else { 0.0 }
                 })
                 .sum()
         })
         .collect()
+}
+
+/// Gains of blocks, added up by flight.
+pub(super) fn by_flight_of(engine: &Engine<'_>, gains: &[f64]) -> Vec<f64> {
+    let runs = engine.blocks.chunk_by(|left, right| left.flight == right.flight);
+    let mut gains = gains.iter();
+    runs.map(|run| gains.by_ref().take(run.len()).sum()).collect()
 }
 
 /// Mean difference of paired gains times their number, and its standard error.

@@ -1,9 +1,10 @@
 //! The search itself: forward steps, the gates each must pass, the backward check.
 
+use super::backward::is_found;
 use super::candidate::{Candidate, with};
 use super::describe::{dropped, stability};
 use super::engine::{Engine, Trial};
-use super::gates::{CONTENDER, MOST_CONTENDERS, SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
+use super::gates::{CONTENDER, MANY, MOST_CONTENDERS, SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
 use super::report::{CandidateReport, Step};
 use super::resample::{RESAMPLES, draw, intervals};
 use super::score::{Scored, gains, paired};
@@ -92,12 +93,23 @@ impl Search<'_> {
         Ok((pass.base.model, None))
     }
 
+    /// With how many effects more it is time to begin from the other end: those that earlier searches found count, unless they were as many.
+    pub(super) fn enough(before: &Model) -> usize {
+        let known = before.effects.iter().filter(|effect| is_found(effect)).count();
+        if known < MANY { MANY - known } else { MANY }
+    }
+
     pub(super) fn forward(&self, before: &Model, candidates: &[Candidate]) -> Result<(Vec<Found>, Vec<CandidateReport>)> {
         let mut model = before.clone();
         let mut found: Vec<Found> = Vec::new();
         // Gains of all that passed at the last step.
         let mut earlier: BTreeMap<String, f64> = BTreeMap::new();
+        let enough = Self::enough(before);
+        let most = self.options.max_effects.unwrap_or(enough);
         loop {
+            if self.options.max_effects.is_none() && found.len() == enough {
+                return Ok((found, Vec::new()));
+            }
             let open: Vec<&Candidate> = candidates.iter().filter(|candidate| model.effect(&candidate.id).is_none()).collect();
             let (base, mut scored) = self.score(&model, &open)?;
             let mse = self.engine.mse(&base);
@@ -108,12 +120,12 @@ impl Search<'_> {
             for scored in &mut scored {
                 scored.rival = found.iter().find(|found| found.is_flawed_by(scored, &mse)).map(|found| found.step.effect.clone());
             }
-            if found.len() < self.options.max_effects {
+            if found.len() < most {
                 self.refine_contenders(&base, &mut scored)?;
             }
             let passing: Vec<&Scored<'_>> = scored.iter().filter(|scored| scored.passes(self.largest_p)).collect();
             let best = passing.iter().max_by(|left, right| left.gain.total_cmp(&right.gain));
-            let Some(best) = best.filter(|_| found.len() < self.options.max_effects) else {
+            let Some(best) = best.filter(|_| found.len() < most) else {
                 let mut reports = self.reports(&open, &scored);
                 reports.splice(0..0, self.backward(&mut found, before)?);
                 return Ok((found, reports));

@@ -265,6 +265,30 @@ pub fn not_carried(blocks: usize) -> String {
     format!("these flights cannot show it: {blocks} what there is of it")
 }
 
+/// No number of it is known well enough beside all others.
+pub fn loose(share: f64) -> String {
+    if share.is_finite() {
+        format!("these flights leave its numbers open: the best known one to {share:.1} of its usual size")
+    } else {
+        "these flights leave its numbers open".into()
+    }
+}
+
+/// How both roads went: what the first named before it was left, and what the second left out of that.
+pub fn both_roads(tried: usize, forward: &[String], dropped: &[String]) -> String {
+    let quoted = |names: &[String]| listed(&names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>());
+    let first = format!(
+        "much is missing at once, so all {tried} effects that apply were fitted together and the needless left out; one after the other the \
+         search had begun with {}",
+        quoted(forward)
+    );
+    if dropped.is_empty() {
+        format!("{first}, and both roads name these")
+    } else {
+        format!("{first}, of which {} turned out to be needless beside the others", quoted(dropped))
+    }
+}
+
 /// Little beside an accepted effect that may only be imperfect.
 pub fn mends(rival: &str) -> String {
     format!("little beside what `{rival}` removed: it may only mend its form")

@@ -36,9 +36,14 @@ impl Search<'_> {
                 coefficient.ci95 = Some(interval);
             }
         }
-        let doubts = model.sign_doubts();
-        Ok(doubts.iter().filter(|doubt| doubt.finding == SignFinding::Wrong).map(ToString::to_string).collect())
+        Ok(wrong_signs(&model))
     }
+}
+
+/// What is to be said of the numbers whose intervals lie on the wrong side of zero.
+pub(super) fn wrong_signs(model: &Model) -> Vec<String> {
+    let doubts = model.sign_doubts();
+    doubts.iter().filter(|doubt| doubt.finding == SignFinding::Wrong).map(ToString::to_string).collect()
 }
 
 /// What there is to say of the sign of an accepted effect's number, to stand behind it; nothing where it is as physics has it.

@@ -163,6 +163,7 @@ fn confirmation(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Lock
     let bar = |(step, values): (usize, &PerChannel)| {
         let name = match step {
             0 => "model".into(),
+            1 if locked.waterfall.len() == 2 && diagnosis.accepted.len() > 1 => "with all of them".into(),
             step => diagnosis.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}")),
         };
         rmse_row(name, values)

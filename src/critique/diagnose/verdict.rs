@@ -1,9 +1,10 @@
 //! From flights and a model to a diagnosis: blocks, search, what is left, confirmation, verdict.
 
+use super::backward::{Backward, is_found};
 use super::candidate::{Candidate, candidates};
 use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
-use super::engine::{Engine, FOLDS};
+use super::engine::{Engine, permuted_folds};
 use super::failure::{Measured, failure};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
@@ -11,19 +12,20 @@ use super::report::{CandidateReport, Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
 use super::significance::Flips;
+use super::signs::wrong_signs;
 use super::{sentences, signs, suggest};
 use crate::critique::unknown::Unknown;
 use crate::error::Result;
 use crate::flight::{Flight, Span};
 use crate::physics::{Effect, Model};
-use phyture_kernels::random::permutation;
 use std::time::Instant;
 
 /// How a search is done.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Most effects to accept.
-    pub max_effects: usize,
+    /// Most effects to accept, one after the other. Without a limit, as soon as many are missing, all that apply are fitted at once and the
+    /// needless left out.
+    pub max_effects: Option<usize>,
     /// Seed of folds, flips and resampling.
     pub seed: u64,
     /// Candidates to leave out.
@@ -32,7 +34,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { max_effects: 6, seed: 1, without: Vec::new() }
+        Self { max_effects: None, seed: 1, without: Vec::new() }
     }
 }
 
@@ -69,9 +71,7 @@ pub fn diagnose(
         block_s = SHORTEST_BLOCK_S;
         cut = blocks(flights, searched, block_s);
     }
-    let order = permutation(cut.len(), options.seed, 0);
-    let mut fold = vec![0; cut.len()];
-    order.iter().enumerate().for_each(|(position, &block)| fold[block as usize] = position % FOLDS);
+    let fold = permuted_folds(cut.len(), options.seed);
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
     let engine = Engine { flights, blocks: cut, fold, correlation: 2.0 * CORRELATION_S / step_s, held: Vec::new() };
     let mut candidates = candidates(model, flights);
@@ -139,13 +139,26 @@ struct Heard {
     found: Vec<Found>,
     left: Vec<CandidateReport>,
     unknown: Vec<Unknown>,
+    /// How both roads went, where both were taken. What was found then stands in one model.
+    roads: Option<String>,
 }
 
 impl Search<'_> {
     /// The whole search: forward, what the rest depends on, stand-ins taken back, intervals.
     fn hear(&self, ground: &Ground<'_>, candidates: &[Candidate]) -> Result<Heard> {
         let before = ground.before;
+        let is_many = |found: &[Found]| self.options.max_effects.is_none() && found.len() == Self::enough(before);
+        // Where much is missing, a part of long flights shows it as well.
+        if let Some(part) = self.part().filter(|_| self.options.max_effects.is_none()) {
+            let (found, _) = part.forward(before, candidates)?;
+            if is_many(&found) {
+                return self.hear_all(ground, candidates, &found);
+            }
+        }
         let (mut found, mut left) = self.forward(before, candidates)?;
+        if is_many(&found) {
+            return self.hear_all(ground, candidates, &found);
+        }
         let fitted = |found: &[Found]| found.last().map_or(before, |last| &last.model).clone();
         let unknown_of = |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
         let mut unknown = unknown_of(&fitted(&found))?;
@@ -156,16 +169,38 @@ impl Search<'_> {
             unknown = unknown_of(&fitted(&found))?;
         }
         self.intervals(&mut found)?;
-        Ok(Heard { found, left, unknown })
+        Ok(Heard { found, left, unknown, roads: None })
+    }
+
+    /// The search from the other end: everything at once, the needless left out, what the rest depends on. `first` is what the forward search
+    /// had found when it was left.
+    fn hear_all(&self, ground: &Ground<'_>, candidates: &[Candidate], first: &[Found]) -> Result<Heard> {
+        let Backward { model, needed, needless } = self.backward_road(ground.before, candidates)?;
+        let mut found: Vec<Found> = needed.iter().filter_map(|judged| self.needed(judged, &model)).collect();
+        self.judge_signs(&model, &mut found);
+        let applicable = candidates.iter().filter(|candidate| candidate.inapplicable.is_none());
+        let tried = applicable.count() + ground.before.effects.iter().filter(|effect| is_found(effect)).count();
+        let names: Vec<String> = first.iter().map(|found| found.step.effect.clone()).collect();
+        let dropped: Vec<String> = names.iter().filter(|name| model.effect(name).is_none()).cloned().collect();
+        let roads = sentences::both_roads(tried, &names, &dropped);
+        let mut left: Vec<CandidateReport> = needless.iter().map(|judged| self.needless(judged)).collect();
+        let refused: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.inapplicable.is_some()).collect();
+        left.extend(self.reports(&refused, &[]));
+        let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
+        Ok(Heard { found, left, unknown, roads: Some(roads) })
     }
 
     /// From what was found to the verdict: confirmation, suggestions tried, where the rest of the error lies, words.
     fn conclude(&self, ground: &Ground<'_>, heard: Heard, mut diagnosis: Diagnosis) -> Result<Outcome> {
         let begun = Instant::now();
-        let Heard { mut found, left, unknown } = heard;
+        let Heard { mut found, left, unknown, roads } = heard;
         let Ground { flights, locked, part, block_s, .. } = *ground;
         let mut models = vec![ground.before.clone()];
-        models.extend(found.iter().map(|found| found.model.clone()));
+        // Effects that were found at once have one model, and one bar.
+        let steps = if roads.is_some() { found.len().saturating_sub(1) } else { 0 };
+        models.extend(found.iter().skip(steps).map(|found| found.model.clone()));
+        diagnosis.both_roads = roads.is_some();
+        diagnosis.notes.extend(roads);
         let after = models.last().cloned().unwrap_or_else(|| ground.before.clone());
         diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
         // Two that were accepted beside each other have been told apart.
@@ -187,13 +222,13 @@ impl Search<'_> {
         let channels = unknown.iter().map(tried).collect::<Result<Vec<_>>>()?;
         diagnosis.unknown = (!channels.is_empty()).then_some(channels);
         diagnosis.failure = match &diagnosis.locked {
-            Some(confirmed) => failure(flights, &Measured::of_locked(confirmed, locked), &unknown),
+            Some(confirmed) => failure(flights, &Measured::of_locked(confirmed, &confirmed.spans), &unknown),
             None => {
                 let mse = self.engine.mse(&self.engine.pass(&after, &[])?.base);
                 failure(flights, &Measured { on: "searched", spans: ground.searched, mse }, &unknown)
             }
         };
-        diagnosis.notes.extend(self.sign_notes(&after)?);
+        diagnosis.notes.extend(if diagnosis.both_roads { wrong_signs(&after) } else { self.sign_notes(&after)? });
         diagnosis.notes.extend(after.assumptions());
         diagnosis.summary = summary(&diagnosis);
         diagnosis.seconds += begun.elapsed().as_secs_f64();
@@ -274,9 +309,19 @@ mod tests {
         for (name, formula) in [("sum", "u1 + u2 + u3"), ("one", "u1"), ("other", "u2")] {
             model.effects.push(Effect { enabled: false, ..Effect::formula(name, 0, formula, 0.0)? });
         }
-        let without = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
-        let options = Options { without, ..Options::default() };
-        let found = diagnose(&flights, &model, &whole(&flights), &[], "test", &options)?.diagnosis;
+        let without: Vec<String> = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
+        let found = |max_effects: Option<usize>| {
+            let options = Options { without: without.clone(), max_effects, ..Options::default() };
+            Ok::<_, crate::Error>(diagnose(&flights, &model, &whole(&flights), &[], "test", &options)?.diagnosis)
+        };
+        // From the other end it is needless from the beginning.
+        let both = found(None)?;
+        assert!(both.both_roads && both.accepted.len() == 2 && !both.accepted.contains(&"sum".to_owned()), "{both}");
+        assert!(
+            both.candidates.iter().any(|candidate| candidate.effect == "sum" && candidate.status == Status::Negligible),
+            "{both:#}"
+        );
+        let found = found(Some(6))?;
         let mut accepted = found.accepted.clone();
         accepted.sort();
         assert_eq!(accepted, ["one", "other"], "{found}");

@@ -212,6 +212,9 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
         for (step, rmse) in locked.waterfall.iter().enumerate().skip(usize::from(!values.is_empty())) {
             names.push(match step {
                 0 => "model".to_owned(),
+                1 if locked.waterfall.len() == 2 && diagnosis.accepted.len() > 1 => {
+                    format!("+ {} effects", diagnosis.accepted.len())
+                }
                 _ => diagnosis.accepted.get(step - 1).map_or_else(|| "?".into(), |effect| format!("+ {effect}")),
             });
             values.push(rmse.channels().into());

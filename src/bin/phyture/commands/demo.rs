@@ -9,9 +9,9 @@ use super::diagnose;
 use super::train::Task;
 use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
 use phyture::Result;
+use phyture::critique::Comparison;
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
-use phyture::critique::{Comparison, floor_of_spans};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::write;
 use phyture::nn::PhyTureConfig;
@@ -103,8 +103,8 @@ pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
 
     context.say("\n4. What is missing? Found, added, calibrated, until nothing worthwhile is left");
     let options = Options { seed: context.seed(), ..Options::default() };
-    let floor = Some(floor_of_spans(&set.flights, &split.test, &explainable.flights)?);
-    let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options, floor };
+    let calm = Some(explainable.flights.clone());
+    let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options, explainable: calm };
     let ledger = out.join("amended.ledger.jsonl");
     let found = diagnose::amend(context, &search, &model, &ledger)?;
     found.model.write(out.join("amended.toml"))?;

@@ -6,8 +6,8 @@ use super::{CHECK_FAILED, Context, data_sha256, explainable};
 use crate::arguments::{Data, Division};
 use phyture::critique::check;
 use phyture::critique::diagnose::{self, Amended, Diagnosis, LoopText, Options, Outcome, Verdict, calibrated, searched};
+use phyture::critique::floor_of_spans;
 use phyture::critique::wrap::wrapped;
-use phyture::critique::{PerChannel, floor_of_spans};
 use phyture::disk::{Target, append_lines};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
@@ -34,8 +34,8 @@ pub struct Task<'a> {
     pub data_sha256: String,
     /// How to search.
     pub options: Options,
-    /// Root mean square error on what only confirms that no model can go below, where it is known.
-    pub floor: Option<PerChannel>,
+    /// The explainable part of the flights, where it is known.
+    pub explainable: Option<Vec<Flight>>,
 }
 
 impl Task<'_> {
@@ -43,17 +43,18 @@ impl Task<'_> {
     pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
         let (searched, locked) = (searched(self.split), &self.split.test);
         let mut outcome = diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options)?;
-        self.label(&mut outcome.diagnosis);
+        self.label(&mut outcome.diagnosis)?;
         diagnose::weigh(&mut outcome.diagnosis, &self.set.flights, &outcome.model, self.split)?;
         Ok(outcome)
     }
 
     /// Notes what the search does not know: the hash of the files and the floor.
-    fn label(&self, diagnosis: &mut Diagnosis) {
+    fn label(&self, diagnosis: &mut Diagnosis) -> Result<()> {
         diagnosis.data_sha256.clone_from(&self.data_sha256);
-        if let (Some(locked), Some(floor)) = (&mut diagnosis.locked, self.floor) {
-            locked.set_floor(floor);
+        if let (Some(locked), Some(explainable)) = (&mut diagnosis.locked, &self.explainable) {
+            locked.set_floor(floor_of_spans(&self.set.flights, &locked.spans, explainable)?);
         }
+        Ok(())
     }
 }
 
@@ -162,16 +163,15 @@ pub struct Wanted<'a> {
     pub of_network: Option<&'a Path>,
     /// Folder for the page.
     pub report: Option<&'a Path>,
-    /// Most effects to name.
-    pub max_effects: usize,
+    /// Most effects to name, one after the other; as many as there are without it.
+    pub max_effects: Option<usize>,
     /// Folder of the explainable part of the flights.
     pub explainable: Option<&'a Path>,
 }
 
-/// The floor on what only confirms, from the explainable part of the flights.
-fn floor(data: &Data, explainable: Option<&Path>, set: &DataSet, split: &Split) -> Result<Option<PerChannel>> {
-    let of = |folder: &Path| floor_of_spans(&set.flights, &split.test, &explainable::read(data, folder)?);
-    explainable.filter(|_| !split.test.is_empty()).map(of).transpose()
+/// The explainable part of the flights, where there is one and something is kept to judge on.
+fn read_explainable(data: &Data, folder: Option<&Path>, split: &Split) -> Result<Option<Vec<Flight>>> {
+    folder.filter(|_| !split.test.is_empty()).map(|folder| explainable::read(data, folder)).transpose()
 }
 
 /// `diagnose`.
@@ -207,8 +207,8 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         set = target.set;
     }
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
-    let floor = floor(data, wanted.explainable, &set, &split)?;
-    let task = Task { set: &set, split: &split, data_sha256, options, floor };
+    let explainable = read_explainable(data, wanted.explainable, &split)?;
+    let task = Task { set: &set, split: &split, data_sha256, options, explainable };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", told(context, &outcome.diagnosis)));
     if let Some(paper) = paper {
@@ -255,7 +255,7 @@ struct LoopOutput {
 /// text; what all found is the caller's to tell (see [`told_together`]).
 pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
     diagnose::amend(&task.set.flights, model, task.split, &task.options, &mut |round, diagnosis| {
-        task.label(diagnosis);
+        task.label(diagnosis)?;
         if context.is_verbose() {
             context.say(format!("\nRound {round}\n{diagnosis:#}"));
         } else {
@@ -283,7 +283,7 @@ fn progress(diagnosis: &Diagnosis) -> String {
 /// it was given, calibrated.
 pub fn told_together(context: &Context, task: &Task<'_>, before: &Model, amended: &Amended) -> Result<Diagnosis> {
     let mut together = diagnose::together(&task.set.flights, before, amended, task.split)?;
-    task.label(&mut together);
+    task.label(&mut together)?;
     let text = LoopText(&together);
     let text = if context.is_verbose() { format!("{text:#}") } else { text.to_string() };
     context.say(format!("\n{}", text.trim_end()));
@@ -335,8 +335,8 @@ pub fn run_loop(context: &Context, data: &Data, wanted: &Loop<'_>, division: &Di
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
-    let floor = floor(data, wanted.explainable, &set, &split)?;
-    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options, floor };
+    let explainable = read_explainable(data, wanted.explainable, &split)?;
+    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
     let ledger = output.with_extension("ledger.jsonl");
     let before = calibrated(&model, &set.flights, &split)?;
     let mut amended = amend(context, &task, &model, &ledger)?;

@@ -1,0 +1,278 @@
+//! The backward road: every effect that applies at once, all numbers fitted together, then what is needless left out. Forms interact, so
+//! an effect can look small by itself and be large beside the others; a search that adds one after the other underrates it.
+
+use super::account::selection;
+use super::candidate::{Candidate, with};
+use super::describe::decisive_flight;
+use super::engine::{Engine, permuted_folds};
+use super::gates::{BLOCK_S, LOOSE, SMALLEST_FALL};
+use super::gram::blocks;
+use super::joint::{Errors, Folds, Point, undetermined};
+use super::score::{by_flight_of, gains_of};
+use super::search::Search;
+use super::significance::Flips;
+use crate::error::Result;
+use crate::flight::Span;
+use crate::physics::{Effect, Model, catalogue};
+use std::collections::BTreeMap;
+
+/// Share of its usual size at which an amplitude starts whose effect has shapes or times: at 0 these have no slope.
+const START: f64 = 0.1;
+
+/// Time of flight on which everything is fitted first, s, and flights at least: many steps on it cost as much as few on all.
+const QUICK: (f64, usize) = (700.0, 10);
+
+/// Time of flight and flights on which effects are judged: on half an hour an effect that is worth a fiftieth of a channel's error shows.
+const JUDGED: (f64, usize) = (1800.0, 20);
+
+/// Steps on these, at most, and on all that was searched.
+const STEPS: [usize; 3] = [30, 3, 2];
+
+/// Length of a block where only the numbers and their intervals are asked for, s: fewer squares to keep.
+const LONG_BLOCK_S: f64 = 40.0;
+
+/// Times that what is left is fitted and judged again, at most.
+const MOST_ROUNDS: usize = 6;
+
+/// Several are left out at once where that costs no more than this beyond what each costs by itself, in the logarithm of the likelihood of
+/// held-out blocks: two of which one is needed cost more together.
+const SLACK: f64 = 0.5;
+
+/// An effect, and what it brings beside all others that are in.
+pub(super) struct Judged {
+    pub effect: String,
+    /// Gain of each block.
+    pub gains: Vec<f64>,
+    /// Share of the held-out error without it that it removes, by channel that it changes.
+    pub falls: BTreeMap<usize, f64>,
+    pub p_value: f64,
+    /// Standard error of its best known number, in usual sizes.
+    pub looseness: f64,
+    /// A flight without which its gain would be gone.
+    pub rests_on: Option<String>,
+}
+
+impl Judged {
+    pub fn gain(&self) -> f64 {
+        self.gains.iter().sum()
+    }
+
+    pub fn largest_fall(&self) -> f64 {
+        self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Whether these flights could show it.
+    pub fn is_excited(&self) -> bool {
+        self.looseness <= LOOSE
+    }
+}
+
+/// What the road came to.
+pub(super) struct Backward {
+    /// With what is needed, fitted, with intervals.
+    pub model: Model,
+    /// The largest gain first.
+    pub needed: Vec<Judged>,
+    /// As they were when they were left out.
+    pub needless: Vec<Judged>,
+}
+
+/// Effects by place in [`Point::optional`].
+struct Pruned {
+    absent: Vec<usize>,
+    needed: Vec<Judged>,
+    needless: Vec<Judged>,
+}
+
+impl Search<'_> {
+    /// Fits everything at once and leaves out what is needless, effects that a search added before not excepted.
+    ///
+    /// # Errors
+    /// As [`Model::predict`]; [`crate::Error::Undetermined`] where the flights do not determine the baseline's numbers.
+    pub(super) fn backward_road(&self, before: &Model, candidates: &[Candidate]) -> Result<Backward> {
+        let mut model = before.clone();
+        for candidate in candidates.iter().filter(|candidate| candidate.inapplicable.is_none()) {
+            model = with(&model, &started(&candidate.effect));
+        }
+        let may_go = |effect: &Effect| is_found(effect) || candidates.iter().any(|candidate| candidate.id == effect.name);
+        let optional = |model: &Model| (0..model.effects.len()).filter(|&index| may_go(&model.effects[index])).collect::<Vec<_>>();
+        let (quick, judging) = (self.even(QUICK, BLOCK_S), self.even(JUDGED, BLOCK_S));
+        let road = Road { flips: Flips::new(judging.blocks.len(), self.options.seed), engine: judging, largest_p: self.largest_p };
+        let mut gone: Vec<Judged> = Vec::new();
+        let mut round = 1;
+        let needed = loop {
+            model = Point::fitted(&quick, model, STEPS[0])?;
+            model = Point::fitted(&road.engine, model, STEPS[1])?;
+            let places = optional(&model);
+            let point = Point::at(&road.engine, model, places)?;
+            let Pruned { absent, needed, needless } = road.pruned(&point)?;
+            gone.extend(needless);
+            model = point.without(&road.engine, &absent).ok_or_else(undetermined)?;
+            if absent.is_empty() || round == MOST_ROUNDS {
+                break needed;
+            }
+            round += 1;
+        };
+        // The numbers and their intervals rest on all that was searched.
+        let whole = self.even((f64::INFINITY, 1), LONG_BLOCK_S);
+        let mut point = Point::at(&whole, Point::fitted(&whole, model, STEPS[2])?, Vec::new())?;
+        point.note_intervals(&point.folds(&whole, &[]).ok_or_else(undetermined)?);
+        Ok(Backward { model: point.model, needed, needless: gone })
+    }
+
+    /// The same search on as much of the flights as judges effects, where there is at least twice as much.
+    pub(super) fn part(&self) -> Option<Search<'_>> {
+        let engine = self.even(JUDGED, BLOCK_S);
+        let engine = Engine { held: self.engine.held.clone(), ..engine };
+        let flips = (2 * engine.rows() <= self.engine.rows()).then(|| Flips::new(engine.blocks.len(), self.options.seed))?;
+        Some(Search { engine, flips, largest_p: self.largest_p, options: self.options })
+    }
+
+    /// An even selection of the searched flights, cut into blocks.
+    fn even(&self, most: (f64, usize), block_s: f64) -> Engine<'_> {
+        let Engine { flights, correlation, .. } = self.engine;
+        let spans: Vec<Span> =
+            self.engine.blocks.iter().map(|block| Span { flight: block.flight, start: block.start, end: block.end }).collect();
+        let cut = blocks(flights, &joined(selection(flights, &spans, most)), block_s);
+        let fold = permuted_folds(cut.len(), self.options.seed);
+        Engine { flights, blocks: cut, fold, correlation, held: Vec::new() }
+    }
+}
+
+/// Spans that follow each other as one.
+fn joined(spans: Vec<Span>) -> Vec<Span> {
+    let mut joined: Vec<Span> = Vec::new();
+    for span in spans {
+        match joined.last_mut() {
+            Some(last) if last.flight == span.flight && last.end == span.start => last.end = span.end,
+            _ => joined.push(span),
+        }
+    }
+    joined
+}
+
+/// What judges effects.
+struct Road<'a> {
+    engine: Engine<'a>,
+    flips: Flips,
+    largest_p: f64,
+}
+
+impl Road<'_> {
+    /// Leaves out what is needless, the least useful first.
+    fn pruned(&self, point: &Point) -> Result<Pruned> {
+        let looseness = point.looseness(&self.engine).ok_or_else(undetermined)?;
+        let mut pruned = Pruned { absent: Vec::new(), needed: Vec::new(), needless: Vec::new() };
+        let mut folds = point.folds(&self.engine, &[]).ok_or_else(undetermined)?;
+        let mut base = point.held_out(&self.engine, &folds, &[]).ok_or_else(undetermined)?;
+        // Those that were needless when they were last looked at; empty is all.
+        let mut doubtful: Vec<usize> = Vec::new();
+        loop {
+            let open = (0..point.optional.len()).filter(|place| !pruned.absent.contains(place));
+            let looked: Vec<usize> = if doubtful.is_empty() { open.collect() } else { doubtful.clone() };
+            let was_all = doubtful.is_empty();
+            let judged = self.judged(point, (&folds, &base), &pruned.absent, &looked).ok_or_else(undetermined)?;
+            let (mut needless, needed): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(_, judged)| !self.is_needed(judged));
+            needless.sort_by(|left, right| left.1.gain().total_cmp(&right.1.gain()));
+            if needless.is_empty() {
+                if was_all {
+                    pruned.needed = needed.into_iter().map(|entry| entry.1).collect();
+                    pruned.needed.sort_by(|left, right| right.gain().total_cmp(&left.gain()));
+                    note_looseness(point, &looseness, &mut pruned);
+                    return Ok(pruned);
+                }
+                doubtful.clear();
+                continue;
+            }
+            let mut count = needless.len().div_ceil(2);
+            loop {
+                let batch: Vec<usize> = needless[..count].iter().map(|entry| entry.0).collect();
+                let without: Vec<usize> = pruned.absent.iter().chain(&batch).copied().collect();
+                let new_folds =
+                    if batch.iter().any(|&place| point.has_locals(place)) { point.folds(&self.engine, &without) } else { None };
+                let errors =
+                    point.held_out(&self.engine, new_folds.as_ref().unwrap_or(&folds), &without).ok_or_else(undetermined)?;
+                let lost: f64 = gains_of(&errors, &base, &[true; 6]).iter().sum();
+                let each: f64 = needless[..count].iter().map(|entry| entry.1.gain().max(0.0)).sum();
+                if count == 1 || lost <= each + SLACK {
+                    doubtful = needless[count..].iter().map(|entry| entry.0).collect();
+                    pruned.needless.extend(needless.drain(..count).map(|entry| entry.1));
+                    (pruned.absent, base) = (without, errors);
+                    if let Some(new) = new_folds {
+                        folds = new;
+                    }
+                    break;
+                }
+                count = count.div_ceil(2);
+            }
+        }
+    }
+
+    fn is_needed(&self, judged: &Judged) -> bool {
+        judged.largest_fall() >= SMALLEST_FALL && judged.p_value <= self.largest_p
+    }
+
+    /// What each of some effects brings beside all that are in.
+    fn judged(
+        &self,
+        point: &Point,
+        (folds, base): (&Folds, &Errors),
+        absent: &[usize],
+        places: &[usize],
+    ) -> Option<Vec<(usize, Judged)>> {
+        let one = |&place: &usize| Some((place, self.beside(point, (folds, base), absent, place)?));
+        #[cfg(feature = "rayon")]
+        {
+            use rayon::prelude::*;
+            places.par_iter().map(one).collect()
+        }
+        #[cfg(not(feature = "rayon"))]
+        places.iter().map(one).collect()
+    }
+
+    fn beside(&self, point: &Point, (folds, base): (&Folds, &Errors), absent: &[usize], place: usize) -> Option<Judged> {
+        let mut without = absent.to_vec();
+        without.push(place);
+        let errors = if point.has_locals(place) {
+            point.held_out(&self.engine, &point.folds(&self.engine, &without)?, &without)?
+        } else {
+            point.held_out(&self.engine, folds, &without)?
+        };
+        let effect = &point.model.effects[point.optional[place]];
+        let channels = point.channels(place);
+        let gains = gains_of(&errors, base, &[true; 6]);
+        let sum = |errors: &[f64]| errors.iter().sum::<f64>();
+        let fall = |channel: usize| (channel, 1.0 - sum(&base[channel]) / sum(&errors[channel]));
+        let by_flight = effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some());
+        let p_value = self.flips.p_value_of_sums(&[if by_flight { by_flight_of(&self.engine, &gains) } else { gains.clone() }]);
+        let falls = (0..6).filter(|&channel| channels[channel]).map(fall).collect();
+        let rests_on = decisive_flight(&self.engine, &gains);
+        Some(Judged { effect: effect.name.clone(), falls, p_value, gains, looseness: f64::INFINITY, rests_on })
+    }
+}
+
+fn note_looseness(point: &Point, looseness: &[f64], pruned: &mut Pruned) {
+    for judged in pruned.needed.iter_mut().chain(&mut pruned.needless) {
+        let place = point.optional.iter().position(|&effect| point.model.effects[effect].name == judged.effect);
+        judged.looseness = place.map_or(f64::INFINITY, |place| looseness[place]);
+    }
+}
+
+/// Whether a search put an effect into the model.
+pub(super) fn is_found(effect: &Effect) -> bool {
+    effect.added_by.as_deref() == Some("diagnose")
+}
+
+/// An effect with amplitudes from which steps lead somewhere.
+fn started(effect: &Effect) -> Effect {
+    let mut effect = effect.clone();
+    let Some(definition) = catalogue::definition(&effect.kind) else { return effect };
+    if effect.parameters.iter().any(|parameter| !parameter.fixed) {
+        for coefficient in effect.coefficients.iter_mut().filter(|coefficient| coefficient.by_flight.is_none()) {
+            let usual = definition.coefficient(&coefficient.name).and_then(|known| known.expected);
+            coefficient.value =
+                START * usual.map_or(1.0, |[low, high]| if low < 0.0 && 0.0 < high { high } else { 0.5 * (low + high) });
+        }
+    }
+    effect
+}

@@ -1,0 +1,645 @@
+//! A model with all its numbers open at once, coefficients, times and shapes: its error near its present numbers as one quadratic form, the steps
+//! that lower it, and the errors of the model without some of its effects. Which effects are needed is the business of `backward`.
+//!
+//! Near its numbers θ₀ the model is `J θ + rest`, J being its derivatives; without the effect e its columns are those of the others, and `A_e` is
+//! added ([`Columns::absence`]). So one pass over the flights brings the Gram matrices of `[J | A | y - rest]`, and every choice among the effects
+//! is least squares on them. Each number but the baseline's has its usual size as a prior, so that many effects at once stay determined.
+
+use super::design::{Design, Free, Layout};
+use super::engine::{Engine, FOLDS};
+use super::fit::Reduced;
+use super::gram::grams;
+use super::own::prediction_errors;
+use crate::error::{Error, Result};
+use crate::physics::{Model, Wanted, catalogue};
+use crate::student::quantile_975;
+use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::BTreeMap;
+
+/// Weight at first of what holds numbers where they are, beside that of their usual sizes; and its factor with each step that succeeds or fails.
+const DAMPING: f64 = 1.0;
+const DAMPING_FACTOR: f64 = 10.0;
+const LARGEST_DAMPING: f64 = 1e8;
+
+/// A step has settled when it changes twice the logarithm of the likelihood by less than this, in independent samples: no
+/// choice between effects hangs on so little.
+const SETTLED: f64 = 0.5;
+
+/// What is known of a number before any flight.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    centre: f64,
+    /// Standard deviation; `None` where nothing is presumed.
+    size: Option<f64>,
+    bounds: [f64; 2],
+    /// Whether each flight has its own.
+    is_local: bool,
+}
+
+/// A model at its numbers, and its neighbourhood.
+pub(super) struct Point {
+    pub model: Model,
+    /// Effects that may be left out, by their index in the model.
+    pub optional: Vec<usize>,
+    layout: Layout,
+    known: Vec<Known>,
+    /// By channel, the squares of `[J | A | y - rest]` of each block; columns are numbered as in `layout.free`, then `optional`.
+    reduced: Vec<Reduced>,
+    /// Names of the flights by index.
+    names: Vec<String>,
+    correlation: f64,
+    /// Mean squared error of each channel.
+    pub mse: [f64; 6],
+    /// Minus twice the logarithm of likelihood and prior, in independent samples, but for a constant.
+    pub cost: f64,
+}
+
+/// Sums of squares over some blocks, after what belongs to each flight has been eliminated.
+pub(super) struct Normal {
+    matrix: DMatrix<f64>,
+    /// By flight: what the flight's own numbers are made of.
+    by_flight: BTreeMap<usize, DMatrix<f64>>,
+}
+
+/// The blocks of all folds but one, for each fold, with these numbers of each flight.
+pub(super) struct Folds {
+    locals: Vec<usize>,
+    normals: Vec<Normal>,
+}
+
+/// Squared errors by channel and block.
+pub(super) type Errors = [Vec<f64>; 6];
+
+impl Point {
+    /// The neighbourhood of a model; `optional` effects may then be left out.
+    ///
+    /// # Errors
+    /// As [`Model::predict`].
+    pub fn at(engine: &Engine<'_>, model: Model, optional: Vec<usize>) -> Result<Self> {
+        let mut design = Design::default();
+        let regressors = design.columns.regressors(&model, Wanted { parameters: true, ..Wanted::default() })?;
+        let mut layout = design.add(&model, &regressors);
+        let numbers = layout.free.len();
+        for (place, &effect) in optional.iter().enumerate() {
+            for absence in design.columns.absence(&model, &regressors, effect)? {
+                let column = design.column(&model, &absence);
+                layout.channels[absence.channel].free.push((numbers + place, vec![(column, 1.0)]));
+            }
+        }
+        let grams = grams(engine.flights, &engine.blocks, &design)?;
+        let reduced: Vec<Reduced> = (0..6).map(|channel| Reduced::new(&layout, channel, &grams)).collect();
+        drop(grams);
+        let known = layout.free.iter().map(|&free| known(&model, free)).collect();
+        let names = engine.flights.iter().map(|flight| flight.name.clone()).collect();
+        let correlation = engine.correlation;
+        let (mse, cost) = ([0.0; 6], 0.0);
+        let mut point = Self { model, optional, layout, known, reduced, names, correlation, mse, cost };
+        point.weigh(engine);
+        Ok(point)
+    }
+
+    /// Error and cost at the present numbers.
+    fn weigh(&mut self, engine: &Engine<'_>) {
+        let mut sums = [0.0; 6];
+        for run in runs(engine) {
+            let values = self.values(engine.blocks[run.start].flight);
+            for block in run {
+                let errors = self.errors(block, &values);
+                sums.iter_mut().zip(errors).for_each(|(sum, error)| *sum += error);
+            }
+        }
+        let (mse, cost) = self.likelihood(engine, &sums);
+        (self.mse, self.cost) = (mse, cost + self.prior(engine, &self.model));
+    }
+
+    /// Numbers, absences (none) and the one of what is measured, for a flight.
+    fn values(&self, flight: usize) -> Vec<f64> {
+        self.values_of(&self.model, flight)
+    }
+
+    fn values_of(&self, model: &Model, flight: usize) -> Vec<f64> {
+        let name = self.names.get(flight).map_or("", String::as_str);
+        let of = |free: &Free| {
+            let number = model.effects[free.effect].number(free.coefficient);
+            number.map_or(0.0, |number| if flight == usize::MAX { number.value } else { number.in_flight(name) })
+        };
+        let numbers = self.layout.free.iter().map(of);
+        numbers.chain(self.optional.iter().map(|_| 0.0)).chain([1.0]).collect()
+    }
+
+    fn size(&self) -> usize {
+        self.layout.free.len() + self.optional.len() + 1
+    }
+
+    /// Squared error of a block, by channel.
+    fn errors(&self, block: usize, values: &[f64]) -> [f64; 6] {
+        std::array::from_fn(|channel| self.reduced[channel].error(block, &|place| values[place]))
+    }
+
+    /// Adds the weighted squares of a block to those of all columns.
+    fn add(&self, block: usize, sum: &mut DMatrix<f64>) {
+        let target = self.size() - 1;
+        for (reduced, mse) in self.reduced.iter().zip(&self.mse) {
+            let square = &reduced.blocks[block];
+            let place = |index: usize| reduced.free.get(index).copied().unwrap_or(target);
+            for column in 0..square.ncols() {
+                let to = place(column);
+                for row in 0..square.nrows() {
+                    sum[(place(row), to)] += square[(row, column)] / mse;
+                }
+            }
+        }
+    }
+
+    /// The numbers that each flight has for itself, those of effects that are left out excepted.
+    fn locals(&self, absent: &[usize]) -> Vec<usize> {
+        (0..self.known.len()).filter(|&at| self.known[at].is_local && !self.is_absent(at, absent)).collect()
+    }
+
+    /// Whether a number belongs to an effect that is left out; `absent` are places in `optional`.
+    fn is_absent(&self, number: usize, absent: &[usize]) -> bool {
+        absent.iter().any(|&place| self.optional[place] == self.layout.free[number].effect)
+    }
+
+    /// The squares of the blocks of each flight that are wanted, with its own numbers eliminated.
+    fn normal(&self, engine: &Engine<'_>, locals: &[usize], wanted: &dyn Fn(usize) -> bool) -> Option<Normal> {
+        let size = self.size();
+        let mut normal = Normal { matrix: DMatrix::zeros(size, size), by_flight: BTreeMap::new() };
+        for run in runs(engine) {
+            let flight = engine.blocks[run.start].flight;
+            if !run.clone().any(wanted) {
+                continue;
+            }
+            if locals.is_empty() {
+                run.filter(|&block| wanted(block)).for_each(|block| self.add(block, &mut normal.matrix));
+                continue;
+            }
+            let mut square = DMatrix::zeros(size, size);
+            run.filter(|&block| wanted(block)).for_each(|block| self.add(block, &mut square));
+            let mut own = DMatrix::from_fn(locals.len(), locals.len(), |i, j| square[(locals[i], locals[j])]);
+            for (index, &local) in locals.iter().enumerate() {
+                own[(index, index)] += self.correlation * self.known[local].precision(0.0, 0.0);
+            }
+            let mut others = DMatrix::from_fn(locals.len(), size, |i, j| square[(locals[i], j)]);
+            locals.iter().for_each(|&local| others.column_mut(local).fill(0.0));
+            let made_of = Cholesky::new(own)?.solve(&others);
+            normal.matrix += square;
+            normal.matrix.gemm_tr(-1.0, &others, &made_of, 1.0);
+            normal.by_flight.insert(flight, made_of);
+        }
+        Some(normal)
+    }
+
+    /// Values of the numbers common to all flights, the others 0; `values` holds those that are not `open`, and the absences.
+    fn solve(&self, normal: &Normal, open: &[usize], values: &[f64], damping: f64) -> Option<Vec<f64>> {
+        let target = self.size() - 1;
+        let fixed: Vec<usize> = (0..target).filter(|at| values[*at] != 0.0 && open.binary_search(at).is_err()).collect();
+        let mut matrix = DMatrix::from_fn(open.len(), open.len(), |i, j| normal.matrix[(open[i], open[j])]);
+        let mut side = DVector::from_fn(open.len(), |i, _| {
+            normal.matrix[(open[i], target)] - fixed.iter().map(|&at| normal.matrix[(open[i], at)] * values[at]).sum::<f64>()
+        });
+        for (index, &number) in open.iter().enumerate() {
+            let (known, now) = (&self.known[number], values[number]);
+            let precision = self.correlation * known.precision(damping, now);
+            matrix[(index, index)] += precision;
+            side[index] += self.correlation
+                * (known.precision(0.0, now) * known.centre + (known.precision(damping, now) - known.precision(0.0, now)) * now);
+        }
+        let scale = DVector::from_fn(open.len(), |index, _| 1.0 / matrix[(index, index)].sqrt());
+        if scale.iter().any(|scale| !scale.is_finite()) {
+            return None;
+        }
+        let scaled = DMatrix::from_fn(open.len(), open.len(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        let found = Cholesky::new(scaled)?.solve(&side.component_mul(&scale));
+        let mut solved = values.to_vec();
+        for (index, &number) in open.iter().enumerate() {
+            solved[number] = found[index] * scale[index];
+        }
+        Some(solved)
+    }
+
+    /// The model without some effects after a damped step of the others on all blocks; `None` where they do not determine it.
+    pub fn without(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Model> {
+        self.step(&self.normal(engine, &self.locals(absent), &|_| true)?, absent, DAMPING)
+    }
+
+    fn step(&self, normal: &Normal, absent: &[usize], damping: f64) -> Option<Model> {
+        let locals = self.locals(absent);
+        let (mut values, mut open) = self.start(absent);
+        open.extend((0..self.known.len()).filter(|&at| self.is_on_bound(at) && !self.is_absent(at, absent)));
+        open.sort_unstable();
+        let solved = loop {
+            let solved = self.solve(normal, &open, &values, damping)?;
+            let excess = |at: &usize| self.known[*at].excess(solved[*at]);
+            let worst =
+                open.iter().copied().filter(|at| excess(at) > 0.0).max_by(|left, right| excess(left).total_cmp(&excess(right)));
+            let Some(worst) = worst else { break solved };
+            let [low, high] = self.known[worst].bounds;
+            values[worst] = solved[worst].clamp(low, high);
+            open.retain(|at| *at != worst);
+        };
+        let mut model = self.model.clone();
+        for (number, free) in self.layout.free.iter().enumerate() {
+            let effect = &mut model.effects[free.effect];
+            if let Some(place) = locals.iter().position(|local| *local == number) {
+                let of = |(flight, made_of): (&usize, &DMatrix<f64>)| (self.names[*flight].clone(), own(made_of, &solved)[place]);
+                let by_flight: BTreeMap<String, f64> = normal.by_flight.iter().map(of).collect();
+                let coefficient = &mut effect.coefficients[free.coefficient];
+                coefficient.value = by_flight.values().sum::<f64>() / by_flight.len().max(1) as f64;
+                coefficient.by_flight = Some(by_flight);
+            } else if let Some((value, _)) = effect.number_mut(free.coefficient) {
+                *value = solved[number];
+            }
+        }
+        let gone: Vec<usize> = absent.iter().map(|&place| self.optional[place]).collect();
+        let mut index = 0;
+        model.effects.retain(|_| {
+            index += 1;
+            !gone.contains(&(index - 1))
+        });
+        Some(model)
+    }
+
+    /// The best numbers of a model, by damped Gauss-Newton steps, with what is presumed of them.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] where the blocks do not determine the numbers of the baseline; as [`Model::predict`].
+    pub fn fitted(engine: &Engine<'_>, model: Model, most: usize) -> Result<Model> {
+        let mut point = Self::at(engine, model, Vec::new())?;
+        let mut damping = DAMPING;
+        for step in 1..=most {
+            let Some((model, cost, found)) = point.best_step(engine, damping)? else { break };
+            damping = found;
+            if point.cost - cost < SETTLED || step == most {
+                return Ok(model);
+            }
+            point = Self::at(engine, model, Vec::new())?;
+        }
+        Ok(point.model)
+    }
+
+    /// The model after the best of some steps, the damping before and after it having been tried, with its cost and damping; `None` where
+    /// none lowers the cost.
+    fn best_step(&self, engine: &Engine<'_>, damping: f64) -> Result<Option<(Model, f64, f64)>> {
+        let normal = self.normal(engine, &self.locals(&[]), &|_| true).ok_or_else(undetermined)?;
+        let mut best: Option<(Model, f64, f64)> = None;
+        let mut tried = damping / DAMPING_FACTOR;
+        while tried <= LARGEST_DAMPING {
+            let model = self.step(&normal, &[], tried).ok_or_else(undetermined)?;
+            let cost = self.cost_of(engine, &model)?;
+            let bar = best.as_ref().map_or(self.cost, |best| best.1);
+            if cost < bar {
+                best = Some((model, cost, tried));
+            } else if best.is_some() {
+                break;
+            }
+            if best.is_some() && tried >= damping {
+                break;
+            }
+            tried *= DAMPING_FACTOR;
+        }
+        Ok(best)
+    }
+
+    /// The cost of the same model with other numbers; infinite where a formula is no number.
+    fn cost_of(&self, engine: &Engine<'_>, model: &Model) -> Result<f64> {
+        let total = prediction_errors(engine, model)?.map(|errors| errors.iter().sum());
+        let cost = self.likelihood(engine, &total).1 + self.prior(engine, model);
+        Ok(if cost.is_finite() { cost } else { f64::INFINITY })
+    }
+
+    /// Mean squared errors, and minus twice the logarithm of the likelihood in independent samples, but for a constant.
+    fn likelihood(&self, engine: &Engine<'_>, sums: &[f64; 6]) -> ([f64; 6], f64) {
+        let rows = engine.rows().max(1) as f64;
+        let mse = sums.map(|sum| (sum / rows).max(f64::MIN_POSITIVE));
+        (mse, mse.iter().map(|mse| rows / self.correlation * mse.ln()).sum())
+    }
+
+    /// What is presumed of the numbers, as the misfit of a model's.
+    fn prior(&self, engine: &Engine<'_>, model: &Model) -> f64 {
+        let misfit = |values: &[f64], is_local: bool| {
+            let known = self.known.iter().zip(values).filter(|(known, _)| known.is_local == is_local);
+            known.map(|(known, value)| known.misfit(*value)).sum::<f64>()
+        };
+        let of_flights = runs(engine).map(|run| misfit(&self.values_of(model, engine.blocks[run.start].flight), true));
+        of_flights.sum::<f64>() + misfit(&self.values_of(model, usize::MAX), false)
+    }
+
+    /// Present values, those of effects that are left out and of each flight 0, absences 1; and the numbers within their bounds.
+    fn start(&self, absent: &[usize]) -> (Vec<f64>, Vec<usize>) {
+        let mut values = self.values(usize::MAX);
+        let mut open = Vec::new();
+        for (number, value) in values.iter_mut().enumerate().take(self.known.len()) {
+            if self.known[number].is_local || self.is_absent(number, absent) {
+                *value = 0.0;
+            } else if !self.is_on_bound(number) {
+                open.push(number);
+            }
+        }
+        absent.iter().for_each(|&place| values[self.known.len() + place] = 1.0);
+        (values, open)
+    }
+
+    fn is_on_bound(&self, number: usize) -> bool {
+        let free = self.layout.free[number];
+        let value = self.model.effects[free.effect].number(free.coefficient).map_or(0.0, |number| number.value);
+        !self.known[number].is_local && self.known[number].excess(value) >= 0.0
+    }
+
+    /// What errors in fold 0 are made of under numbers of each flight that the other fold shows.
+    pub fn first_halves(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Folds> {
+        let locals = self.locals(absent);
+        let normal = self.normal(engine, &locals, &|block| engine.fold[block] != 0)?;
+        Some(Folds { locals, normals: vec![normal] })
+    }
+
+    /// What held-out errors are made of where these effects are left out.
+    pub fn folds(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Folds> {
+        let locals = self.locals(absent);
+        let one = |fold: usize| self.normal(engine, &locals, &|block| engine.fold[block] != fold);
+        #[cfg(feature = "rayon")]
+        let normals = {
+            use rayon::prelude::*;
+            (0..FOLDS).into_par_iter().map(one).collect::<Option<_>>()?
+        };
+        #[cfg(not(feature = "rayon"))]
+        let normals = (0..FOLDS).map(one).collect::<Option<_>>()?;
+        Some(Folds { locals, normals })
+    }
+
+    /// Whether leaving out an effect changes which numbers each flight has for itself.
+    pub fn has_locals(&self, place: usize) -> bool {
+        (0..self.known.len()).any(|at| self.known[at].is_local && self.layout.free[at].effect == self.optional[place])
+    }
+
+    /// Squared errors of each block under numbers fitted to the other folds, some effects being left out. Numbers on their bounds stay there.
+    pub fn held_out(&self, engine: &Engine<'_>, folds: &Folds, absent: &[usize]) -> Option<Errors> {
+        let (start, open) = self.start(absent);
+        let mut errors: Errors = std::array::from_fn(|_| vec![0.0; engine.blocks.len()]);
+        for (fold, normal) in folds.normals.iter().enumerate() {
+            let solved = self.solve(normal, &open, &start, 0.0)?;
+            self.errors_of_fold(engine, (folds, fold), &solved, &mut errors);
+        }
+        Some(errors)
+    }
+
+    /// The numbers common to all flights, fitted to all blocks, some effects being left out.
+    pub fn refitted(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Vec<f64>> {
+        let (start, open) = self.start(absent);
+        self.solve(&self.normal(engine, &self.locals(absent), &|_| true)?, &open, &start, 0.0)
+    }
+
+    /// The numbers common to all flights as they are, some effects being left out.
+    pub fn unchanged(&self, absent: &[usize]) -> Vec<f64> {
+        self.start(absent).0
+    }
+
+    /// Squared errors of each block under such numbers, found on other flights ([`Point::refitted`] of the same model there); those of each
+    /// flight are found from its blocks of other folds, or are those of the model where there is none.
+    pub fn errors_under(&self, engine: &Engine<'_>, folds: &Folds, solved: &[f64]) -> Errors {
+        let mut errors: Errors = std::array::from_fn(|_| vec![0.0; engine.blocks.len()]);
+        (0..folds.normals.len()).for_each(|fold| self.errors_of_fold(engine, (folds, fold), solved, &mut errors));
+        errors
+    }
+
+    fn errors_of_fold(&self, engine: &Engine<'_>, (folds, fold): (&Folds, usize), solved: &[f64], errors: &mut Errors) {
+        for run in runs(engine) {
+            let mut values = solved.to_vec();
+            let flight = engine.blocks[run.start].flight;
+            match folds.normals[fold].by_flight.get(&flight) {
+                Some(made_of) => {
+                    let own = own(made_of, solved);
+                    folds.locals.iter().zip(own.iter()).for_each(|(&local, value)| values[local] = *value);
+                }
+                None => {
+                    let present = self.values(flight);
+                    folds.locals.iter().for_each(|&local| values[local] = present[local]);
+                }
+            }
+            for block in run.filter(|&block| engine.fold[block] == fold) {
+                let found = self.errors(block, &values);
+                errors.iter_mut().zip(found).for_each(|(errors, found)| errors[block] = found);
+            }
+        }
+    }
+
+    /// Notes 95 % intervals in the model: from what the numbers would be without each tenth of the blocks (the delete-a-group jackknife, Kott 2001,
+    /// Journal of Official Statistics 17:521), given those of each flight.
+    pub fn note_intervals(&mut self, folds: &Folds) {
+        let (start, open) = self.start(&[]);
+        let without: Option<Vec<Vec<f64>>> = folds.normals.iter().map(|normal| self.solve(normal, &open, &start, 0.0)).collect();
+        let Some(without) = without else { return };
+        let count = without.len() as f64;
+        for number in open {
+            let mean = without.iter().map(|values| values[number]).sum::<f64>() / count;
+            let variance = without.iter().map(|values| (values[number] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count;
+            let half = quantile_975(count - 1.0) * variance.sqrt();
+            let free = self.layout.free[number];
+            if let Some((value, ci95)) = self.model.effects[free.effect].number_mut(free.coefficient) {
+                *ci95 = Some([*value - half, *value + half]);
+            }
+        }
+    }
+
+    /// For each effect that may be left out, how little these blocks know of it: the standard error of its best known number in usual sizes.
+    pub fn looseness(&self, engine: &Engine<'_>) -> Option<Vec<f64>> {
+        let (_, open) = self.start(&[]);
+        let normal = self.normal(engine, &self.locals(&[]), &|_| true)?;
+        let matrix = DMatrix::from_fn(open.len(), open.len(), |i, j| {
+            let prior = if i == j { self.correlation * self.known[open[i]].precision(0.0, 0.0) } else { 0.0 };
+            normal.matrix[(open[i], open[j])] + prior
+        });
+        let inverse = Cholesky::new(matrix)?.inverse();
+        let of = |effect: &usize| {
+            let own = (0..self.known.len()).filter(|&at| self.layout.free[at].effect == *effect);
+            let relative = own.map(|number| {
+                // What is on its bound, and what each flight shows of itself, is known.
+                let Ok(place) = open.binary_search(&number) else { return 0.0 };
+                // Of a number without a usual size none is asked.
+                self.known[number].size.map_or(0.0, |size| (self.correlation * inverse[(place, place)]).sqrt() / size)
+            });
+            relative.fold(f64::INFINITY, f64::min)
+        };
+        Some(self.optional.iter().map(of).collect())
+    }
+
+    /// Channels in which an effect acts.
+    pub fn channels(&self, place: usize) -> [bool; 6] {
+        let column = self.known.len() + place;
+        std::array::from_fn(|channel| self.reduced[channel].free.contains(&column))
+    }
+}
+
+impl Known {
+    /// Weight in independent samples, with `damping` that holds the number at its present value.
+    fn precision(&self, damping: f64, now: f64) -> f64 {
+        match self.size {
+            Some(size) => (1.0 + damping) / (size * size),
+            None => damping / if now == 0.0 { 1.0 } else { now * now },
+        }
+    }
+
+    fn misfit(&self, value: f64) -> f64 {
+        self.size.map_or(0.0, |size| ((value - self.centre) / size).powi(2))
+    }
+
+    /// How far a value is beyond its bounds, in usual sizes; 0 on one of them, negative within.
+    fn excess(&self, value: f64) -> f64 {
+        let [low, high] = self.bounds;
+        (low - value).max(value - high) / self.size.unwrap_or(1.0)
+    }
+}
+
+/// Why there is no next step.
+pub(super) fn undetermined() -> Error {
+    Error::Undetermined("the flights do not determine the numbers of the model's own effects".into())
+}
+
+/// The numbers of a flight from those common to all.
+fn own(made_of: &DMatrix<f64>, solved: &[f64]) -> DVector<f64> {
+    let target = solved.len() - 1;
+    let common = DVector::from_column_slice(&solved[..target]);
+    made_of.column(target) - made_of.columns(0, target) * common
+}
+
+/// The blocks of each flight, as ranges.
+fn runs<'a>(engine: &'a Engine<'_>) -> impl Iterator<Item = std::ops::Range<usize>> + 'a {
+    let mut next = 0;
+    engine.blocks.chunk_by(|left, right| left.flight == right.flight).map(move |run| {
+        let start = next;
+        next += run.len();
+        start..next
+    })
+}
+
+/// Usual spread of a number that each flight has for itself.
+pub(super) fn size_of(model: &Model, effect: usize, coefficient: usize) -> f64 {
+    known(model, Free { effect, coefficient }).size.unwrap_or(1.0)
+}
+
+/// What is known of a number of a model before any flight. Signs that physics fixes are kept: an effect that needs the other one stands in for
+/// something else.
+fn known(model: &Model, free: Free) -> Known {
+    let effect = &model.effects[free.effect];
+    let nothing = Known { centre: 0.0, size: None, bounds: [f64::NEG_INFINITY, f64::INFINITY], is_local: false };
+    let Some(number) = effect.number(free.coefficient) else { return nothing };
+    let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
+    let Some(definition) = definition else {
+        let is_local = number.by_flight.is_some();
+        return Known { size: is_local.then_some(1.0), is_local, ..nothing };
+    };
+    if let Some(known) = definition.coefficient(&number.name) {
+        let bounds = known.physical_sign().map_or(known.bounds, |(sign, _)| sign.bounds(known.bounds));
+        let usual = known.expected.map(|[low, high]| low.abs().max(high.abs()));
+        return Known { centre: 0.0, size: known.by_flight.or(usual), bounds, is_local: number.by_flight.is_some() };
+    }
+    let plain = definition.effect(model.mass_kg, model.rotor_radius_m);
+    let start = plain.parameters.iter().find(|parameter| parameter.name == number.name).map_or(0.0, |parameter| parameter.value);
+    let bounds = definition.parameter(&number.name).map_or(nothing.bounds, |known| known.bounds);
+    let half = 0.5 * (bounds[1] - bounds[0]);
+    Known { centre: start, size: half.is_finite().then_some(half), bounds, is_local: false }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidate::with;
+    use super::super::gram::blocks;
+    use super::super::gram::tests::{model, near, noise, whole};
+    use super::*;
+    use crate::flight::Flight;
+    use crate::physics::{Effect, calibrate};
+
+    fn engine(flights: &[Flight]) -> Engine<'_> {
+        let blocks = blocks(flights, &whole(flights), 2.0);
+        let fold = (0..blocks.len()).map(|block| block % FOLDS).collect();
+        Engine { flights, blocks, fold, correlation: 100.0, held: Vec::new() }
+    }
+
+    /// An effect at its usual size.
+    fn usual(kind: &str) -> Effect {
+        let definition = catalogue::definition(kind).expect("in the catalogue");
+        let mut effect = definition.effect(4.58, 0.8);
+        for (coefficient, known) in effect.coefficients.iter_mut().zip(definition.coefficients) {
+            coefficient.value = known.expected.map_or(0.5, |[low, high]| 0.25 * low + 0.75 * high);
+        }
+        effect
+    }
+
+    fn baseline() -> Model {
+        let mut model = model();
+        for (effect, value) in [("collective_thrust", -20.0), ("control_moment", 30.0)] {
+            let effect = model.effects.iter_mut().find(|known| known.name == effect).expect("of the baseline");
+            effect.coefficients.iter_mut().for_each(|coefficient| coefficient.value = value);
+        }
+        model
+    }
+
+    #[test]
+    fn errors_without_an_effect_are_those_of_the_model_that_lacks_it() -> Result<()> {
+        let flights = noise(21, &[1200, 900]);
+        let engine = engine(&flights);
+        let base = with(&with(&baseline(), &usual("cyclic_lag")), &usual("transl_lift"));
+        for definition in catalogue::definitions().filter(|definition| definition.notes.is_some_and(|notes| notes.searched)) {
+            if base.effect(definition.kind).is_some() {
+                continue;
+            }
+            let whole = with(&base, &usual(definition.kind));
+            let place = whole.effects.len() - 1;
+            let point = Point::at(&engine, whole.clone(), vec![place])?;
+            for (absent, model) in [(&[][..], &whole), (&[0][..], &base)] {
+                let expected = prediction_errors(&engine, model)?;
+                for (block, cut) in engine.blocks.iter().enumerate() {
+                    let mut values = point.values(cut.flight);
+                    (0..point.known.len())
+                        .filter(|number| point.is_absent(*number, absent))
+                        .for_each(|number| values[number] = 0.0);
+                    absent.iter().for_each(|place| values[point.known.len() + place] = 1.0);
+                    let found = point.errors(block, &values);
+                    for (channel, found) in found.into_iter().enumerate() {
+                        let scale = expected[channel][block].max(1.0);
+                        let difference = (found - expected[channel][block]).abs() / scale;
+                        assert!(difference < 1e-6, "{} channel {channel}: {found} {}", definition.kind, expected[channel][block]);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_linear_model_is_fitted_as_calibration_does_and_its_folds_as_the_search() -> Result<()> {
+        let flights = noise(22, &[4000, 3000]);
+        let engine = engine(&flights);
+        let (calibrated, _) = calibrate(&model(), &flights, &whole(&flights))?;
+        let fitted = Point::fitted(&engine, model(), 10)?;
+        let best = Point::at(&engine, calibrated, Vec::new())?.cost;
+        let mut point = Point::at(&engine, fitted, Vec::new())?;
+        assert!((best - 1e-6..best + SETTLED).contains(&point.cost), "{} {best}", point.cost);
+        let folds = point.folds(&engine, &[]).expect("determined");
+        let errors = point.held_out(&engine, &folds, &[]).expect("determined");
+        let expected = engine.pass(&model(), &[])?.base.errors;
+        errors.iter().zip(&expected).for_each(|(errors, expected)| assert!(near(errors, expected)));
+        point.note_intervals(&folds);
+        let intervals = point.model.effects.iter().flat_map(|effect| &effect.coefficients).map(|coefficient| coefficient.ci95);
+        let widths: Vec<f64> = intervals.map(|ci95| ci95.map_or(f64::NAN, |[low, high]| high - low)).collect();
+        assert!(widths.iter().all(|width| *width > 0.0 && *width < 1.0), "{widths:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn numbers_stay_within_their_bounds() -> Result<()> {
+        // Data of a drag that pushes: the bound is at none.
+        let truth = Effect { kind: "quad_drag".into(), ..usual("quad_drag") };
+        let mut pushing = truth.clone();
+        pushing.coefficients.iter_mut().for_each(|coefficient| coefficient.value = 0.05);
+        let mut flights = noise(23, &[4000]);
+        for flight in &mut flights {
+            let predicted = with(&baseline(), &pushing).predict(flight)?;
+            *flight = flight.with_accelerations(&predicted)?;
+        }
+        let fitted = Point::fitted(&engine(&flights), with(&baseline(), &truth), 10)?;
+        let drag = fitted.effect("quad_drag").expect("still in");
+        assert!(drag.coefficients.iter().all(|coefficient| coefficient.value <= 0.0), "{drag}");
+        Ok(())
+    }
+}

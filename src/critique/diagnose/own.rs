@@ -1,0 +1,355 @@
+//! Numbers that each flight has for itself (wind, a bias) on flights that no fit has seen: found from a flight's first half, so that its second
+//! half can judge. Nothing else is fitted here, and nothing judged.
+
+use super::engine::{Engine, FOLDS};
+use super::gram::blocks;
+use super::joint::{Errors, size_of};
+use crate::error::Result;
+use crate::flight::{Column, Flight, Span};
+use crate::physics::{Columns, Model, Regressor, Wanted};
+use nalgebra::{Cholesky, DMatrix, DVector};
+
+/// Gauss-Newton steps, at most; wind bends the columns a little.
+const MOST_STEPS: usize = 6;
+
+/// Settled, when no number moves by more than this share of its usual size.
+const SETTLED: f64 = 1e-3;
+
+/// Spans of flights that some fit has seen, or that need no numbers of their own; and of the others the first halves, and the second.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Halves {
+    pub seen: Vec<Span>,
+    pub first: Vec<Span>,
+    pub second: Vec<Span>,
+}
+
+impl Halves {
+    pub fn of(flights: &[Flight], models: &[Model], spans: &[Span]) -> Self {
+        let mut halves = Self::default();
+        for (flight, log) in flights.iter().enumerate() {
+            let mut own: Vec<Span> = spans.iter().filter(|span| span.flight == flight).copied().collect();
+            if models
+                .iter()
+                .all(|model| own_numbers(model).into_iter().all(|(effect, index)| is_known(model, effect, index, &log.name)))
+            {
+                halves.seen.extend(own);
+                continue;
+            }
+            own.sort_unstable_by_key(|span| span.start);
+            let total: usize = own.iter().map(|span| span.end - span.start).sum();
+            let mut left = total / 2;
+            for span in own {
+                let middle = span.start + left.min(span.end - span.start);
+                left -= middle - span.start;
+                halves.first.extend((span.start < middle).then_some(Span { end: middle, ..span }));
+                halves.second.extend((middle < span.end).then_some(Span { start: middle, ..span }));
+            }
+        }
+        halves
+    }
+
+    /// What is judged.
+    pub fn judged(&self) -> Vec<Span> {
+        self.seen.iter().chain(&self.second).copied().collect()
+    }
+
+    /// Blocks of what is judged, in fold 0, and of the first halves, in fold 1.
+    pub fn engine<'a>(&self, flights: &'a [Flight], block_s: f64, correlation: f64) -> Engine<'a> {
+        let mut cut: Vec<_> = blocks(flights, &self.judged(), block_s).into_iter().map(|block| (block, 0)).collect();
+        cut.extend(blocks(flights, &self.first, block_s).into_iter().map(|block| (block, 1)));
+        cut.sort_unstable_by_key(|(block, _)| (block.flight, block.start));
+        let (blocks, fold) = cut.into_iter().unzip();
+        Engine { flights, blocks, fold, correlation, held: Vec::new() }
+    }
+
+    /// The model with the numbers that the flights have for themselves, from their first halves.
+    ///
+    /// # Errors
+    /// As [`Model::predict`].
+    pub fn met(&self, flights: &[Flight], model: &Model, correlation: f64) -> Result<Model> {
+        let numbers = own_numbers(model);
+        let mut met = model.clone();
+        if numbers.is_empty() || self.first.is_empty() {
+            return Ok(met);
+        }
+        let sizes: Vec<f64> = numbers.iter().map(|&(effect, index)| size_of(model, effect, index)).collect();
+        for _ in 0..MOST_STEPS {
+            if step(flights, &self.first, &mut met, (&numbers, &sizes), correlation)? < SETTLED {
+                break;
+            }
+        }
+        Ok(met)
+    }
+}
+
+/// Numbers that each flight has for itself: index of the effect, and in it.
+fn own_numbers(model: &Model) -> Vec<(usize, usize)> {
+    let enabled = model.effects.iter().enumerate().filter(|(_, effect)| effect.enabled);
+    let of = |(index, effect): (usize, &crate::physics::Effect)| {
+        let own = effect.coefficients.iter().enumerate().filter(|(_, coefficient)| coefficient.by_flight.is_some());
+        own.map(|(number, _)| (index, number)).collect::<Vec<_>>()
+    };
+    enabled.flat_map(of).collect()
+}
+
+fn is_known(model: &Model, effect: usize, index: usize, flight: &str) -> bool {
+    let values = &model.effects[effect].coefficients[index].by_flight;
+    values.as_ref().is_some_and(|values| values.contains_key(flight))
+}
+
+/// What one flight says of its own numbers, by channel: `JᵀJ`, `Jᵀr` and `rᵀr`.
+type Sums = Vec<(DMatrix<f64>, DVector<f64>, f64)>;
+
+/// One step for all flights; by how much a number moved at most, in usual sizes.
+fn step(
+    flights: &[Flight],
+    spans: &[Span],
+    model: &mut Model,
+    (numbers, sizes): (&[(usize, usize)], &[f64]),
+    correlation: f64,
+) -> Result<f64> {
+    let mut columns = Columns::default();
+    let mut regressors: Vec<Regressor> = Vec::new();
+    for (place, &(effect, _)) in numbers.iter().enumerate() {
+        if place == 0 || numbers[place - 1].0 != effect {
+            let own = columns.regressors(model, Wanted { effect: Some(effect), ..Wanted::default() })?;
+            regressors.extend(own.into_iter().filter(|one| one.number.is_some_and(|number| numbers.contains(&(effect, number)))));
+        }
+    }
+    let mut nodes: Vec<_> = columns.predictions(model)?.to_vec();
+    nodes.extend(regressors.iter().map(|regressor| regressor.node));
+    let mut order: Vec<usize> = spans.iter().map(|span| span.flight).collect();
+    order.sort_unstable();
+    order.dedup();
+    let place = |one: &Regressor| numbers.iter().position(|number| Some(number.1) == one.number && number.0 == one.effect);
+    let by_channel: Vec<Vec<(usize, usize)>> = (0..6)
+        .map(|channel| {
+            let own = regressors.iter().enumerate().filter(|(_, one)| one.channel == channel);
+            own.filter_map(|(column, one)| Some((place(one)?, 6 + column))).collect()
+        })
+        .collect();
+    let one = |&flight: &usize| -> Result<Sums> {
+        let log = &flights[flight];
+        let own: Vec<&Span> = spans.iter().filter(|span| span.flight == flight).collect();
+        let end = own.iter().map(|span| span.end).max().unwrap_or(0);
+        let empty = || (DMatrix::zeros(numbers.len(), numbers.len()), DVector::zeros(numbers.len()), 0.0);
+        let mut sums: Sums = (0..6).map(|_| empty()).collect();
+        columns.evaluate(&nodes, log, end, &mut |range, values| {
+            for span in &own {
+                let (start, end) = (span.start.max(range.start), span.end.min(range.end));
+                if start >= end {
+                    continue;
+                }
+                let part = start - range.start..end - range.start;
+                for (channel, (matrix, side, square)) in sums.iter_mut().enumerate() {
+                    let measured = &log.column(Column::TARGETS[channel])[start..end];
+                    let predicted = &values.column(channel)[part.clone()];
+                    let rest: Vec<f64> = measured.iter().zip(predicted).map(|(measured, value)| measured - value).collect();
+                    let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(left, right)| left * right).sum::<f64>();
+                    *square += dot(&rest, &rest);
+                    for &(i, left) in &by_channel[channel] {
+                        let left = &values.column(left)[part.clone()];
+                        side[i] += dot(left, &rest);
+                        by_channel[channel]
+                            .iter()
+                            .for_each(|&(j, right)| matrix[(i, j)] += dot(left, &values.column(right)[part.clone()]));
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        Ok(sums)
+    };
+    #[cfg(feature = "rayon")]
+    let found: Vec<Sums> = {
+        use rayon::prelude::*;
+        order.par_iter().with_max_len(1).map(one).collect::<Result<_>>()?
+    };
+    #[cfg(not(feature = "rayon"))]
+    let found: Vec<Sums> = order.iter().map(one).collect::<Result<_>>()?;
+    let rows: usize = spans.iter().map(|span| span.end - span.start).sum();
+    let mse: Vec<f64> = (0..6).map(|channel| found.iter().map(|sums| sums[channel].2).sum::<f64>() / rows.max(1) as f64).collect();
+    let mut moved = 0.0_f64;
+    for (&flight, sums) in order.iter().zip(&found) {
+        let name = &flights[flight].name;
+        let now = DVector::from_iterator(
+            numbers.len(),
+            numbers.iter().map(|&(effect, index)| model.effects[effect].coefficients[index].in_flight(name)),
+        );
+        let (mut matrix, mut side) = (DMatrix::zeros(numbers.len(), numbers.len()), DVector::zeros(numbers.len()));
+        for ((own, right, _), mse) in sums.iter().zip(&mse) {
+            matrix += own / mse.max(f64::MIN_POSITIVE);
+            side += right / mse.max(f64::MIN_POSITIVE);
+        }
+        for (place, size) in sizes.iter().enumerate() {
+            let precision = correlation / (size * size);
+            matrix[(place, place)] += precision;
+            side[place] -= precision * now[place];
+        }
+        // A flight without any error says nothing that a computer can hold.
+        let Some(change) =
+            Cholesky::new(matrix).map(|factor| factor.solve(&side)).filter(|change| change.iter().all(|c| c.is_finite()))
+        else {
+            continue;
+        };
+        for (place, &(effect, index)) in numbers.iter().enumerate() {
+            moved = moved.max(change[place].abs() / sizes[place]);
+            if let Some(values) = &mut model.effects[effect].coefficients[index].by_flight {
+                values.insert(name.clone(), now[place] + change[place]);
+            }
+        }
+    }
+    Ok(moved)
+}
+
+/// Squared errors of a model's predictions, by channel and block.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub(super) fn prediction_errors(engine: &Engine<'_>, model: &Model) -> Result<Errors> {
+    let mut columns = Columns::default();
+    let nodes = columns.predictions(model)?;
+    let runs: Vec<_> = engine.blocks.chunk_by(|left, right| left.flight == right.flight).collect();
+    let one = |run: &&[super::gram::Block]| -> Result<Vec<[f64; 6]>> {
+        let flight = &engine.flights[run[0].flight];
+        let end = run.iter().map(|block| block.end).max().unwrap_or(0);
+        let mut sums = vec![[0.0; 6]; run.len()];
+        columns.evaluate(&nodes, flight, end, &mut |range, values| {
+            for (block, sums) in run.iter().zip(&mut sums) {
+                let (start, end) = (block.start.max(range.start), block.end.min(range.end));
+                for (channel, sum) in sums.iter_mut().enumerate().filter(|_| start < end) {
+                    let measured = &flight.column(Column::TARGETS[channel])[start..end];
+                    let predicted = &values.column(channel)[start - range.start..end - range.start];
+                    *sum += measured.iter().zip(predicted).map(|(measured, value)| (measured - value).powi(2)).sum::<f64>();
+                }
+            }
+            Ok(())
+        })?;
+        Ok(sums)
+    };
+    #[cfg(feature = "rayon")]
+    let sums: Vec<Vec<[f64; 6]>> = {
+        use rayon::prelude::*;
+        runs.par_iter().with_max_len(1).map(one).collect::<Result<_>>()?
+    };
+    #[cfg(not(feature = "rayon"))]
+    let sums: Vec<Vec<[f64; 6]>> = runs.iter().map(one).collect::<Result<_>>()?;
+    let flat: Vec<[f64; 6]> = sums.into_iter().flatten().collect();
+    Ok(std::array::from_fn(|channel| flat.iter().map(|sums| sums[channel]).collect()))
+}
+
+/// Errors of some models on the same blocks.
+pub(super) struct Judgement {
+    /// Samples of each block.
+    pub counts: Vec<usize>,
+    /// Of each model.
+    pub errors: Vec<Errors>,
+}
+
+/// Squared errors of each model on the judged blocks; `None` without a sample.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub(super) fn judged_errors(
+    flights: &[Flight],
+    models: &[Model],
+    halves: &Halves,
+    block_s: f64,
+    correlation: f64,
+) -> Result<Option<Judgement>> {
+    let cut = blocks(flights, &halves.judged(), block_s);
+    if cut.is_empty() {
+        return Ok(None);
+    }
+    let counts = cut.iter().map(|block| block.end - block.start).collect();
+    let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
+    let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
+    let one = |model: &Model| prediction_errors(&engine, &halves.met(flights, model, correlation)?);
+    Ok(Some(Judgement { counts, errors: models.iter().map(one).collect::<Result<_>>()? }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::candidate::with;
+    use super::super::gram::tests::{model, near, noise, whole};
+    use super::*;
+    use crate::physics::catalogue;
+
+    /// A model whose every number acts.
+    fn flying() -> Model {
+        let mut model = model();
+        model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients).for_each(|coefficient| coefficient.value = -0.5);
+        model
+    }
+
+    /// Flights whose forward velocity is recorded with a bias of their own, and a little noise; and the model that knows of biases.
+    fn biased(biases: &[f64]) -> Result<(Vec<Flight>, Model)> {
+        let mut flights = noise(11, &vec![8000; biases.len()]);
+        let bias = catalogue::definition("sensor_bias").map(|definition| definition.effect(4.58, 0.8)).expect("in the catalogue");
+        let mut truth = with(&flying(), &bias);
+        let named: std::collections::BTreeMap<String, f64> =
+            flights.iter().map(|flight| flight.name.clone()).zip(biases.iter().copied()).collect();
+        truth.effects.last_mut().expect("it has effects").coefficients[0].by_flight = Some(named);
+        for flight in &mut flights {
+            let mut accelerations = truth.predict(flight)?;
+            for (values, target) in accelerations.iter_mut().zip(Column::TARGETS) {
+                values.iter_mut().zip(flight.column(target)).for_each(|(value, noise)| *value += 0.02 * noise);
+            }
+            *flight = flight.with_accelerations(&accelerations)?;
+        }
+        Ok((flights, with(&flying(), &bias)))
+    }
+
+    #[test]
+    fn a_new_flight_is_judged_on_its_second_half_by_every_model() -> Result<()> {
+        let biases = [0.3, -0.2];
+        let (flights, knows) = biased(&biases)?;
+        let models = [flying(), knows.clone()];
+        let halves = Halves::of(&flights, &models, &whole(&flights));
+        assert!(halves.seen.is_empty());
+        let ends: Vec<[usize; 2]> =
+            halves.first.iter().zip(&halves.second).map(|(first, second)| [first.end, second.start]).collect();
+        assert_eq!(ends, [[4000, 4000]; 2]);
+        let met = halves.met(&flights, &knows, 100.0)?;
+        let found = met.effect("sensor_bias").and_then(|effect| effect.coefficients.first()?.by_flight.clone()).unwrap_or_default();
+        for (flight, bias) in flights.iter().zip(biases) {
+            // Shrunk a little by what is usual.
+            let value = found.get(&flight.name).copied().unwrap_or(f64::NAN);
+            assert!((value - bias).abs() < 0.1 * bias.abs(), "{value} for {bias}");
+        }
+        let judged = judged_errors(&flights, &models, &halves, 10.0, 100.0)?.expect("two halves");
+        assert_eq!(judged.counts.iter().sum::<usize>(), 8000);
+        let sums: Vec<f64> = judged.errors.iter().map(|errors| errors[0].iter().sum()).collect();
+        assert!(sums[1] < 0.1 * sums[0], "{sums:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn a_flight_whose_numbers_are_known_is_judged_whole() -> Result<()> {
+        let (flights, mut knows) = biased(&[0.3, -0.2])?;
+        for coefficient in &mut knows.effects.last_mut().expect("it has effects").coefficients {
+            coefficient.by_flight = Some(flights.iter().map(|flight| (flight.name.clone(), 0.0)).collect());
+        }
+        let halves = Halves::of(&flights, &[flying(), knows], &whole(&flights));
+        assert_eq!((halves.seen.len(), halves.first.len(), halves.second.len()), (2, 0, 0));
+        Ok(())
+    }
+
+    #[test]
+    fn errors_of_predictions_are_those_of_predicting() -> Result<()> {
+        let flights = noise(3, &[3000, 1700]);
+        let halves = Halves::of(&flights, &[model()], &whole(&flights));
+        let engine = halves.engine(&flights, 5.0, 100.0);
+        let errors = prediction_errors(&engine, &model())?;
+        for (index, block) in engine.blocks.iter().enumerate() {
+            let flight = &flights[block.flight];
+            let predicted = model().predict(flight)?;
+            for (channel, values) in predicted.iter().enumerate() {
+                let measured = &flight.column(Column::TARGETS[channel])[block.start..block.end];
+                let sum: f64 = measured.iter().zip(&values[block.start..block.end]).map(|(y, f)| (y - f).powi(2)).sum();
+                assert!(near(&[errors[channel][index]], &[sum]));
+            }
+        }
+        Ok(())
+    }
+}
