@@ -113,11 +113,20 @@ impl Search<'_> {
             }
             round += 1;
         };
-        // The numbers and their intervals rest on all that was searched.
+        Ok(Backward { model: self.refitted(&model, &[])?, needed, needless: gone })
+    }
+
+    /// A model without some effects, its numbers and their intervals from all that was searched.
+    ///
+    /// # Errors
+    /// As [`Search::backward_road`].
+    pub(super) fn refitted(&self, model: &Model, without: &[String]) -> Result<Model> {
+        let mut model = model.clone();
+        model.effects.retain(|effect| !without.contains(&effect.name));
         let whole = self.even((f64::INFINITY, 1), LONG_BLOCK_S);
         let mut point = Point::at(&whole, Point::fitted(&whole, model, STEPS[2])?, Vec::new())?;
         point.note_intervals(&point.folds(&whole, &[]).ok_or_else(undetermined)?);
-        Ok(Backward { model: point.model, needed, needless: gone })
+        Ok(point.model)
     }
 
     /// The same search on as much of the flights as judges effects, where there is at least twice as much.

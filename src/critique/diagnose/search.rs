@@ -99,15 +99,22 @@ impl Search<'_> {
         if known < MANY { MANY - known } else { MANY }
     }
 
-    pub(super) fn forward(&self, before: &Model, candidates: &[Candidate]) -> Result<(Vec<Found>, Vec<CandidateReport>)> {
+    /// Adds one effect after the other; `most` of them, or as many as there are until it is time to begin from the other end: then nothing is
+    /// said of the others.
+    pub(super) fn forward(
+        &self,
+        before: &Model,
+        candidates: &[Candidate],
+        most: Option<usize>,
+    ) -> Result<(Vec<Found>, Vec<CandidateReport>)> {
         let mut model = before.clone();
         let mut found: Vec<Found> = Vec::new();
         // Gains of all that passed at the last step.
         let mut earlier: BTreeMap<String, f64> = BTreeMap::new();
         let enough = Self::enough(before);
-        let most = self.options.max_effects.unwrap_or(enough);
+        let limit = most.unwrap_or(enough);
         loop {
-            if self.options.max_effects.is_none() && found.len() == enough {
+            if most.is_none() && found.len() == enough {
                 return Ok((found, Vec::new()));
             }
             let open: Vec<&Candidate> = candidates.iter().filter(|candidate| model.effect(&candidate.id).is_none()).collect();
@@ -120,12 +127,12 @@ impl Search<'_> {
             for scored in &mut scored {
                 scored.rival = found.iter().find(|found| found.is_flawed_by(scored, &mse)).map(|found| found.step.effect.clone());
             }
-            if found.len() < most {
+            if found.len() < limit {
                 self.refine_contenders(&base, &mut scored)?;
             }
             let passing: Vec<&Scored<'_>> = scored.iter().filter(|scored| scored.passes(self.largest_p)).collect();
             let best = passing.iter().max_by(|left, right| left.gain.total_cmp(&right.gain));
-            let Some(best) = best.filter(|_| found.len() < most) else {
+            let Some(best) = best.filter(|_| found.len() < limit) else {
                 let mut reports = self.reports(&open, &scored);
                 reports.splice(0..0, self.backward(&mut found, before)?);
                 return Ok((found, reports));

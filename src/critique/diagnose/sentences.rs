@@ -289,6 +289,13 @@ pub fn both_roads(tried: usize, forward: &[String], dropped: &[String]) -> Strin
     }
 }
 
+/// Why there was one road only where two were wanted.
+pub fn one_road(why: &str) -> String {
+    format!(
+        "much is missing at once, but all effects together cannot be fitted: {why}; so they were looked for one after the other"
+    )
+}
+
 /// Little beside an accepted effect that may only be imperfect.
 pub fn mends(rival: &str) -> String {
     format!("little beside what `{rival}` removed: it may only mend its form")

@@ -8,6 +8,7 @@ use super::engine::{Engine, permuted_folds};
 use super::failure::{Measured, failure};
 use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
+use super::own::prediction_errors;
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
 use super::search::{Found, Search};
@@ -15,10 +16,13 @@ use super::significance::Flips;
 use super::signs::wrong_signs;
 use super::{sentences, signs, suggest};
 use crate::critique::unknown::Unknown;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
 use crate::physics::{Effect, Model};
 use std::time::Instant;
+
+/// Effects that are looked for one after the other, at most, where they cannot be fitted at once.
+const MOST_FORWARD: usize = 6;
 
 /// How a search is done.
 #[derive(Clone, Debug)]
@@ -139,25 +143,35 @@ struct Heard {
     found: Vec<Found>,
     left: Vec<CandidateReport>,
     unknown: Vec<Unknown>,
-    /// How both roads went, where both were taken. What was found then stands in one model.
+    /// How both roads went, where both were taken.
     roads: Option<String>,
+    /// Whether what was found was found at once, and stands in one model.
+    at_once: bool,
 }
 
 impl Search<'_> {
     /// The whole search: forward, what the rest depends on, stand-ins taken back, intervals.
     fn hear(&self, ground: &Ground<'_>, candidates: &[Candidate]) -> Result<Heard> {
         let before = ground.before;
-        let is_many = |found: &[Found]| self.options.max_effects.is_none() && found.len() == Self::enough(before);
+        let limit = self.options.max_effects;
+        let is_many = |found: &[Found]| limit.is_none() && found.len() == Self::enough(before);
         // Where much is missing, a part of long flights shows it as well.
-        if let Some(part) = self.part().filter(|_| self.options.max_effects.is_none()) {
-            let (found, _) = part.forward(before, candidates)?;
-            if is_many(&found) {
-                return self.hear_all(ground, candidates, &found);
-            }
-        }
-        let (mut found, mut left) = self.forward(before, candidates)?;
+        let part = self.part().filter(|_| limit.is_none());
+        let of_part = part.map(|part| part.forward(before, candidates, None)).transpose()?;
+        let (mut found, mut left) = match of_part.filter(|(found, _)| is_many(found)) {
+            Some(of_part) => of_part,
+            None => self.forward(before, candidates, limit)?,
+        };
+        let mut roads = None;
         if is_many(&found) {
-            return self.hear_all(ground, candidates, &found);
+            match self.hear_all(ground, candidates, &found) {
+                // Some effect cannot be fitted beside all others: what one after the other brings is still worth having.
+                Err(Error::Undetermined(why)) => {
+                    (found, left) = self.forward(before, candidates, Some(MOST_FORWARD))?;
+                    roads = Some(sentences::one_road(&why));
+                }
+                heard => return heard,
+            }
         }
         let fitted = |found: &[Found]| found.last().map_or(before, |last| &last.model).clone();
         let unknown_of = |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
@@ -169,7 +183,7 @@ impl Search<'_> {
             unknown = unknown_of(&fitted(&found))?;
         }
         self.intervals(&mut found)?;
-        Ok(Heard { found, left, unknown, roads: None })
+        Ok(Heard { found, left, unknown, roads, at_once: false })
     }
 
     /// The search from the other end: everything at once, the needless left out, what the rest depends on. `first` is what the forward search
@@ -187,19 +201,29 @@ impl Search<'_> {
         let refused: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.inapplicable.is_some()).collect();
         left.extend(self.reports(&refused, &[]));
         let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
-        Ok(Heard { found, left, unknown, roads: Some(roads) })
+        let stand_ins = self.stand_ins_of(&found, [ground.before, &model], &unknown)?;
+        if stand_ins.is_empty() {
+            return Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true });
+        }
+        left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
+        let model = self.refitted(&model, &stand_ins)?;
+        let needed = needed.iter().filter(|judged| !stand_ins.contains(&judged.effect));
+        let mut found: Vec<Found> = needed.filter_map(|judged| self.needed(judged, &model)).collect();
+        self.judge_signs(&model, &mut found);
+        let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
+        Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true })
     }
 
     /// From what was found to the verdict: confirmation, suggestions tried, where the rest of the error lies, words.
     fn conclude(&self, ground: &Ground<'_>, heard: Heard, mut diagnosis: Diagnosis) -> Result<Outcome> {
         let begun = Instant::now();
-        let Heard { mut found, left, unknown, roads } = heard;
+        let Heard { mut found, left, unknown, roads, at_once } = heard;
         let Ground { flights, locked, part, block_s, .. } = *ground;
         let mut models = vec![ground.before.clone()];
         // Effects that were found at once have one model, and one bar.
-        let steps = if roads.is_some() { found.len().saturating_sub(1) } else { 0 };
+        let steps = if at_once { found.len().saturating_sub(1) } else { 0 };
         models.extend(found.iter().skip(steps).map(|found| found.model.clone()));
-        diagnosis.both_roads = roads.is_some();
+        diagnosis.both_roads = at_once;
         diagnosis.notes.extend(roads);
         let after = models.last().cloned().unwrap_or_else(|| ground.before.clone());
         diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
@@ -233,6 +257,24 @@ impl Search<'_> {
         diagnosis.summary = summary(&diagnosis);
         diagnosis.seconds += begun.elapsed().as_secs_f64();
         Ok(Outcome { diagnosis, model: after })
+    }
+}
+
+impl Search<'_> {
+    /// The same of effects that were found at once, by what the models before and after predict.
+    fn stand_ins_of(&self, found: &[Found], models: [&Model; 2], unknown: &[Unknown]) -> Result<Vec<String>> {
+        if unknown.is_empty() {
+            return Ok(Vec::new());
+        }
+        let rows = self.engine.rows().max(1) as f64;
+        let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
+        let [whole, left] = [mse(models[0])?, mse(models[1])?];
+        let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
+        let is_one = |found: &&Found| {
+            let effect = found.model.effect(&found.step.effect);
+            effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
+        };
+        Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
     }
 }
 
