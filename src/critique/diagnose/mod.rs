@@ -1,8 +1,10 @@
-//! Which physical effect is missing, and how sure is that? A grouped, constrained forward search over the catalogue.
+//! Which physical effects are missing, and how sure is that? A grouped, constrained search over the catalogue: one effect after the other, and
+//! where many are missing from the other end, all at once and the needless left out (`backward`, on the algebra of `joint`).
 //!
 //! Every effect is one candidate with its physical bounds. It is judged by the error on blocks of flight that its numbers have not
 //! seen, by a p-value from sign flips of blocks, and by whether it removes enough to be worth while; then once more on flights that the
-//! whole search has not seen. What is searched is in `candidate`, what is fitted in `fit`, what is chance in `significance`.
+//! whole search has not seen. What is searched is in `candidate`, what is fitted in `fit` and `joint`, what is chance in `significance`, what each flight
+//! has for itself in `own`.
 //!
 //! Nothing here reads a file or draws a picture, and nothing knows of the built-in simulator.
 

@@ -55,6 +55,10 @@ pub fn unseen(kept: Kept, duration_s: f64) -> String {
     format!("{duration_s:.0} s of {} that no search has seen", kept.words())
 }
 
+/// What flights that no fit has seen are judged on, where a model has numbers of each flight.
+pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its first half. The same for \
+     every row.";
+
 /// The verdict in a few words, the head of everything that is said.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let confirmation = diagnosis.confirmation.filter(|_| diagnosis.verdict == Verdict::EffectsMissing);

@@ -131,6 +131,11 @@ fn table(f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, [String; 6])])
     rows.iter().try_for_each(|(name, cells)| writeln!(f, "   {:<28}{}", clipped(name, 28), line(cells)))
 }
 
+/// On what part of the flights a table rests, where it is not the whole.
+fn halves(f: &mut fmt::Formatter<'_>, locked: &Locked) -> fmt::Result {
+    if locked.own_from_first_half { writeln!(f, "{}", wrapped("   ", sentences::OWN_FROM_FIRST_HALF)) } else { Ok(()) }
+}
+
 /// What was removed on the kept part by channel: its share with interval and, with a floor, the floor and the share of what lies above it.
 fn removed(locked: &Locked) -> Vec<(String, [String; 6])> {
     let fall = |channel: usize| locked.mse_fall.get(Column::TARGETS[channel].name());
@@ -170,6 +175,7 @@ fn confirmation(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Lock
     };
     let rows: Vec<_> = locked.waterfall.iter().enumerate().map(bar).chain(removed(locked)).collect();
     table(f, "RMSE", &rows)?;
+    halves(f, locked)?;
     sentences::removable(locked)
         .filter(|_| !locked.mse_fall.is_empty())
         .map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))
@@ -184,6 +190,7 @@ fn before_and_after(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &
     let added = if count == 1 { "one effect added".into() } else { format!("{count} effects added") };
     writeln!(f, "\n{}", wrapped("", &format!("RMSE on {}; {added}", sentences::unseen(locked.kept, locked.duration_s))))?;
     table(f, "", &rows)?;
+    halves(f, locked)?;
     sentences::removable(locked).map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))
 }
 

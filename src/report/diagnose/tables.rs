@@ -5,7 +5,7 @@ use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
 use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
-use crate::critique::diagnose::sentences::{removable, share, tried, unseen, worth};
+use crate::critique::diagnose::sentences::{OWN_FROM_FIRST_HALF, removable, share, tried, unseen, worth};
 use crate::critique::diagnose::{CandidateReport, Diagnosis, Locked, Status, Step, number_remark};
 use crate::critique::table::{Kind, significant};
 use crate::error::{Error, Result};
@@ -232,6 +232,9 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
          not fall here, on the part that no search has seen, speaks against it."
     };
     let mut words = Vec::new();
+    if report.told().iter().any(|diagnosis| diagnosis.locked.as_ref().is_some_and(|locked| locked.own_from_first_half)) {
+        words.push(Part::Text(OWN_FROM_FIRST_HALF.into()));
+    }
     let unknown = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref());
     let measured = |channel: usize| {
         let name = Column::TARGETS[channel].name();
