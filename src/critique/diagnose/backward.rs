@@ -5,7 +5,7 @@ use super::account::selection;
 use super::candidate::{Candidate, with};
 use super::describe::decisive_flight;
 use super::engine::{Engine, permuted_folds};
-use super::gates::{BLOCK_S, LOOSE, SMALLEST_FALL};
+use super::gates::{BLOCK_S, LOOSE, SMALLEST_AMPLITUDE, SMALLEST_AMPLITUDE_OF_RIVAL, SMALLEST_FALL};
 use super::gram::blocks;
 use super::joint::{Errors, Folds, Point, undetermined};
 use super::score::{by_flight_of, gains_of};
@@ -50,6 +50,10 @@ pub(super) struct Judged {
     pub looseness: f64,
     /// A flight without which its gain would be gone.
     pub rests_on: Option<String>,
+    /// Whether its numbers belong to each flight.
+    by_flight: bool,
+    /// An effect whose form it may only mend.
+    pub mends: Option<String>,
 }
 
 impl Judged {
@@ -59,6 +63,28 @@ impl Judged {
 
     pub fn largest_fall(&self) -> f64 {
         self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// What it removes of a channel's error, in units of what is left with it.
+    fn removed(&self, channel: usize) -> f64 {
+        self.falls.get(&channel).map_or(0.0, |fall| fall / (1.0 - fall))
+    }
+
+    /// The effect whose form this one may only mend: in every channel in which it is worth while, some other removes so much more that
+    /// its form need be wrong by little. The form of a property of each flight is not in doubt.
+    fn flaw_of<'j>(&self, others: impl Iterator<Item = &'j Judged> + Clone) -> Option<&'j str> {
+        let notes = |kind: &str| catalogue::definition(kind).and_then(|definition| definition.notes);
+        let listed = |one: &str, other: &str| notes(one).is_some_and(|notes| notes.confusable_with.contains(&other));
+        let stronger = |channel: usize| {
+            others.clone().filter(|other| other.effect != self.effect && !other.by_flight).find(|other| {
+                let related = listed(&self.effect, &other.effect) || listed(&other.effect, &self.effect);
+                let amplitude = if related { SMALLEST_AMPLITUDE_OF_RIVAL } else { SMALLEST_AMPLITUDE };
+                self.removed(channel) < amplitude * amplitude * other.removed(channel)
+            })
+        };
+        let worthy = self.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
+        let found: Vec<Option<&Judged>> = worthy.map(|(&channel, _)| stronger(channel)).collect();
+        found.iter().all(Option::is_some).then(|| found.first().copied().flatten().map(|other| other.effect.as_str()))?
     }
 
     /// Whether these flights could show it.
@@ -176,16 +202,29 @@ impl Road<'_> {
         let mut base = point.held_out(&self.engine, &folds, &[]).ok_or_else(undetermined)?;
         // Those that were needless when they were last looked at; empty is all.
         let mut doubtful: Vec<usize> = Vec::new();
+        // What each was worth when it was last needed.
+        let mut worth: BTreeMap<usize, Judged> = BTreeMap::new();
         loop {
             let open = (0..point.optional.len()).filter(|place| !pruned.absent.contains(place));
             let looked: Vec<usize> = if doubtful.is_empty() { open.collect() } else { doubtful.clone() };
             let was_all = doubtful.is_empty();
             let judged = self.judged(point, (&folds, &base), &pruned.absent, &looked).ok_or_else(undetermined)?;
             let (mut needless, needed): (Vec<_>, Vec<_>) = judged.into_iter().partition(|(_, judged)| !self.is_needed(judged));
+            needless.iter().for_each(|entry| drop(worth.remove(&entry.0)));
+            worth.extend(needed);
+            if needless.is_empty() && was_all {
+                // Only beside all that are needed does it show what mends the form of another.
+                let flaws: Vec<(usize, String)> =
+                    worth.iter().filter_map(|(&place, judged)| Some((place, judged.flaw_of(worth.values())?.to_owned()))).collect();
+                for (place, other) in flaws {
+                    let judged = worth.remove(&place).expect("listed above");
+                    needless.push((place, Judged { mends: Some(other), ..judged }));
+                }
+            }
             needless.sort_by(|left, right| left.1.gain().total_cmp(&right.1.gain()));
             if needless.is_empty() {
                 if was_all {
-                    pruned.needed = needed.into_iter().map(|entry| entry.1).collect();
+                    pruned.needed = worth.into_values().collect();
                     pruned.needed.sort_by(|left, right| right.gain().total_cmp(&left.gain()));
                     note_looseness(point, &looseness, &mut pruned);
                     return Ok(pruned);
@@ -193,7 +232,8 @@ impl Road<'_> {
                 doubtful.clear();
                 continue;
             }
-            let mut count = needless.len().div_ceil(2);
+            // What mends a form costs something, and leaves by itself.
+            let mut count = if needless.iter().any(|entry| entry.1.mends.is_some()) { 1 } else { needless.len().div_ceil(2) };
             loop {
                 let batch: Vec<usize> = needless[..count].iter().map(|entry| entry.0).collect();
                 let without: Vec<usize> = pruned.absent.iter().chain(&batch).copied().collect();
@@ -204,7 +244,7 @@ impl Road<'_> {
                 let lost: f64 = gains_of(&errors, &base, &[true; 6]).iter().sum();
                 let each: f64 = needless[..count].iter().map(|entry| entry.1.gain().max(0.0)).sum();
                 if count == 1 || lost <= each + SLACK {
-                    doubtful = needless[count..].iter().map(|entry| entry.0).collect();
+                    doubtful = needless[count..].iter().filter(|entry| entry.1.mends.is_none()).map(|entry| entry.0).collect();
                     pruned.needless.extend(needless.drain(..count).map(|entry| entry.1));
                     (pruned.absent, base) = (without, errors);
                     if let Some(new) = new_folds {
@@ -256,7 +296,8 @@ impl Road<'_> {
         let p_value = self.flips.p_value_of_sums(&[if by_flight { by_flight_of(&self.engine, &gains) } else { gains.clone() }]);
         let falls = (0..6).filter(|&channel| channels[channel]).map(fall).collect();
         let rests_on = decisive_flight(&self.engine, &gains);
-        Some(Judged { effect: effect.name.clone(), falls, p_value, gains, looseness: f64::INFINITY, rests_on })
+        let name = effect.name.clone();
+        Some(Judged { effect: name, falls, p_value, gains, looseness: f64::INFINITY, rests_on, by_flight, mends: None })
     }
 }
 

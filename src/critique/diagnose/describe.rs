@@ -59,6 +59,7 @@ impl Search<'_> {
     /// What is said of an effect that the backward road leaves out.
     pub(super) fn needless(&self, judged: &Judged) -> CandidateReport {
         let status = match () {
+            () if judged.mends.is_some() => Status::SamePhysics,
             () if !judged.is_excited() => Status::NotExcited,
             () if judged.largest_fall() < SMALLEST_FALL => Status::Negligible,
             () => Status::NotSignificant,
@@ -73,6 +74,7 @@ impl Search<'_> {
             p_value: Some(judged.p_value),
             detection_limit_mse_fall: None,
             reason: match status {
+                Status::SamePhysics => sentences::mends(judged.mends.as_deref().unwrap_or("?")),
                 Status::NotExcited => sentences::loose(judged.looseness),
                 Status::Negligible => too_little(),
                 _ => sentences::could_be_chance(judged.p_value, self.largest_p),

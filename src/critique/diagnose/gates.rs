@@ -41,3 +41,8 @@ pub(super) const LOOSE: f64 = 0.5;
 /// With so many effects missing a search that adds one after the other is held against one that begins with all: forms interact, and each
 /// that is missing hides the others.
 pub(super) const MANY: usize = 3;
+/// A textbook form is right to about this share of the amplitude of what its effect does: what another removes in the same channel, as a root,
+/// has to be more, or it may only mend the form …
+pub(super) const SMALLEST_AMPLITUDE: f64 = 0.05;
+/// … and more than this where the two are known to be mistaken for each other.
+pub(super) const SMALLEST_AMPLITUDE_OF_RIVAL: f64 = 0.15;
