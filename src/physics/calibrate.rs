@@ -207,17 +207,21 @@ fn started(model: &Model, rows: &Rows<'_>) -> Result<Model> {
             effect.coefficients = found.coefficients;
         }
     }
-    for effect in current.effects.iter_mut().filter(|effect| effect.enabled) {
-        let Some(definition) = catalogue::definition(&effect.kind) else { continue };
-        if effect.parameters.iter().any(|parameter| !parameter.fixed) {
-            for coefficient in effect.coefficients.iter_mut().filter(|c| c.value == 0.0 && c.by_flight.is_none()) {
-                let usual = definition.coefficient(&coefficient.name).and_then(|known| known.expected);
-                coefficient.value =
-                    START * usual.map_or(1.0, |[low, high]| if low < 0.0 && 0.0 < high { high } else { 0.5 * (low + high) });
-            }
-        }
-    }
+    current.effects.iter_mut().filter(|effect| effect.enabled).for_each(off_zero);
     Ok(current)
+}
+
+/// Gives the amplitudes that are zero a tenth of their usual size, if the effect has shapes or times: steps then lead somewhere.
+pub(crate) fn off_zero(effect: &mut Effect) {
+    let Some(definition) = catalogue::definition(&effect.kind) else { return };
+    if effect.parameters.iter().all(|parameter| parameter.fixed) {
+        return;
+    }
+    for coefficient in effect.coefficients.iter_mut().filter(|c| c.value == 0.0 && c.by_flight.is_none()) {
+        let usual = definition.coefficient(&coefficient.name).and_then(|known| known.expected);
+        coefficient.value =
+            START * usual.map_or(1.0, |[low, high]| if low < 0.0 && 0.0 < high { high } else { 0.5 * (low + high) });
+    }
 }
 
 /// Whether an effect acts through the numbers of others: it changes a signal, reads one that the baseline makes, or reads a coefficient.

@@ -26,6 +26,7 @@ mod toml_section;
 mod vehicle;
 
 pub use baseline::PAPER;
+pub(crate) use calibrate::off_zero;
 pub use calibrate::{Calibration, Estimate, calibrate};
 pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
 pub use definition::{

@@ -13,11 +13,8 @@ use super::search::Search;
 use super::significance::Flips;
 use crate::error::Result;
 use crate::flight::Span;
-use crate::physics::{Effect, Model, catalogue};
+use crate::physics::{Effect, Model, catalogue, off_zero};
 use std::collections::BTreeMap;
-
-/// Share of its usual size at which an amplitude starts whose effect has shapes or times: at 0 these have no slope.
-const START: f64 = 0.1;
 
 /// Time of flight on which everything is fitted first, s, and flights at least: many steps on it cost as much as few on all.
 const QUICK: (f64, usize) = (700.0, 10);
@@ -118,7 +115,9 @@ impl Search<'_> {
     pub(super) fn backward_road(&self, before: &Model, candidates: &[Candidate]) -> Result<Backward> {
         let mut model = before.clone();
         for candidate in candidates.iter().filter(|candidate| candidate.inapplicable.is_none()) {
-            model = with(&model, &started(&candidate.effect));
+            let mut effect = candidate.effect.clone();
+            off_zero(&mut effect);
+            model = with(&model, &effect);
         }
         let may_go = |effect: &Effect| is_found(effect) || candidates.iter().any(|candidate| candidate.id == effect.name);
         let optional = |model: &Model| (0..model.effects.len()).filter(|&index| may_go(&model.effects[index])).collect::<Vec<_>>();
@@ -311,18 +310,4 @@ fn note_looseness(point: &Point, looseness: &[f64], pruned: &mut Pruned) {
 /// Whether a search put an effect into the model.
 pub(super) fn is_found(effect: &Effect) -> bool {
     effect.added_by.as_deref() == Some("diagnose")
-}
-
-/// An effect with amplitudes from which steps lead somewhere.
-fn started(effect: &Effect) -> Effect {
-    let mut effect = effect.clone();
-    let Some(definition) = catalogue::definition(&effect.kind) else { return effect };
-    if effect.parameters.iter().any(|parameter| !parameter.fixed) {
-        for coefficient in effect.coefficients.iter_mut().filter(|coefficient| coefficient.by_flight.is_none()) {
-            let usual = definition.coefficient(&coefficient.name).and_then(|known| known.expected);
-            coefficient.value =
-                START * usual.map_or(1.0, |[low, high]| if low < 0.0 && 0.0 < high { high } else { 0.5 * (low + high) });
-        }
-    }
-    effect
 }

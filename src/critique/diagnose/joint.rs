@@ -9,9 +9,10 @@ use super::design::{Design, Free, Layout};
 use super::engine::{Engine, FOLDS};
 use super::fit::Reduced;
 use super::gram::grams;
+use super::known::{Known, known};
 use super::own::prediction_errors;
 use crate::error::{Error, Result};
-use crate::physics::{Model, Wanted, catalogue};
+use crate::physics::{Model, Wanted};
 use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
@@ -24,17 +25,6 @@ const LARGEST_DAMPING: f64 = 1e8;
 /// A step has settled when it changes twice the logarithm of the likelihood by less than this, in independent samples: no
 /// choice between effects hangs on so little.
 const SETTLED: f64 = 0.5;
-
-/// What is known of a number before any flight.
-#[derive(Clone, Copy, Debug)]
-struct Known {
-    centre: f64,
-    /// Standard deviation; `None` where nothing is presumed.
-    size: Option<f64>,
-    bounds: [f64; 2],
-    /// Whether each flight has its own.
-    is_local: bool,
-}
 
 /// A model at its numbers, and its neighbourhood.
 pub(super) struct Point {
@@ -470,26 +460,6 @@ impl Point {
     }
 }
 
-impl Known {
-    /// Weight in independent samples, with `damping` that holds the number at its present value.
-    fn precision(&self, damping: f64, now: f64) -> f64 {
-        match self.size {
-            Some(size) => (1.0 + damping) / (size * size),
-            None => damping / if now == 0.0 { 1.0 } else { now * now },
-        }
-    }
-
-    fn misfit(&self, value: f64) -> f64 {
-        self.size.map_or(0.0, |size| ((value - self.centre) / size).powi(2))
-    }
-
-    /// How far a value is beyond its bounds, in usual sizes; 0 on one of them, negative within.
-    fn excess(&self, value: f64) -> f64 {
-        let [low, high] = self.bounds;
-        (low - value).max(value - high) / self.size.unwrap_or(1.0)
-    }
-}
-
 /// Why there is no next step.
 pub(super) fn undetermined() -> Error {
     Error::Undetermined("the flights do not determine the numbers of the model's own effects".into())
@@ -512,34 +482,6 @@ fn runs<'a>(engine: &'a Engine<'_>) -> impl Iterator<Item = std::ops::Range<usiz
     })
 }
 
-/// Usual spread of a number that each flight has for itself.
-pub(super) fn size_of(model: &Model, effect: usize, coefficient: usize) -> f64 {
-    known(model, Free { effect, coefficient }).size.unwrap_or(1.0)
-}
-
-/// What is known of a number of a model before any flight. Signs that physics fixes are kept: an effect that needs the other one stands in for
-/// something else.
-fn known(model: &Model, free: Free) -> Known {
-    let effect = &model.effects[free.effect];
-    let nothing = Known { centre: 0.0, size: None, bounds: [f64::NEG_INFINITY, f64::INFINITY], is_local: false };
-    let Some(number) = effect.number(free.coefficient) else { return nothing };
-    let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
-    let Some(definition) = definition else {
-        let is_local = number.by_flight.is_some();
-        return Known { size: is_local.then_some(1.0), is_local, ..nothing };
-    };
-    if let Some(known) = definition.coefficient(&number.name) {
-        let bounds = known.physical_sign().map_or(known.bounds, |(sign, _)| sign.bounds(known.bounds));
-        let usual = known.expected.map(|[low, high]| low.abs().max(high.abs()));
-        return Known { centre: 0.0, size: known.by_flight.or(usual), bounds, is_local: number.by_flight.is_some() };
-    }
-    let plain = definition.effect(model.mass_kg, model.rotor_radius_m);
-    let start = plain.parameters.iter().find(|parameter| parameter.name == number.name).map_or(0.0, |parameter| parameter.value);
-    let bounds = definition.parameter(&number.name).map_or(nothing.bounds, |known| known.bounds);
-    let half = 0.5 * (bounds[1] - bounds[0]);
-    Known { centre: start, size: half.is_finite().then_some(half), bounds, is_local: false }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::candidate::with;
@@ -547,7 +489,7 @@ mod tests {
     use super::super::gram::tests::{model, near, noise, whole};
     use super::*;
     use crate::flight::Flight;
-    use crate::physics::{Effect, calibrate};
+    use crate::physics::{Effect, calibrate, catalogue};
 
     fn engine(flights: &[Flight]) -> Engine<'_> {
         let blocks = blocks(flights, &whole(flights), 2.0);

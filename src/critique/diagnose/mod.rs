@@ -21,6 +21,7 @@ mod fit;
 mod gates;
 mod gram;
 mod joint;
+mod known;
 mod own;
 mod refine;
 mod report;

@@ -3,7 +3,8 @@
 
 use super::engine::{Engine, FOLDS};
 use super::gram::blocks;
-use super::joint::{Errors, size_of};
+use super::joint::Errors;
+use super::known::size_of;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};
 use crate::physics::{Columns, Model, Regressor, Wanted};
