@@ -3,6 +3,7 @@
 //! Every variant carries its operands and its message tells the person what to do next. Messages about input name the file,
 //! the line (1-based, the header is line 1), the column, what was found and what was expected.
 
+use phyture_kernels::level::{ENVIRONMENT_VARIABLE, LevelError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -111,6 +112,16 @@ pub enum Error {
 }
 
 impl Error {
+    /// An instruction set was asked for that is not there.
+    pub(crate) fn level(error: LevelError) -> Self {
+        Self::Config {
+            place: "environment".into(),
+            field: ENVIRONMENT_VARIABLE.into(),
+            found: error.to_string(),
+            expected: "a level of this processor, or nothing".into(),
+        }
+    }
+
     /// The kind of error in one word, for programs.
     pub const fn kind(&self) -> &'static str {
         match self {

@@ -6,8 +6,8 @@
 
 use phyture::critique::PerChannel;
 use phyture::critique::diagnose::{
-    CandidateReport, Confirmation, DependsOn, Diagnosis, Kept, Locked, Method, Number, Status, Step, TriedFormula, UnknownChannel,
-    Verdict, Worth,
+    Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Kept, Locked, Method, Number, Status, Step, TriedFormula,
+    UnknownChannel, Verdict, Worth,
 };
 use phyture::critique::shares::Share;
 use phyture::flight::{Column, Flight, Span, Targets};
@@ -101,7 +101,7 @@ fn found() -> Diagnosis {
             rmse_before: rmse(0.4567),
             rmse_after: rmse(0.3456),
             mse_fall: [("vz_dot".to_owned(), [0.427, 0.391, 0.463])].into(),
-            waterfall: vec![rmse(0.4567), rmse(0.3456)],
+            waterfall: bars(&["ground_effect"], &[rmse(0.4567), rmse(0.3456)]),
             ..Locked::default()
         }),
         method: Some(Method {
@@ -263,17 +263,23 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
     Ok(())
 }
 
+/// Bars that add one effect after the other.
+fn bars(effects: &[&str], errors: &[PerChannel]) -> Vec<Bar> {
+    let added = [Vec::new()].into_iter().chain(effects.iter().map(|effect| vec![(*effect).to_owned()]));
+    added.zip(errors).map(|(added, &rmse)| Bar { added, rmse, ..Bar::default() }).collect()
+}
+
 /// Two rounds, and what is told of them as one: with a floor and with what each effect is worth.
 #[test]
 fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> {
     let [before, after] = models();
     let rmse = |value: f64| PerChannel::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)]);
-    let of = |effect: &str, bars: [f64; 2]| {
+    let of = |effect: &str, errors: [f64; 2]| {
         let mut round = found();
         round.accepted = vec![effect.into()];
         round.steps[0].effect = effect.into();
         if let Some(locked) = &mut round.locked {
-            locked.waterfall = bars.map(rmse).into();
+            locked.waterfall = bars(&[effect], &errors.map(rmse));
         }
         round
     };
@@ -290,7 +296,7 @@ fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> 
         rmse_before: rmse(0.8764),
         rmse_after: rmse(0.4321),
         mse_fall: [("vz_dot".to_owned(), [0.757, 0.711, 0.803])].into(),
-        waterfall: [0.8764, 0.6543, 0.4321].map(rmse).into(),
+        waterfall: bars(&["ground_effect", "wind"], &[0.8764, 0.6543, 0.4321].map(rmse)),
         ..Locked::default()
     };
     locked.set_floor(PerChannel::new([0.29, 0.29, 0.2357, 0.29, 0.29, 0.29].map(Some)));

@@ -1,11 +1,11 @@
 //! Runs cases and writes a line for each.
 
 use crate::cases::{ALIENS, CONFUSABLE, FOREIGN, PAIRS, SINGLES, SIZES, Single};
-use phyture::critique::diagnose::{Diagnosis, Options, diagnose, textbook};
+use phyture::critique::diagnose::{Diagnosis, Met, Options, diagnose, met, textbook};
 use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet, Flight};
 use phyture::formula::Formula;
-use phyture::physics::{Model, evaluate};
+use phyture::physics::{Model, catalogue, evaluate};
 use phyture::sim::{INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -73,10 +73,8 @@ pub fn read(path: &Path) -> Result<Vec<Line>> {
 struct Bench<'a> {
     out: &'a Path,
     done: Vec<String>,
-    /// Mean squared errors of data without a hidden effect, by seed and level.
-    floors: BTreeMap<(u64, u8), [f64; 6]>,
-    /// Wind of level two; none for the shares.
-    calm: bool,
+    /// Mean squared errors of data without a hidden effect, by seed, level and whether there is wind beside it.
+    floors: BTreeMap<(u64, u8, bool), [f64; 6]>,
     minutes: f64,
 }
 
@@ -86,8 +84,23 @@ struct Hidden<'a> {
     alien: Option<(&'a str, &'a str)>,
 }
 
+impl Hidden<'_> {
+    /// Whether a wind blows beside what is hidden.
+    fn is_windy(&self, level: u8) -> bool {
+        level == 2 && !self.mechanisms.iter().any(|(id, _)| *id == "wind")
+    }
+}
+
 fn model() -> Model {
     Model::paper("sim", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M)
+}
+
+/// The same, knowing of wind.
+fn model_with_wind() -> Model {
+    let mut model = model();
+    let wind = catalogue::definition("wind").expect("in the catalogue");
+    model.effects.push(wind.effect(MASS_KG, ROTOR_RADIUS_M));
+    model
 }
 
 impl Bench<'_> {
@@ -99,7 +112,7 @@ impl Bench<'_> {
             level: if level == 1 { Level::ONE } else { Level::TWO },
             ..Simulation::default()
         };
-        if level == 2 && !self.calm && !hidden.mechanisms.iter().any(|(id, _)| *id == "wind") {
+        if hidden.is_windy(level) {
             simulation = simulation.hide("wind", 1.0)?;
         }
         for (id, scale) in &hidden.mechanisms {
@@ -113,9 +126,12 @@ impl Bench<'_> {
         Ok(set)
     }
 
-    fn mse(&self, set: &DataSet, split: &Split) -> Result<[f64; 6]> {
-        let (fitted, _) = phyture::physics::calibrate(&model(), &set.flights, &split.training)?;
-        Ok(fitted.rmse(&set.flights, &split.test)?.map(|error| error * error))
+    /// Of the baseline on flights that no search sees; where it blows with the wind that it finds.
+    fn mse(&self, set: &DataSet, split: &Split, is_windy: bool) -> Result<[f64; 6]> {
+        let model = if is_windy { model_with_wind() } else { model() };
+        let (fitted, _) = phyture::physics::calibrate(&model, &set.flights, &split.training)?;
+        let Met { models, judged, .. } = met(&set.flights, &[&fitted], &split.test)?;
+        Ok(models[0].rmse(&set.flights, &judged)?.map(|error| error * error))
     }
 
     fn case(&mut self, part: &str, size: &str, hidden: &Hidden<'_>, level: u8, seed: u64, known: Option<&Single>) -> Result<()> {
@@ -137,14 +153,15 @@ impl Bench<'_> {
         }
         let set = self.data(hidden, level, seed)?;
         let split = Split::for_search(&set.flights, seed);
-        let floor = match self.floors.get(&(seed, level)) {
+        let is_windy = hidden.is_windy(level);
+        let floor = match self.floors.get(&(seed, level, is_windy)) {
             Some(floor) => *floor,
             None if line.hidden == "null" => [0.0; 6],
             None => {
-                // What is left at best: the same session without the hidden effect. At level two without the wind as well.
-                let nothing = Hidden { mechanisms: vec![("wind", 0.0)], alien: None };
-                let floor = self.mse(&self.data(&nothing, level, seed)?, &split)?;
-                self.floors.insert((seed, level), floor);
+                // What is left at best: the same session without the hidden effect.
+                let mechanisms = if is_windy { Vec::new() } else { vec![("wind", 0.0)] };
+                let floor = self.mse(&self.data(&Hidden { mechanisms, alien: None }, level, seed)?, &split, is_windy)?;
+                self.floors.insert((seed, level, is_windy), floor);
                 floor
             }
         };
@@ -158,16 +175,8 @@ impl Bench<'_> {
         }
         let outcome =
             diagnose(&set.flights, &model(), &split.training, &split.test, "test", &Options { seed, ..Options::default() })?;
-        // The share is that of the hidden effect alone, so at level two it is taken from the same session without the wind.
-        let hidden_mse = match level {
-            2 if line.hidden != "null" => {
-                self.calm = true;
-                let calm = self.data(hidden, level, seed).and_then(|calm| self.mse(&calm, &split));
-                self.calm = false;
-                Some(calm?)
-            }
-            _ => None,
-        };
+        // The share is that of the hidden effect beside the wind.
+        let hidden_mse = if is_windy && line.hidden != "null" { Some(self.mse(&set, &split, true)?) } else { None };
         self.fill(&mut line, &outcome.diagnosis, &floor, hidden_mse, known);
         self.write(&line)
     }
@@ -246,7 +255,7 @@ fn wanted(id: &str, share: f64) -> (&str, f64) {
 /// Everything, resumable.
 pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     let done = read(out)?.iter().map(Line::key).collect();
-    let mut bench = Bench { out, done, floors: BTreeMap::new(), calm: false, minutes: 30.0 };
+    let mut bench = Bench { out, done, floors: BTreeMap::new(), minutes: 30.0 };
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
     let level = |seed: u64| if seed.is_multiple_of(2) { 1 } else { 2 };
     if asked("nulls") {
@@ -316,7 +325,7 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
 
 /// A few cases of each kind.
 pub fn few(out: &Path) -> Result<()> {
-    let mut bench = Bench { out, done: Vec::new(), floors: BTreeMap::new(), calm: false, minutes: 30.0 };
+    let mut bench = Bench { out, done: Vec::new(), floors: BTreeMap::new(), minutes: 30.0 };
     for seed in 1..5 {
         bench.case("null", "", &Hidden { mechanisms: Vec::new(), alien: None }, 1 + (seed % 2) as u8, seed, None)?;
     }

@@ -14,6 +14,7 @@ pub mod activation;
 pub mod adam;
 pub mod attention;
 pub mod batch_norm;
+pub mod columns;
 mod compiled;
 pub mod conv1d;
 pub mod conv1d_general;

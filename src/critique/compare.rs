@@ -150,6 +150,10 @@ pub struct Comparison {
     pub target: Targets,
     /// Where the windows come from.
     pub split: Part,
+    /// Whether some model has numbers of each flight: flights that no fit has seen are then judged on their second halves, those numbers being
+    /// found from the first; noted by whoever has the models.
+    #[serde(default)]
+    pub own_from_first_half: bool,
     /// Samples from one window to the next, the same for all models.
     #[serde(default = "one")]
     pub stride: usize,
@@ -223,6 +227,7 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
         models,
         target: if derived { Targets::Derived } else { Targets::Recorded },
         split,
+        own_from_first_half: false,
         stride: 1,
         blocks: groups.blocks.len(),
         floor: None,

@@ -32,6 +32,13 @@ pub struct Share {
     pub ci95: Option<[f64; 2]>,
 }
 
+impl Share {
+    /// What it is at least: the lower end of its interval, or itself where there is none.
+    pub fn at_least(&self) -> f64 {
+        self.ci95.map_or(self.share, |[low, _]| low)
+    }
+}
+
 /// One part's share of each channel, and of all channels together: squared errors over the channel's variance, summed over the
 /// channels. `None` where the reference has no error, or a prediction is not finite.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -261,9 +261,16 @@ pub const LEGEND: &str = "* best of the column (of the row, by manoeuvre and reg
 pub const FLOOR: &str = "Floor: what is left of the recorded accelerations without their explainable part, gusts, turbulence and noise; no model can \
                          remove it.";
 
+/// What flights that no fit has seen are judged on, where a model has numbers of each flight.
+pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its first half. The same for \
+     every row.";
+
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", wrapped("", &self.basis()))?;
+        if self.own_from_first_half {
+            writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
+        }
         if let Some(caution) = self.caution() {
             writeln!(f, "{}", wrapped("", &caution))?;
         }

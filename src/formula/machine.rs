@@ -3,11 +3,11 @@
 
 use super::graph::{Graph, Kind, Node, Recall, whole_power};
 use super::memory::{MAX_DELAY_SAMPLES, Memory};
-use super::operation::{History, Operation};
+use super::operation::{History, Operation, whole_power_of_column};
 use super::{Formula, Value};
 use crate::error::{Error, Result};
+use phyture_kernels::Level;
 use std::borrow::Cow;
-use std::collections::HashMap;
 
 /// Longest run of samples that is evaluated at once …
 const LONGEST_BLOCK: usize = 512;
@@ -41,13 +41,15 @@ pub struct Machine {
     /// Index in the graph's inputs of each column that is read.
     inputs: Vec<usize>,
     block: usize,
+    level: Level,
 }
 
 /// Gives out columns, and takes back those that are no longer read.
 struct Slots {
     count: usize,
     free: Vec<Slot>,
-    of: HashMap<Node, Slot>,
+    /// By node.
+    of: Vec<Option<Slot>>,
 }
 
 impl Slots {
@@ -56,8 +58,12 @@ impl Slots {
             self.count += 1;
             self.count as Slot - 1
         });
-        self.of.insert(node, slot);
+        self.of[node.0 as usize] = Some(slot);
         slot
+    }
+
+    fn of(&self, node: Node) -> Slot {
+        self.of[node.0 as usize].expect("operands come before what is made of them")
     }
 }
 
@@ -66,7 +72,8 @@ impl Machine {
     /// node, where it is not the symbol's own.
     ///
     /// # Errors
-    /// [`Error::Config`] for a step that is not positive and finite, or a delay of too many steps.
+    /// [`Error::Config`] for a step that is not positive and finite, a delay of too many steps, or an instruction set that was asked for
+    /// and is not there.
     pub fn new(graph: &Graph, roots: &[Node], step_s: f64, number: &dyn Fn(Node) -> Option<f64>) -> Result<Self> {
         if !(step_s > 0.0 && step_s.is_finite()) {
             let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
@@ -74,28 +81,36 @@ impl Machine {
         }
         let behind = graph.behind(roots);
         let uniform = uniform(graph, &behind, number);
-        let mut last_use: HashMap<Node, usize> = HashMap::new();
+        let is_uniform = |node: &Node| uniform[node.0 as usize].is_some();
+        let mut last_use: Vec<Option<usize>> = vec![None; graph.nodes.len()];
         for (place, &node) in behind.iter().enumerate() {
-            graph.operands(node).for_each(|operand| {
-                last_use.insert(operand, place);
-            });
+            graph.operands(node).for_each(|operand| last_use[operand.0 as usize] = Some(place));
         }
-        roots.iter().for_each(|&root| {
-            last_use.insert(root, usize::MAX);
-        });
-        let mut machine =
-            Self { steps: Vec::new(), memory: Vec::new(), columns: Vec::new(), roots: Vec::new(), inputs: Vec::new(), block: 0 };
-        let mut slots = Slots { count: 0, free: Vec::new(), of: HashMap::new() };
+        roots.iter().for_each(|root| last_use[root.0 as usize] = Some(usize::MAX));
+        let mut machine = Self {
+            steps: Vec::new(),
+            memory: Vec::new(),
+            columns: Vec::new(),
+            roots: Vec::new(),
+            inputs: Vec::new(),
+            block: 0,
+            level: Level::detect().map_err(Error::level)?,
+        };
+        let mut slots = Slots { count: 0, free: Vec::new(), of: vec![None; graph.nodes.len()] };
         // Columns of constants are filled once, so they are never given to anything else.
-        let constants: Vec<(Slot, f64)> = behind.iter().filter_map(|node| Some((slots.take(*node), *uniform.get(node)?))).collect();
-        for (place, &node) in behind.iter().enumerate().filter(|(_, node)| !uniform.contains_key(node)) {
+        let of_constant = |node: &Node| Some((slots.take(*node), uniform[node.0 as usize]?));
+        let constants: Vec<(Slot, f64)> = behind.iter().filter(|node| is_uniform(node)).filter_map(of_constant).collect();
+        for (place, &node) in behind.iter().enumerate().filter(|(_, node)| !is_uniform(node)) {
             machine.step(graph, node, step_s, &uniform, &mut slots)?;
-            let mut ended: Vec<Node> = graph.operands(node).filter(|operand| last_use.get(operand) == Some(&place)).collect();
-            ended.sort_unstable();
-            ended.dedup();
-            slots.free.extend(ended.iter().filter(|node| !uniform.contains_key(node)).map(|node| slots.of[node]));
+            for operand in graph.operands(node).filter(|operand| !is_uniform(operand)) {
+                // Once, also for one that is both operands.
+                if last_use[operand.0 as usize].take_if(|last| *last == place).is_some() {
+                    let slot = slots.of(operand);
+                    slots.free.push(slot);
+                }
+            }
         }
-        machine.roots = roots.iter().map(|root| slots.of[root]).collect();
+        machine.roots = roots.iter().map(|root| slots.of(*root)).collect();
         machine.block = (NUMBERS_AT_ONCE / slots.count.max(1)).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
         machine.columns = vec![vec![0.0; machine.block]; slots.count];
         constants.iter().for_each(|&(slot, value)| machine.columns[slot as usize].fill(value));
@@ -103,8 +118,7 @@ impl Machine {
     }
 
     /// Adds what computes one node.
-    fn step(&mut self, graph: &Graph, node: Node, step_s: f64, uniform: &HashMap<Node, f64>, slots: &mut Slots) -> Result<()> {
-        let of = |slots: &Slots, node: Node| slots.of[&node];
+    fn step(&mut self, graph: &Graph, node: Node, step_s: f64, uniform: &[Option<f64>], slots: &mut Slots) -> Result<()> {
         let step = match graph.nodes[node.0 as usize] {
             Kind::Number(_) | Kind::Symbol(_) => unreachable!("a number is the same at all samples"),
             Kind::Input(input) => {
@@ -115,16 +129,19 @@ impl Machine {
                 });
                 Step::Input { input: place as u32, out: slots.take(node) }
             }
-            Kind::One(operation, x) => Step::One { operation, x: of(slots, x), out: slots.take(node) },
+            Kind::One(operation, x) => Step::One { operation, x: slots.of(x), out: slots.take(node) },
             Kind::Two(operation, x, y) => {
-                let (left, right) = (of(slots, x), of(slots, y));
-                match whole_power(operation, uniform.get(&y).copied()) {
+                let (left, right) = (slots.of(x), slots.of(y));
+                match whole_power(operation, uniform[y.0 as usize]) {
                     Some(exponent) => Step::PowerInteger { x: left, exponent, out: slots.take(node) },
                     None => Step::Two { operation, x: left, y: right, out: slots.take(node) },
                 }
             }
             Kind::Recall(recall, [x, number, tangent, limit]) => {
-                let number = if recall == Recall::History(History::Rate) { 0.0 } else { uniform[&number] };
+                let number = match recall {
+                    Recall::History(History::Rate) => 0.0,
+                    _ => uniform[number.0 as usize].expect("a time or a limit is the same at all samples"),
+                };
                 let samples = number / step_s;
                 if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) && samples > MAX_DELAY_SAMPLES {
                     return Err(Error::Config {
@@ -135,7 +152,7 @@ impl Machine {
                     });
                 }
                 self.memory.push(Memory::new(recall, number, step_s));
-                let (x, tangents) = (of(slots, x), [of(slots, tangent), of(slots, limit)]);
+                let (x, tangents) = (slots.of(x), [slots.of(tangent), slots.of(limit)]);
                 Step::Recall { memory: self.memory.len() as u32 - 1, x, tangents, out: slots.take(node) }
             }
         };
@@ -161,7 +178,7 @@ impl Machine {
     /// Takes the next samples, at most [`Machine::block`] of them; `input` gives their columns in the order of [`Machine::inputs`].
     pub fn advance<'a>(&mut self, samples: usize, input: &dyn Fn(usize) -> &'a [f64]) {
         assert!(samples <= self.block, "{samples} samples at once, at most {}", self.block);
-        let Self { steps, memory, columns, .. } = self;
+        let Self { steps, memory, columns, level, .. } = self;
         for step in steps {
             let (Step::Input { out, .. }
             | Step::One { out, .. }
@@ -173,13 +190,11 @@ impl Machine {
             let column = |slot: Slot| &columns[slot as usize][..samples];
             match *step {
                 Step::Input { input: index, .. } => values.copy_from_slice(input(index as usize)),
-                Step::One { operation, x, .. } => operation.of_column(column(x), values),
-                Step::Two { operation, x, y, .. } => operation.of_columns(column(x), column(y), values),
-                Step::PowerInteger { x, exponent, .. } => {
-                    values.iter_mut().zip(column(x)).for_each(|(value, x)| *value = x.powi(exponent));
-                }
+                Step::One { operation, x, .. } => operation.of_column(*level, column(x), values),
+                Step::Two { operation, x, y, .. } => operation.of_columns(*level, column(x), column(y), values),
+                Step::PowerInteger { x, exponent, .. } => whole_power_of_column(*level, exponent, column(x), values),
                 Step::Recall { memory: index, x, tangents, .. } => {
-                    memory[index as usize].run(column(x), tangents.map(column), values);
+                    memory[index as usize].run(*level, column(x), tangents.map(column), values);
                 }
             }
             columns[out as usize] = result;
@@ -192,16 +207,16 @@ impl Machine {
     }
 }
 
-/// The values that are the same at all samples, with the symbols that vary at the values of this evaluation.
-fn uniform(graph: &Graph, behind: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> HashMap<Node, f64> {
-    let mut known: HashMap<Node, f64> = HashMap::new();
+/// By node, the values that are the same at all samples, with the symbols that vary at the values of this evaluation.
+fn uniform(graph: &Graph, behind: &[Node], number: &dyn Fn(Node) -> Option<f64>) -> Vec<Option<f64>> {
+    let mut known: Vec<Option<f64>> = vec![None; graph.nodes.len()];
     for &node in behind.iter().filter(|node| graph.uniform[node.0 as usize].is_some()) {
         let symbol = |index: usize| {
             let symbol = graph.symbols[index];
             if symbol.varies { number(node).unwrap_or(symbol.value) } else { symbol.value }
         };
-        let value = graph.value_of(graph.nodes[node.0 as usize], &|operand| known.get(&operand).copied(), &symbol);
-        known.insert(node, value.expect("what is the same at all samples has operands that are"));
+        let value = graph.value_of(graph.nodes[node.0 as usize], &|operand| known[operand.0 as usize], &symbol);
+        known[node.0 as usize] = Some(value.expect("what is the same at all samples has operands that are"));
     }
     known
 }

@@ -6,7 +6,7 @@
 
 use super::graph::Recall;
 use super::operation::History;
-use std::collections::VecDeque;
+use phyture_kernels::{Level, columns};
 
 impl History {
     /// Number of arguments.
@@ -21,6 +21,9 @@ impl History {
 /// Longest delay, s: bounds the memory a formula can ask for.
 pub(super) const MAX_DELAY_S: f64 = 60.0;
 
+/// Samples that a delay keeps beyond those it needs, so that it forgets seldom.
+const SPARE: usize = 512;
+
 /// Longest delay, samples: 60 s at more than 100 kHz.
 pub(super) const MAX_DELAY_SAMPLES: f64 = 1e7;
 
@@ -32,10 +35,10 @@ pub(super) enum Memory {
     Lag { approach: f64, ramp: f64, last: Option<(f64, f64)> },
     /// `dy/dtau` of that recursion; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
     LagByTime { approach: f64, ramp: f64, slopes: [f64; 2], last: Option<(f64, f64, f64)> },
-    /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before. The newest value is at the back.
-    Delay { whole: usize, part: f64, past: VecDeque<f64> },
+    /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before.
+    Delay { whole: usize, part: f64, past: Past },
     /// `dy/ds` of that: the slope between the two samples.
-    DelayByTime { whole: usize, step_s: f64, past: VecDeque<f64> },
+    DelayByTime { whole: usize, step_s: f64, past: Past },
     /// `y[k] = (x[k] - x[k-1]) / T`, zero at the first sample: causal, so half a sample late.
     Rate { step_s: f64, last: Option<f64> },
     /// `y[k] = y[k-1] + clamp(x[k] - y[k-1], -limit, limit)`: a servo at its largest speed.
@@ -54,9 +57,25 @@ fn lag_coefficients(tau_s: f64, step_s: f64) -> ([f64; 2], [f64; 2]) {
     ([approach, 1.0 - approach * tau_s / step_s], [slope, -(approach + tau_s * slope) / step_s])
 }
 
-/// The sample so far back, or the first one.
-fn back(past: &VecDeque<f64>, samples: usize) -> f64 {
-    past.get((past.len() - 1).saturating_sub(samples)).copied().expect("the newest sample is there")
+/// The latest samples of a signal, the newest at the back; before the first one it was at rest.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Past(Vec<f64>);
+
+impl Past {
+    /// Takes the next samples; gives, for each of them, the ones that lie so far back, and those before these.
+    fn delayed<'a>(&'a mut self, whole: usize, next: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+        let Self(samples) = self;
+        let Some(&first) = next.first() else { return (next, next) };
+        if samples.is_empty() {
+            samples.resize(whole + 1, first);
+        } else if samples.len() > 2 * (whole + 1) + SPARE {
+            // What is long past is let go in large pieces.
+            samples.drain(..samples.len() - (whole + 1));
+        }
+        samples.extend_from_slice(next);
+        let before = &samples[samples.len() - next.len() - (whole + 1)..];
+        (&before[1..=next.len()], &before[..next.len()])
+    }
 }
 
 impl Memory {
@@ -73,9 +92,9 @@ impl Memory {
                 Self::LagByTime { approach, ramp, slopes, last: None }
             }
             Recall::History(History::Delay) => {
-                Self::Delay { whole: whole as usize, part: number / step_s - whole, past: VecDeque::new() }
+                Self::Delay { whole: whole as usize, part: number / step_s - whole, past: Past::default() }
             }
-            Recall::DelayByTime => Self::DelayByTime { whole: whole as usize, step_s, past: VecDeque::new() },
+            Recall::DelayByTime => Self::DelayByTime { whole: whole as usize, step_s, past: Past::default() },
             Recall::History(History::Rate) => Self::Rate { step_s, last: None },
             Recall::History(History::Slew) => Self::Slew { limit: number * step_s, last: None },
             Recall::SlewTangent => Self::SlewTangent { limit: number * step_s, step_s, last: None },
@@ -87,13 +106,13 @@ impl Memory {
         match self {
             Self::Lag { last, .. } | Self::SlewTangent { last, .. } => *last = None,
             Self::LagByTime { last, .. } => *last = None,
-            Self::Delay { past, .. } | Self::DelayByTime { past, .. } => past.clear(),
+            Self::Delay { past, .. } | Self::DelayByTime { past, .. } => past.0.clear(),
             Self::Rate { last, .. } | Self::Slew { last, .. } => *last = None,
         }
     }
 
     /// Takes samples in order. `tangents`, of the signal and of the limit, are read by a slew's derivative alone.
-    pub(super) fn run(&mut self, signal: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
+    pub(super) fn run(&mut self, level: Level, signal: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
         let samples = out.iter_mut().zip(signal.iter().copied());
         match self {
             Self::Lag { approach, ramp, last } => {
@@ -112,17 +131,16 @@ impl Memory {
                 }
             }
             Self::Delay { whole, part, past } => {
-                for (out, x) in samples {
-                    remember(past, x, *whole);
-                    let near = back(past, *whole);
-                    *out = if *part == 0.0 { near } else { near + *part * (back(past, *whole + 1) - near) };
+                let (near, far) = past.delayed(*whole, signal);
+                if *part == 0.0 {
+                    out.copy_from_slice(near);
+                } else {
+                    columns::zip(level, |near, far| near + *part * (far - near), near, far, out);
                 }
             }
             Self::DelayByTime { whole, step_s, past } => {
-                for (out, x) in samples {
-                    remember(past, x, *whole);
-                    *out = (back(past, *whole + 1) - back(past, *whole)) / *step_s;
-                }
+                let (near, far) = past.delayed(*whole, signal);
+                columns::zip(level, |near, far| (far - near) / *step_s, near, far, out);
             }
             Self::Rate { step_s, last } => {
                 for (out, x) in samples {
@@ -150,13 +168,6 @@ impl Memory {
     }
 }
 
-fn remember(past: &mut VecDeque<f64>, x: f64, whole: usize) {
-    past.push_back(x);
-    if past.len() > whole + 2 {
-        past.pop_front();
-    }
-}
-
 fn slewed(x: f64, before: f64, limit: f64) -> f64 {
     let change = x - before;
     if change.abs() > limit { before + limit.copysign(change) } else { x }
@@ -175,7 +186,7 @@ mod tests {
 
     fn recalled(recall: Recall, number: f64, step_s: f64, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        Memory::new(recall, number, step_s).run(values, [&[], &[]], &mut out);
+        Memory::new(recall, number, step_s).run(Level::PLAIN, values, [&[], &[]], &mut out);
         out
     }
 

@@ -191,6 +191,14 @@ impl Hybrid {
         Ok(gate)
     }
 
+    /// The same network on another model, for one that knows more of some flights than the one it was trained on and is equal otherwise.
+    ///
+    /// # Errors
+    /// As [`Hybrid::new`].
+    pub fn on(&self, model: Model) -> Result<Self> {
+        Self::new(Description { model, ..self.description.clone() }, self.parameters.clone())
+    }
+
     /// What it is, but for its weights.
     pub const fn description(&self) -> &Description {
         &self.description

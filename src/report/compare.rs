@@ -7,7 +7,7 @@ use super::page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, dat
 use crate::critique::compare::{Intervals, deviation};
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
 use crate::critique::shares::bars;
-use crate::critique::table::{FLOOR, Kind, LEGEND, MEASURES, significant};
+use crate::critique::table::{FLOOR, Kind, LEGEND, MEASURES, OWN_FROM_FIRST_HALF, significant};
 use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty, paired};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};
@@ -81,6 +81,7 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
         (0..6).filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?))).collect();
     let name = |channel: usize| Column::TARGETS[channel].name();
     let mut out = vec![format!("{}.", report.comparison.basis())];
+    out.extend(report.comparison.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
     if model.not_finite > 0 {
         out.push(format!(
             "Beware: {} of {} predictions of {} are not finite numbers. The channels they hit have no error measure.",

@@ -181,24 +181,25 @@ impl Body {
         let lateral = lag(Mechanism::CyclicLag, FLAP_TIME_S, steady_flap(0, p), state.flap[0]);
         let longitudinal = lag(Mechanism::CyclicLag, FLAP_TIME_S, steady_flap(1, q), state.flap[1]);
 
-        // Thrust along the mast, up.
-        let (mut thrust, induced_rate) = self.thrust(collective.0, v[2], in_plane, state.induced);
+        // Thrust along the mast, up. The baseline's heave damping is the rotor's, too: what changes the thrust changes the whole of it.
+        let (thrust, induced_rate) = self.thrust(collective.0, v[2], in_plane, state.induced);
+        let undisturbed = thrust - a[2] * v[2];
         let speed_squared = if self.on.has(Mechanism::RotorDroop) { state.rotor_speed * state.rotor_speed } else { 1.0 };
-        thrust *= speed_squared;
+        let mut whole = undisturbed * speed_squared;
         if self.on.has(Mechanism::VortexRing) {
-            let descent = v[2] * thrust.signum();
+            let descent = v[2] * whole.signum();
             let depth = vortex_ring(descent, in_plane, self.rotor.hover_induced);
-            thrust *= 1.0 - scale(Mechanism::VortexRing) * depth * (0.25 + 0.1 * disturbance.roughness);
+            whole *= 1.0 - scale(Mechanism::VortexRing) * depth * (0.25 + 0.1 * disturbance.roughness);
         }
         if self.on.has(Mechanism::GroundEffect) {
             let gain = ground_effect(HUB_HEIGHT_M - state.position[2], speed, self.rotor.hover_induced);
-            thrust *= 1.0 + scale(Mechanism::GroundEffect) * (gain - 1.0);
+            whole *= 1.0 + scale(Mechanism::GroundEffect) * (gain - 1.0);
         }
         if self.on.has(Mechanism::StallSaturation) {
-            thrust = stall(thrust, 1.3 * GRAVITY_M_S2 / scale(Mechanism::StallSaturation));
+            whole = stall(whole, 1.3 * GRAVITY_M_S2 / scale(Mechanism::StallSaturation));
         }
-        // The baseline's heave damping is the rotor's, too: it acts wherever the thrust does.
-        let whole = thrust - a[2] * v[2];
+        // What is added to the heave damping, which the baseline has by itself.
+        let thrust = thrust + (whole - undisturbed);
         let load = whole / GRAVITY_M_S2;
         let power = 0.2 + 0.8 * load.abs().powf(1.5) - load * v[2] / self.rotor.hover_induced * 0.8;
         let droop = 1.0 - scale(Mechanism::RotorDroop) * DROOP * (power - 1.0) - state.rotor_speed;

@@ -53,12 +53,7 @@ pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
 /// # Errors
 /// [`Error::Config`] if the environment asks for one that this processor does not have.
 pub fn instruction_set() -> Result<Level> {
-    Level::detect().map_err(|error| Error::Config {
-        place: "environment".into(),
-        field: phyture_kernels::level::ENVIRONMENT_VARIABLE.into(),
-        found: error.to_string(),
-        expected: "a level of this processor, or nothing".into(),
-    })
+    Level::detect().map_err(Error::level)
 }
 
 /// A plan with its memory, ready to be replayed.

@@ -9,7 +9,7 @@ use super::gates::{BLOCK_S, CORRELATION_S};
 use super::gram::blocks;
 use super::joint::{Errors, Point, undetermined};
 use super::own::Halves;
-use super::report::{Diagnosis, Locked, Status, Step, Verdict, Worth};
+use super::report::{Bar, Diagnosis, Locked, Status, Step, Verdict, Worth};
 use super::sentences;
 use crate::blocks::{BlockMean, BlockSum};
 use crate::critique::compare::PerChannel;
@@ -49,7 +49,7 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
     let cut = blocks(flights, &selection(flights, &searched(split), REFIT), BLOCK_S);
     let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
     let searched = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
-    let halves = Halves::of(flights, std::slice::from_ref(&all), &split.test);
+    let halves = Halves::of(flights, &[&all], &split.test);
     let kept = halves.engine(flights, BLOCK_S, correlation);
     if effects.is_empty() || kept.blocks.is_empty() {
         return Ok(Vec::new());
@@ -79,7 +79,7 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
         Ok(Worth { effect: (*effect).to_owned(), share, rise, refitted: refitted && with_refitted })
     };
     let mut worth: Vec<Worth> = named.iter().enumerate().map(of).collect::<Result<_>>()?;
-    worth.sort_by(|left, right| right.largest().total_cmp(&left.largest()));
+    worth.sort_by(|left, right| right.at_least().total_cmp(&left.at_least()));
     Ok(worth)
 }
 
@@ -165,12 +165,12 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
     let mut enabled = model.clone();
     enabled.effects.retain(|effect| effect.enabled);
-    let models = [before.clone(), enabled];
-    whole.locked = confirm(flights, &models, &split.test, split.tested.name(), BLOCK_S, 2.0 * CORRELATION_S / step_s)?;
+    let rungs = [(Vec::new(), before.clone()), (whole.accepted.clone(), enabled)];
+    whole.locked = confirm(flights, &rungs, &split.test, split.tested.name(), BLOCK_S, 2.0 * CORRELATION_S / step_s)?;
     if let Some(locked) = &mut whole.locked {
         let bars = waterfall(&added);
-        // An effect that a later round took out again has no bar of its own.
-        if bars.len() == whole.accepted.len() + 1 {
+        // With an effect that a later round took out again the rounds are no ladder.
+        if bars.iter().map(|bar| bar.added.len()).sum::<usize>() == whole.accepted.len() {
             locked.waterfall = bars;
         }
     }
@@ -185,8 +185,8 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
 }
 
 /// The bars of several rounds in one row: what a round begins with is what the one before has ended with.
-fn waterfall(rounds: &[&Diagnosis]) -> Vec<PerChannel> {
-    let of = |(index, locked): (usize, &Locked)| locked.waterfall.iter().skip(usize::from(index > 0)).copied().collect::<Vec<_>>();
+fn waterfall(rounds: &[&Diagnosis]) -> Vec<Bar> {
+    let of = |(index, locked): (usize, &Locked)| locked.waterfall.iter().skip(usize::from(index > 0)).cloned().collect::<Vec<_>>();
     rounds.iter().filter_map(|round| round.locked.as_ref()).enumerate().flat_map(of).collect()
 }
 
@@ -269,7 +269,7 @@ mod tests {
         assert!(found[0].rise.get("vx_dot").is_some_and(|found| (found - rise).abs() < 1e-6 * rise), "{found:?} {rise}");
         assert!(found.iter().all(|worth| worth.refitted && worth.share.keys().all(|channel| channel == "vx_dot")), "{found:?}");
         // Frozen, the loss of either would cost most of the first stick; fitted again, the one takes the other's place.
-        assert!(found[1..].iter().all(|worth| worth.largest().abs() < 0.01), "{found:?}");
+        assert!(found[1..].iter().all(|worth| worth.at_least().abs() < 0.01), "{found:?}");
         Ok(())
     }
 

@@ -1,24 +1,32 @@
 //! The confirmation: errors on flights that no search has seen, with none, one, two … of the accepted effects.
 
+use super::joint::Errors;
 use super::own::{Halves, Judgement, judged_errors};
-use super::report::{Kept, Locked};
+use super::report::{Bar, Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
+use crate::blocks::{BlockMean, BlockSum};
 use crate::critique::compare::PerChannel;
+use crate::critique::shares::Share;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};
 use crate::physics::Model;
+use std::collections::BTreeMap;
+
+/// A model, and the effects that it adds to the one before it.
+pub(super) type Rung = (Vec<String>, Model);
 
 /// Errors on flights that no search has seen, of each of the models.
 pub(super) fn confirm(
     flights: &[Flight],
-    models: &[Model],
+    rungs: &[Rung],
     locked: &[Span],
     part: &str,
     block_s: f64,
     correlation: f64,
 ) -> Result<Option<Locked>> {
-    let halves = Halves::of(flights, models, locked);
-    let judged = judged_errors(flights, models, &halves, block_s, correlation)?;
+    let models: Vec<&Model> = rungs.iter().map(|rung| &rung.1).collect();
+    let halves = Halves::of(flights, &models, locked);
+    let judged = judged_errors(flights, &models, &halves, block_s, correlation)?;
     let Some(Judgement { counts, errors }) = judged else { return Ok(None) };
     let rows = counts.iter().sum::<usize>() as f64;
     let rmse = |errors: &[Vec<f64>; 6]| {
@@ -51,10 +59,30 @@ pub(super) fn confirm(
         rmse_before: rmse(first),
         rmse_after: rmse(last),
         mse_fall,
-        waterfall: errors.iter().map(rmse).collect(),
+        waterfall: rungs
+            .iter()
+            .zip(&errors)
+            .enumerate()
+            .map(|(place, ((added, _), own))| Bar {
+                added: added.clone(),
+                rmse: rmse(own),
+                rises: if place == 0 { BTreeMap::new() } else { rises(&errors[place - 1], own) },
+            })
+            .collect(),
         floor: None,
         removable_removed: None,
     }))
+}
+
+/// Channels whose error is larger than before by more than chance, block against block.
+fn rises(before: &Errors, after: &Errors) -> BTreeMap<String, Share> {
+    let of = |channel: usize| {
+        let pairs = before[channel].iter().zip(&after[channel]);
+        let mean = BlockMean::ratio(pairs.map(|(before, after)| BlockSum { samples: *before, sum: after - before }))?;
+        let rise = Share { share: mean.mean, ci95: mean.interval() };
+        rise.ci95.is_some_and(|[low, _]| low > 0.0).then(|| (Column::TARGETS[channel].name().to_owned(), rise))
+    };
+    (0..6).filter_map(of).collect()
 }
 
 /// What spans are made of: whole flights, the last part of each, or pieces from anywhere.
@@ -98,7 +126,7 @@ mod tests {
         let flights = [Flight::new("still", "rest", 0.0, 0.01, still, Targets::Recorded)?];
         let bias = catalogue::definition("sensor_bias").map(|definition| definition.effect(4.58, 0.8));
         let models = [Some(model()), bias.map(|bias| with(&model(), &bias))];
-        let models: Vec<Model> = models.into_iter().flatten().collect();
+        let models: Vec<Rung> = models.into_iter().flatten().map(|model| (Vec::new(), model)).collect();
         let found = confirm(&flights, &models, &whole(&flights), "test", 5.0, 100.0)?;
         let rmse = found.map(|found| [found.rmse_before, found.rmse_after].map(|rmse| rmse.channels()));
         assert!(models.len() == 2 && rmse.is_some_and(|[before, after]| before == after && before[0] == Some(0.0)), "{rmse:?}");

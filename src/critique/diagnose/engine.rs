@@ -1,6 +1,6 @@
 //! Models tried on the same blocks: one pass for the columns of all of them, then for each its held-out error block by block.
 
-use super::design::{Design, Layout};
+use super::design::{Design, Free, Layout};
 use super::fit::{Component, Prior, Reduced, Solution, components};
 use super::gram::{Block, BlockGram, grams};
 use crate::error::{Error, Result};
@@ -42,8 +42,15 @@ pub(super) struct Trial {
     pub changed: [bool; 6],
     /// Whether a coefficient of the last effect is on a bound.
     pub at_bound: bool,
-    /// Values by position in `layout.free`.
-    pub values: Vec<f64>,
+}
+
+impl Trial {
+    /// Value in a flight of a number by its position in `layout.free`.
+    pub fn value_in(&self, free: usize, flight: &str) -> f64 {
+        let Some(&Free { effect, coefficient }) = self.layout.free.get(free) else { return 0.0 };
+        let number = self.model.effects.get(effect).and_then(|effect| effect.coefficients.get(coefficient));
+        number.map_or(0.0, |number| number.in_flight(flight))
+    }
 }
 
 /// What one pass brought: a model, others that change it, and the Gram matrices behind them.
@@ -121,7 +128,6 @@ impl Engine<'_> {
             errors: std::array::from_fn(|_| vec![f64::NAN; self.blocks.len()]),
             changed: [true; 6],
             at_bound: false,
-            values: Vec::new(),
         };
         // Twice: channels that share coefficients are weighted by an error that is known only then.
         let Some(first) = self.fit(model, layout, &nothing, &[1.0; 6], grams) else { return Err(self.undetermined(model)) };
@@ -178,7 +184,6 @@ impl Engine<'_> {
             errors: base.errors.clone(),
             changed: [false; 6],
             at_bound: false,
-            values: layout.free.iter().map(|free| value(model, *free)).collect(),
         };
         let priors = priors(model, layout, &self.held);
         for (channels, members) in components(layout) {
@@ -241,7 +246,6 @@ impl Engine<'_> {
                     coefficient.by_flight = Some(values);
                 }
             }
-            trial.values[member] = coefficient.value;
             trial.at_bound |= free.effect == last && solution.bound[position];
         }
     }
@@ -254,9 +258,4 @@ fn regressors_of(design: &mut Design, model: &Model, (base, known): (&Model, &[R
         return design.enlarged(model, known);
     }
     design.columns.regressors(model, Wanted::default())
-}
-
-fn value(model: &Model, free: super::design::Free) -> f64 {
-    let effect = model.effects.get(free.effect);
-    effect.and_then(|effect| effect.coefficients.get(free.coefficient)).map_or(0.0, |coefficient| coefficient.value)
 }

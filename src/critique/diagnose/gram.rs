@@ -9,6 +9,9 @@ use ndarray::{Array2, ArrayView2, Axis, Slice};
 use std::ops::Range;
 use std::sync::Arc;
 
+/// Rows of a square that are multiplied at once, with the columns from the first of them on: the others are known from above the diagonal.
+const PANEL: usize = 48;
+
 /// A stretch of consecutive samples of one flight: the unit that is resampled, left out or flipped as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -48,7 +51,7 @@ pub(super) struct BlockGram {
 #[derive(Clone, Debug)]
 pub(super) struct Square {
     places: Arc<Places>,
-    /// Columns of several models and y, by all columns.
+    /// Columns of several models and y, by all columns; of themselves each with what comes after it, as far as rows are not multiplied at once.
     common: Array2<f64>,
     /// Of each model that has columns of its own, these by themselves.
     own: Vec<Array2<f64>>,
@@ -100,8 +103,14 @@ impl Square {
 
     /// Adds some samples; `rows` holds the columns in the order of [`Places::order`].
     fn add(&mut self, rows: &ArrayView2<'_, f64>) {
-        let common = rows.slice_axis(Axis(0), Slice::from(..self.places.common()));
-        general_mat_mul(1.0, &common, &rows.t(), 1.0, &mut self.common);
+        let common = self.places.common();
+        for start in (0..common).step_by(PANEL) {
+            let end = (start + PANEL).min(common);
+            let (panel, after) = (Slice::from(start..end), Slice::from(start..));
+            let mut sum = self.common.slice_axis_mut(Axis(0), panel);
+            let (left, right) = (rows.slice_axis(Axis(0), panel), rows.slice_axis(Axis(0), after));
+            general_mat_mul(1.0, &left, &right.t(), 1.0, &mut sum.slice_axis_mut(Axis(1), after));
+        }
         for (group, own) in self.places.groups.iter().zip(&mut self.own) {
             let part = rows.slice_axis(Axis(0), Slice::from(group.clone()));
             general_mat_mul(1.0, &part, &part.t(), 1.0, own);
@@ -116,7 +125,7 @@ impl Square {
     /// The product of two columns, by their places in the design; y is the last.
     pub fn at(&self, row: usize, column: usize) -> f64 {
         match (self.places.of[row], self.places.of[column]) {
-            ((row, None), (column, _)) | ((column, _), (row, None)) => self.common[(row, column)],
+            ((row, None), (column, _)) | ((column, _), (row, None)) => self.common[(row.min(column), row.max(column))],
             ((row, Some(left)), (column, Some(right))) => {
                 assert_eq!(left, right, "columns of two models meet in no fit");
                 let start = self.places.groups[left].start;

@@ -16,6 +16,7 @@ use crate::physics::{Model, Wanted};
 use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Weight at first of what holds numbers where they are, beside that of their usual sizes; and its factor with each step that succeeds or fails.
 const DAMPING: f64 = 1.0;
@@ -25,6 +26,9 @@ const LARGEST_DAMPING: f64 = 1e8;
 /// A step has settled when it changes twice the logarithm of the likelihood by less than this, in independent samples: no
 /// choice between effects hangs on so little.
 const SETTLED: f64 = 0.5;
+
+/// Parts into which flights are divided where they are worked on side by side.
+const PARTS: usize = 8;
 
 /// A model at its numbers, and its neighbourhood.
 pub(super) struct Point {
@@ -49,6 +53,22 @@ pub(super) struct Normal {
     matrix: DMatrix<f64>,
     /// By flight: what the flight's own numbers are made of.
     by_flight: BTreeMap<usize, DMatrix<f64>>,
+}
+
+impl Normal {
+    fn empty(size: usize) -> Self {
+        Self { matrix: DMatrix::zeros(size, size), by_flight: BTreeMap::new() }
+    }
+
+    fn add_eliminated(&mut self, (matrix, made_of): &(DMatrix<f64>, Option<DMatrix<f64>>), flight: usize) {
+        self.matrix += matrix;
+        self.by_flight.extend(made_of.iter().map(|made_of| (flight, made_of.clone())));
+    }
+
+    fn add(&mut self, other: Self) {
+        self.matrix += other.matrix;
+        self.by_flight.extend(other.by_flight);
+    }
 }
 
 /// The blocks of all folds but one, for each fold, with these numbers of each flight.
@@ -131,12 +151,10 @@ impl Point {
         let target = self.size() - 1;
         for (reduced, mse) in self.reduced.iter().zip(&self.mse) {
             let square = &reduced.blocks[block];
-            let place = |index: usize| reduced.free.get(index).copied().unwrap_or(target);
-            for column in 0..square.ncols() {
-                let to = place(column);
-                for row in 0..square.nrows() {
-                    sum[(place(row), to)] += square[(row, column)] / mse;
-                }
+            let places: Vec<usize> = reduced.free.iter().copied().chain([target]).collect();
+            for (column, &to) in square.column_iter().zip(&places) {
+                let mut sum = sum.column_mut(to);
+                column.iter().zip(&places).for_each(|(value, &place)| sum[place] += value / mse);
             }
         }
     }
@@ -151,33 +169,85 @@ impl Point {
         absent.iter().any(|&place| self.optional[place] == self.layout.free[number].effect)
     }
 
-    /// The squares of the blocks of each flight that are wanted, with its own numbers eliminated.
-    fn normal(&self, engine: &Engine<'_>, locals: &[usize], wanted: &dyn Fn(usize) -> bool) -> Option<Normal> {
-        let size = self.size();
-        let mut normal = Normal { matrix: DMatrix::zeros(size, size), by_flight: BTreeMap::new() };
-        for run in runs(engine) {
-            let flight = engine.blocks[run.start].flight;
-            if !run.clone().any(wanted) {
-                continue;
-            }
-            if locals.is_empty() {
-                run.filter(|&block| wanted(block)).for_each(|block| self.add(block, &mut normal.matrix));
-                continue;
-            }
-            let mut square = DMatrix::zeros(size, size);
-            run.filter(|&block| wanted(block)).for_each(|block| self.add(block, &mut square));
-            let mut own = DMatrix::from_fn(locals.len(), locals.len(), |i, j| square[(locals[i], locals[j])]);
-            for (index, &local) in locals.iter().enumerate() {
-                own[(index, index)] += self.correlation * self.known[local].precision(0.0, 0.0);
-            }
-            let mut others = DMatrix::from_fn(locals.len(), size, |i, j| square[(locals[i], j)]);
-            locals.iter().for_each(|&local| others.column_mut(local).fill(0.0));
-            let made_of = Cholesky::new(own)?.solve(&others);
-            normal.matrix += square;
-            normal.matrix.gemm_tr(-1.0, &others, &made_of, 1.0);
-            normal.by_flight.insert(flight, made_of);
+    /// The squares of all blocks, with the numbers of each flight eliminated.
+    fn normal(&self, engine: &Engine<'_>, locals: &[usize]) -> Option<Normal> {
+        self.normals(engine, locals, &[None])?.pop()
+    }
+
+    /// The squares of the blocks of all folds but one, for each of the `held` folds, with the numbers of each flight eliminated. Flights are
+    /// worked off in parts, always the same ones, so that no sum depends on the number of threads.
+    fn normals(&self, engine: &Engine<'_>, locals: &[usize], held: &[Option<usize>]) -> Option<Vec<Normal>> {
+        let flights: Vec<Range<usize>> = runs(engine).collect();
+        let parts: Vec<&[Range<usize>]> = flights.chunks(flights.len().div_ceil(PARTS).max(1)).collect();
+        let one = |part: &&[Range<usize>]| {
+            let mut sums: Vec<Normal> = held.iter().map(|_| Normal::empty(self.size())).collect();
+            part.iter().try_for_each(|run| self.add_flight(engine, locals, held, run, &mut sums))?;
+            Some(sums)
+        };
+        #[cfg(feature = "rayon")]
+        let found: Vec<Vec<Normal>> = {
+            use rayon::prelude::*;
+            parts.par_iter().map(one).collect::<Option<_>>()?
+        };
+        #[cfg(not(feature = "rayon"))]
+        let found: Vec<Vec<Normal>> = parts.iter().map(one).collect::<Option<_>>()?;
+        found.into_iter().reduce(|mut sums, part| {
+            sums.iter_mut().zip(part).for_each(|(sum, part)| sum.add(part));
+            sums
+        })
+    }
+
+    /// Adds the blocks of one flight to the sums of [`Point::normals`].
+    fn add_flight(
+        &self,
+        engine: &Engine<'_>,
+        locals: &[usize],
+        held: &[Option<usize>],
+        run: &Range<usize>,
+        sums: &mut [Normal],
+    ) -> Option<()> {
+        let mut folds: BTreeMap<usize, DMatrix<f64>> = BTreeMap::new();
+        for block in run.clone() {
+            let square = folds.entry(engine.fold[block]).or_insert_with(|| DMatrix::zeros(self.size(), self.size()));
+            self.add(block, square);
         }
-        Some(normal)
+        let flight = engine.blocks[run.start].flight;
+        let without = |fold: Option<usize>| {
+            let squares = folds.iter().filter(|entry| Some(*entry.0) != fold).map(|entry| entry.1);
+            squares.fold(DMatrix::zeros(self.size(), self.size()), |sum, square| sum + square)
+        };
+        // Most folds have no block of a short flight: what is left without them is the whole.
+        let mut whole = None;
+        for (&fold, sum) in held.iter().zip(sums) {
+            if fold.is_some_and(|fold| folds.contains_key(&fold)) {
+                if folds.len() > 1 {
+                    sum.add_eliminated(&self.eliminated(without(fold), locals)?, flight);
+                }
+                continue;
+            }
+            if whole.is_none() {
+                whole = Some(self.eliminated(without(None), locals)?);
+            }
+            whole.iter().for_each(|whole| sum.add_eliminated(whole, flight));
+        }
+        Some(())
+    }
+
+    /// The squares of a flight without its own numbers, and what those are made of.
+    fn eliminated(&self, square: DMatrix<f64>, locals: &[usize]) -> Option<(DMatrix<f64>, Option<DMatrix<f64>>)> {
+        if locals.is_empty() {
+            return Some((square, None));
+        }
+        let mut own = DMatrix::from_fn(locals.len(), locals.len(), |i, j| square[(locals[i], locals[j])]);
+        for (index, &local) in locals.iter().enumerate() {
+            own[(index, index)] += self.correlation * self.known[local].precision(0.0, 0.0);
+        }
+        let mut others = DMatrix::from_fn(locals.len(), self.size(), |i, j| square[(locals[i], j)]);
+        locals.iter().for_each(|&local| others.column_mut(local).fill(0.0));
+        let made_of = Cholesky::new(own)?.solve(&others);
+        let mut left = square;
+        left.gemm_tr(-1.0, &others, &made_of, 1.0);
+        Some((left, Some(made_of)))
     }
 
     /// Values of the numbers common to all flights, the others 0; `values` holds those that are not `open`, and the absences.
@@ -210,7 +280,7 @@ impl Point {
 
     /// The model without some effects after a damped step of the others on all blocks; `None` where they do not determine it.
     pub fn without(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Model> {
-        self.step(&self.normal(engine, &self.locals(absent), &|_| true)?, absent, DAMPING)
+        self.step(&self.normal(engine, &self.locals(absent))?, absent, DAMPING)
     }
 
     fn step(&self, normal: &Normal, absent: &[usize], damping: f64) -> Option<Model> {
@@ -271,7 +341,7 @@ impl Point {
     /// The model after the best of some steps, the damping before and after it having been tried, with its cost and damping; `None` where
     /// none lowers the cost.
     fn best_step(&self, engine: &Engine<'_>, damping: f64) -> Result<Option<(Model, f64, f64)>> {
-        let normal = self.normal(engine, &self.locals(&[]), &|_| true).ok_or_else(undetermined)?;
+        let normal = self.normal(engine, &self.locals(&[])).ok_or_else(undetermined)?;
         let mut best: Option<(Model, f64, f64)> = None;
         let mut tried = damping / DAMPING_FACTOR;
         while tried <= LARGEST_DAMPING {
@@ -339,21 +409,15 @@ impl Point {
     /// What errors in fold 0 are made of under numbers of each flight that the other fold shows.
     pub fn first_halves(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Folds> {
         let locals = self.locals(absent);
-        let normal = self.normal(engine, &locals, &|block| engine.fold[block] != 0)?;
-        Some(Folds { locals, normals: vec![normal] })
+        let normals = self.normals(engine, &locals, &[Some(0)])?;
+        Some(Folds { locals, normals })
     }
 
     /// What held-out errors are made of where these effects are left out.
     pub fn folds(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Folds> {
         let locals = self.locals(absent);
-        let one = |fold: usize| self.normal(engine, &locals, &|block| engine.fold[block] != fold);
-        #[cfg(feature = "rayon")]
-        let normals = {
-            use rayon::prelude::*;
-            (0..FOLDS).into_par_iter().map(one).collect::<Option<_>>()?
-        };
-        #[cfg(not(feature = "rayon"))]
-        let normals = (0..FOLDS).map(one).collect::<Option<_>>()?;
+        let held: Vec<Option<usize>> = (0..FOLDS).map(Some).collect();
+        let normals = self.normals(engine, &locals, &held)?;
         Some(Folds { locals, normals })
     }
 
@@ -376,7 +440,7 @@ impl Point {
     /// The numbers common to all flights, fitted to all blocks, some effects being left out.
     pub fn refitted(&self, engine: &Engine<'_>, absent: &[usize]) -> Option<Vec<f64>> {
         let (start, open) = self.start(absent);
-        self.solve(&self.normal(engine, &self.locals(absent), &|_| true)?, &open, &start, 0.0)
+        self.solve(&self.normal(engine, &self.locals(absent))?, &open, &start, 0.0)
     }
 
     /// The numbers common to all flights as they are, some effects being left out.
@@ -434,7 +498,7 @@ impl Point {
     /// For each effect that may be left out, how little these blocks know of it: the standard error of its best known number in usual sizes.
     pub fn looseness(&self, engine: &Engine<'_>) -> Option<Vec<f64>> {
         let (_, open) = self.start(&[]);
-        let normal = self.normal(engine, &self.locals(&[]), &|_| true)?;
+        let normal = self.normal(engine, &self.locals(&[]))?;
         let matrix = DMatrix::from_fn(open.len(), open.len(), |i, j| {
             let prior = if i == j { self.correlation * self.known[open[i]].precision(0.0, 0.0) } else { 0.0 };
             normal.matrix[(open[i], open[j])] + prior
@@ -473,7 +537,7 @@ fn own(made_of: &DMatrix<f64>, solved: &[f64]) -> DVector<f64> {
 }
 
 /// The blocks of each flight, as ranges.
-fn runs<'a>(engine: &'a Engine<'_>) -> impl Iterator<Item = std::ops::Range<usize>> + 'a {
+fn runs<'a>(engine: &'a Engine<'_>) -> impl Iterator<Item = Range<usize>> + 'a {
     let mut next = 0;
     engine.blocks.chunk_by(|left, right| left.flight == right.flight).map(move |run| {
         let start = next;

@@ -22,6 +22,7 @@ mod gates;
 mod gram;
 mod joint;
 mod known;
+mod ladder;
 mod own;
 mod refine;
 mod report;
@@ -39,9 +40,10 @@ mod verdict;
 
 pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
+pub use own::{Met, met};
 pub use report::{
-    CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number, ParameterValue,
-    Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,
+    Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number,
+    ParameterValue, Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,
 };
 pub use signs::number_remark;
 pub use text::LoopText;

@@ -2,6 +2,7 @@
 //! half can judge. Nothing else is fitted here, and nothing judged.
 
 use super::engine::{Engine, FOLDS};
+use super::gates::CORRELATION_S;
 use super::gram::blocks;
 use super::joint::Errors;
 use super::known::size_of;
@@ -16,6 +17,30 @@ const MOST_STEPS: usize = 6;
 /// Settled, when no number moves by more than this share of its usual size.
 const SETTLED: f64 = 1e-3;
 
+/// Models on flights that no fit has seen.
+#[derive(Clone, Debug)]
+pub struct Met {
+    /// The models, with the numbers that these flights have for themselves.
+    pub models: Vec<Model>,
+    /// What is left to judge them by.
+    pub judged: Vec<Span>,
+    /// Whether that leaves out first halves.
+    pub own_from_first_half: bool,
+}
+
+/// Finds what flights have for themselves (wind, biases) for models that no fit has shown these flights: from the first half of each, so that the
+/// second half can judge. Where no model has such numbers, or all are known, everything is judged.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub fn met(flights: &[Flight], models: &[&Model], spans: &[Span]) -> Result<Met> {
+    let halves = Halves::of(flights, models, spans);
+    let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
+    let met = |model: &&Model| halves.met(flights, model, 2.0 * CORRELATION_S / step_s);
+    let models = models.iter().map(met).collect::<Result<_>>()?;
+    Ok(Met { models, judged: halves.judged(), own_from_first_half: !halves.first.is_empty() })
+}
+
 /// Spans of flights that some fit has seen, or that need no numbers of their own; and of the others the first halves, and the second.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Halves {
@@ -25,7 +50,7 @@ pub(super) struct Halves {
 }
 
 impl Halves {
-    pub fn of(flights: &[Flight], models: &[Model], spans: &[Span]) -> Self {
+    pub fn of(flights: &[Flight], models: &[&Model], spans: &[Span]) -> Self {
         let mut halves = Self::default();
         for (flight, log) in flights.iter().enumerate() {
             let mut own: Vec<Span> = spans.iter().filter(|span| span.flight == flight).copied().collect();
@@ -253,7 +278,7 @@ pub(super) struct Judgement {
 /// As [`Model::predict`].
 pub(super) fn judged_errors(
     flights: &[Flight],
-    models: &[Model],
+    models: &[&Model],
     halves: &Halves,
     block_s: f64,
     correlation: f64,
@@ -266,7 +291,7 @@ pub(super) fn judged_errors(
     let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
     let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
     let one = |model: &Model| prediction_errors(&engine, &halves.met(flights, model, correlation)?);
-    Ok(Some(Judgement { counts, errors: models.iter().map(one).collect::<Result<_>>()? }))
+    Ok(Some(Judgement { counts, errors: models.iter().copied().map(one).collect::<Result<_>>()? }))
 }
 
 #[cfg(test)]
@@ -305,7 +330,7 @@ mod tests {
     fn a_new_flight_is_judged_on_its_second_half_by_every_model() -> Result<()> {
         let biases = [0.3, -0.2];
         let (flights, knows) = biased(&biases)?;
-        let models = [flying(), knows.clone()];
+        let models = [&flying(), &knows];
         let halves = Halves::of(&flights, &models, &whole(&flights));
         assert!(halves.seen.is_empty());
         let ends: Vec<[usize; 2]> =
@@ -331,7 +356,7 @@ mod tests {
         for coefficient in &mut knows.effects.last_mut().expect("it has effects").coefficients {
             coefficient.by_flight = Some(flights.iter().map(|flight| (flight.name.clone(), 0.0)).collect());
         }
-        let halves = Halves::of(&flights, &[flying(), knows], &whole(&flights));
+        let halves = Halves::of(&flights, &[&flying(), &knows], &whole(&flights));
         assert_eq!((halves.seen.len(), halves.first.len(), halves.second.len()), (2, 0, 0));
         Ok(())
     }
@@ -339,7 +364,7 @@ mod tests {
     #[test]
     fn errors_of_predictions_are_those_of_predicting() -> Result<()> {
         let flights = noise(3, &[3000, 1700]);
-        let halves = Halves::of(&flights, &[model()], &whole(&flights));
+        let halves = Halves::of(&flights, &[&model()], &whole(&flights));
         let engine = halves.engine(&flights, 5.0, 100.0);
         let errors = prediction_errors(&engine, &model())?;
         for (index, block) in engine.blocks.iter().enumerate() {

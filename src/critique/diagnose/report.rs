@@ -196,14 +196,37 @@ pub struct Locked {
     pub rmse_after: PerChannel,
     /// Share of the mean squared error removed, by channel, with its 95 % interval from blocks.
     pub mse_fall: BTreeMap<String, [f64; 3]>,
-    /// Root mean square error with none, one, two … of the accepted effects, in order of acceptance.
-    pub waterfall: Vec<PerChannel>,
+    /// The model as it was given, then with more and more of the accepted effects.
+    pub waterfall: Vec<Bar>,
     /// Root mean square error that no model can go below, where the explainable part of the flights is known; see [`Locked::set_floor`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub floor: Option<PerChannel>,
     /// With a floor: share of the mean squared error above it that was removed; its `mean` is that of the channels that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub removable_removed: Option<PerChannel>,
+}
+
+/// A bar of the waterfall.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bar {
+    /// Effects that it adds to the bar before it; the first adds nothing.
+    pub added: Vec<String>,
+    /// Root mean square error with them.
+    pub rmse: PerChannel,
+    /// Channels in which the mean squared error rises against the bar before by more than chance: by which share, and its 95 % interval.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub rises: BTreeMap<String, Share>,
+}
+
+impl Bar {
+    /// What it is called.
+    pub fn name(&self) -> String {
+        match self.added.as_slice() {
+            [] => "model".into(),
+            [one] => format!("+ {one}"),
+            several => format!("+ {} effects", several.len()),
+        }
+    }
 }
 
 /// What one effect is worth on the part that no search has seen, all others being in: the model without it against the model with it.
@@ -221,9 +244,9 @@ pub struct Worth {
 }
 
 impl Worth {
-    /// Its share in the channel where that is largest.
-    pub fn largest(&self) -> f64 {
-        self.share.values().map(|share| share.share).fold(f64::NEG_INFINITY, f64::max)
+    /// What it is worth at least, in the channel where that is most.
+    pub fn at_least(&self) -> f64 {
+        self.share.values().map(Share::at_least).fold(f64::NEG_INFINITY, f64::max)
     }
 }
 
@@ -291,7 +314,7 @@ pub struct Diagnosis {
     pub unknown: Option<Vec<UnknownChannel>>,
     /// The confirmation.
     pub locked: Option<Locked>,
-    /// What each accepted effect is worth there with all others in, the largest first; empty where it was not measured.
+    /// What each accepted effect is worth there with all others in, by what it is at least, the largest first; empty where it was not measured.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub worth: Vec<Worth>,
     /// Whether all effects were fitted at once and the needless left out, after a search that adds one after the other.

@@ -1,12 +1,12 @@
 //! One step of the search: every candidate tried beside a model, with its gain, its share of the error and its p-value.
 
 use super::candidate::{Candidate, with};
-use super::engine::{Engine, Pass, Trial};
+use super::engine::{Engine, Pass, Trial, priors};
 use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, LARGEST_GAIN, SMALLEST_FALL, SMALLEST_MOVEMENT};
 use super::report::Status;
 use super::search::Search;
 use super::sentences;
-use super::significance::{Raw, block_weights, raw_scores};
+use super::significance::{OwnBlocks, Raw, block_weights, raw_scores};
 use crate::error::Result;
 use crate::flight::Column;
 use crate::physics::Model;
@@ -140,7 +140,9 @@ impl Search<'_> {
         let gains: Vec<Vec<f64>> = trials.iter().map(|trial| gains(&pass.base, trial)).collect();
         let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
         let best = (0..trials.len()).max_by(|&left, &right| total(&gains[left]).total_cmp(&total(&gains[right])))?;
-        let raw: Vec<Option<Raw>> = trials.iter().map(|trial| raw_scores(&pass.base, trial, &pass.grams, weights)).collect();
+        let (flights, locals) = (self.flights(), self.locals(&pass.base));
+        let raw_scores = |trial: &&Trial, weights| raw_scores(&pass.base, trial, &pass.grams, weights, &flights, &locals);
+        let raw: Vec<Option<Raw>> = trials.iter().map(|trial| raw_scores(trial, weights)).collect();
         let p_value = if candidate.is_by_flight() {
             // The blocks of a flight share its numbers: a flight is flipped as a whole.
             let by_flight: Vec<Vec<f64>> = gains.iter().map(|gains| self.by_flight(gains)).collect();
@@ -150,7 +152,7 @@ impl Search<'_> {
             if whitened.is_empty() { 1.0 } else { self.flips.p_value(&whitened) }
         };
         let movement = trials.iter().filter_map(|trial| {
-            let raw = raw_scores(&pass.base, trial, &pass.grams, even)?;
+            let raw = raw_scores(trial, even)?;
             Some(self.movement(candidate, trial, &raw))
         });
         let movement = movement.max_by(|left, right| left.share.total_cmp(&right.share));
@@ -169,6 +171,24 @@ impl Search<'_> {
             rival: None,
             profiles: BTreeMap::new(),
         })
+    }
+
+    /// The flights with their blocks.
+    fn flights(&self) -> Vec<OwnBlocks<'_>> {
+        let Engine { flights, blocks, correlation, .. } = &self.engine;
+        let mut next = 0;
+        let runs = blocks.chunk_by(|left, right| left.flight == right.flight).map(|run| {
+            let start = next;
+            next += run.len();
+            OwnBlocks { name: &flights[run[0].flight].name, blocks: start..next, correlation: *correlation }
+        });
+        runs.collect()
+    }
+
+    /// What a model has for each flight: place in its layout, and usual spread.
+    fn locals(&self, base: &Trial) -> Vec<(usize, f64)> {
+        let priors = priors(&base.model, &base.layout, &self.engine.held);
+        priors.iter().enumerate().filter_map(|(place, prior)| Some((place, prior.by_flight?))).collect()
     }
 
     /// Share of the held-out mean squared error that a trial removes, by channel that it acts in.

@@ -2,7 +2,7 @@
 //! words fit a number. Text, JSON and page take their sentences from here, so that they cannot contradict each other.
 
 use super::gates::SMALLEST_FALL;
-use super::report::{Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict, Worth};
+use super::report::{Bar, Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict, Worth};
 use crate::critique::shares::Share;
 use crate::flight::Column;
 
@@ -55,10 +55,6 @@ pub fn unseen(kept: Kept, duration_s: f64) -> String {
     format!("{duration_s:.0} s of {} that no search has seen", kept.words())
 }
 
-/// What flights that no fit has seen are judged on, where a model has numbers of each flight.
-pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its first half. The same for \
-     every row.";
-
 /// The verdict in a few words, the head of everything that is said.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let confirmation = diagnosis.confirmation.filter(|_| diagnosis.verdict == Verdict::EffectsMissing);
@@ -102,18 +98,18 @@ pub fn worth(of: &str, all_refitted: bool) -> String {
     let others =
         if all_refitted { "and the others were fitted again" } else { "and the others, where that is possible, fitted again" };
     format!(
-        "the largest share first. Share: how much of the mean squared error before would come back on {of} if that effect alone were taken away \
+        "the largest share first, by the lower end of its interval. Share: how much of the mean squared error before would come back on {of} if that effect alone were taken away \
          {others}."
     )
 }
 
-/// `wx_dot 42 % [38, 46], wy_dot 30 % [27, 33]`: what one effect is worth, the largest first. Of the other channels only those of half a
+/// `wx_dot 42 % [38, 46], wy_dot 30 % [27, 33]`: what one effect is worth, by the lower ends of the intervals, the largest first. Of the other channels only those of half a
 /// percent and more, and more than chance.
 pub fn share(worth: &Worth) -> String {
     const SHOWN: f64 = 0.005;
     let sure = |share: &Share| share.ci95.is_none_or(|[low, high]| low > 0.0 || high < 0.0);
     let mut shares: Vec<(&String, &Share)> = worth.share.iter().filter(|(_, share)| share.share.abs() >= SHOWN).collect();
-    shares.sort_by(|left, right| right.1.share.total_cmp(&left.1.share));
+    shares.sort_by(|left, right| right.1.at_least().total_cmp(&left.1.at_least()));
     let shown = shares.into_iter().enumerate().filter(|(place, (_, share))| *place == 0 || sure(share));
     let interval =
         |share: &Share| share.ci95.map(|[low, high]| format!(" [{}, {}]", percent(low), percent(high))).unwrap_or_default();
@@ -126,6 +122,21 @@ pub fn share(worth: &Worth) -> String {
 
 /// More than all of what is removable: by a fiftieth and less a model may be below the floor by chance.
 const BELOW: f64 = 1.02;
+
+/// Where a bar of the waterfall rises by more than chance; nothing where none does.
+pub fn rises(locked: &Locked) -> Option<String> {
+    let one = |bar: &Bar| {
+        let in_channels = bar.rises.iter().map(|(channel, rise)| {
+            let interval = rise.ci95.map_or_else(String::new, |[low, high]| format!(" [{}, {}]", percent(low), percent(high)));
+            format!("{channel} by {} %{interval}", percent(rise.share))
+        });
+        let rises: Vec<String> = in_channels.collect();
+        (!rises.is_empty()).then(|| format!("with \"{}\" in {}", bar.name(), listed(&rises)))
+    };
+    let bars: Vec<String> = locked.waterfall.iter().filter_map(one).collect();
+    (!bars.is_empty())
+        .then(|| format!("The squared error rises {}: what an effect mends in one channel may cost in another.", listed(&bars)))
+}
 
 /// What the effects removed together of what could be removed; nothing without a floor.
 pub fn removable(locked: &Locked) -> Option<String> {
@@ -410,7 +421,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_names_its_channels_largest_first_and_says_where_the_others_stayed() {
+    fn a_share_names_its_channels_the_surest_first_and_says_where_the_others_stayed() {
         let of = |share: f64, half: f64| Share { share, ci95: Some([share - half, share + half]) };
         let shares = [
             ("vx_dot", of(0.304, 0.03)),
@@ -421,7 +432,11 @@ mod tests {
         ];
         let mut worth =
             Worth { share: shares.map(|(channel, share)| (channel.to_owned(), share)).into(), refitted: true, ..Worth::default() };
-        assert_eq!(share(&worth), "wx_dot 42 % [-8.0, 92], vx_dot 30 % [27, 33], wz_dot -1.0 % [-1.2, -0.8]");
+        assert_eq!(
+            share(&worth),
+            "vx_dot 30 % [27, 33], wz_dot -1.0 % [-1.2, -0.8]",
+            "the surest first, others only beyond chance"
+        );
         worth.refitted = false;
         assert!(share(&worth).ends_with("(the others as they were: without it the flights do not determine them)"));
         worth = Worth { share: [("vx_dot".to_owned(), of(0.001, 0.0))].into(), refitted: true, ..Worth::default() };

@@ -16,6 +16,7 @@ use super::gram::BlockGram;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use ndarray::Array2;
 use phyture_kernels::random::Stream;
+use std::ops::Range;
 
 /// Where in a run the signs are drawn; other draws have other sites.
 const SITE: u64 = 0x7369_676e;
@@ -42,38 +43,57 @@ pub(super) struct Raw {
     pub one_sided: bool,
 }
 
+/// A flight of the search: its name, its blocks, and how surely the usual size of a number of its own is known, beside squares that are
+/// weighted by the inverse of an error.
+pub(super) struct OwnBlocks<'a> {
+    pub name: &'a str,
+    pub blocks: Range<usize>,
+    /// Independent samples in one.
+    pub correlation: f64,
+}
+
 /// Scores of a variant against the model it would enlarge. `None` where its regressors are those of the model.
-pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weights: &[Vec<f64>; 6]) -> Option<Raw> {
+///
+/// What the model has for each flight, wind or a bias, is taken out of all columns flight by flight. `locals` are those numbers by index in the
+/// model's layout, with their usual spread.
+pub(super) fn raw_scores(
+    base: &Trial,
+    trial: &Trial,
+    grams: &[BlockGram],
+    weights: &[Vec<f64>; 6],
+    flights: &[OwnBlocks<'_>],
+    locals: &[(usize, f64)],
+) -> Option<Raw> {
     let effect = trial.model.effects.last()?;
     let one_sided = effect.coefficients.is_empty();
-    let layout = if one_sided { difference(base, trial) } else { trial.layout.clone() };
     let known = base.layout.free.len();
-    let channels: Vec<usize> =
-        (0..6).filter(|&channel| layout.channels[channel].free.iter().any(|entry| entry.0 >= known)).collect();
-    let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, grams)).collect();
-    // The model's own coefficients that act in these channels, then the effect's.
-    let mut members: Vec<usize> = reduced.iter().flat_map(|reduced| reduced.free.iter().copied()).collect();
-    members.sort_unstable();
-    members.dedup();
-    let split = members.partition_point(|&member| member < known);
-    let (size, new) = (members.len(), members.len() - split);
-    let place = |free: usize| members.binary_search(&free).unwrap_or_default();
-    // One square a block: `[X | y]ᵀ W [X | y]` over the channels.
-    let blocks: Vec<DMatrix<f64>> = (0..grams.len())
-        .map(|block| {
-            let mut square = DMatrix::zeros(size + 1, size + 1);
-            for (&channel, reduced) in channels.iter().zip(&reduced) {
-                let places: Vec<usize> = reduced.free.iter().map(|&free| place(free)).collect();
-                let to = |index: usize| places.get(index).copied().unwrap_or(size);
-                for column in 0..=places.len() {
-                    for row in 0..=places.len() {
-                        square[(to(row), to(column))] += weights[channel][block] * reduced.blocks[block][(row, column)];
-                    }
-                }
-            }
-            square
+    let is_new = |entry: &(usize, Vec<(usize, f64)>)| entry.0 >= known;
+    let channels: Vec<usize> = (0..6)
+        .filter(|&channel| match one_sided {
+            true => trial.changed[channel],
+            false => trial.layout.channels[channel].free.iter().any(is_new),
         })
         .collect();
+    // The model's own coefficients that act in these channels, then the effect's; of a swap that is the change it makes.
+    let of_channel = |&channel: &usize| {
+        let layout = if one_sided { &base.layout } else { &trial.layout };
+        layout.channels[channel].free.iter().map(|entry| entry.0).collect::<Vec<_>>()
+    };
+    let mut members: Vec<usize> = channels.iter().flat_map(of_channel).chain(one_sided.then_some(known)).collect();
+    members.sort_unstable();
+    members.dedup();
+    let is_local = |member: &usize| locals.iter().any(|local| local.0 == *member);
+    let (own, members): (Vec<usize>, Vec<usize>) = members.into_iter().partition(is_local);
+    let own: Vec<(usize, f64)> = locals.iter().filter(|local| own.contains(&local.0)).copied().collect();
+    let split = members.partition_point(|&member| member < known);
+    let (size, new) = (members.len(), members.len() - split);
+    let columns = Places { members: &members, own: &own };
+    let mut blocks: Vec<DMatrix<f64>> = Vec::with_capacity(grams.len());
+    for flight in flights {
+        let layout = if one_sided { &difference(base, trial, flight.name) } else { &trial.layout };
+        let squares = columns.squares(layout, &channels, (grams, weights), flight.blocks.clone());
+        blocks.extend(columns.without_own(squares, flight.correlation)?);
+    }
     let mut total = DMatrix::zeros(size + 1, size + 1);
     blocks.iter().for_each(|block| total += block);
     let scale = DVector::from_fn(size, |index, _| 1.0 / total[(index, index)].sqrt());
@@ -111,6 +131,66 @@ pub(super) fn raw_scores(base: &Trial, trial: &Trial, grams: &[BlockGram], weigh
     independent.then_some(Raw { scores, energy, one_sided })
 }
 
+/// Where the numbers of a test stand among its columns: those common to all flights, the measured acceleration, those of each flight.
+struct Places<'a> {
+    members: &'a [usize],
+    own: &'a [(usize, f64)],
+}
+
+impl Places<'_> {
+    fn of(&self, free: usize) -> usize {
+        let own = || self.members.len() + 1 + self.own.iter().position(|own| own.0 == free).expect("common to all or of each");
+        self.members.binary_search(&free).unwrap_or_else(|_| own())
+    }
+
+    /// One square a block: `[X | y | X of the flight]ᵀ W [X | y | X of the flight]` over the channels.
+    fn squares(
+        &self,
+        layout: &Layout,
+        channels: &[usize],
+        (grams, weights): (&[BlockGram], &[Vec<f64>; 6]),
+        range: Range<usize>,
+    ) -> Vec<DMatrix<f64>> {
+        let size = self.members.len() + 1 + self.own.len();
+        let mut squares = vec![DMatrix::zeros(size, size); range.len()];
+        for &channel in channels {
+            let reduced = Reduced::new(layout, channel, &grams[range.clone()]);
+            let places: Vec<usize> = reduced.free.iter().map(|&free| self.of(free)).chain([self.members.len()]).collect();
+            for ((sum, square), block) in squares.iter_mut().zip(&reduced.blocks).zip(range.clone()) {
+                for (column, &to) in places.iter().enumerate() {
+                    for (row, &from) in places.iter().enumerate() {
+                        sum[(from, to)] += weights[channel][block] * square[(row, column)];
+                    }
+                }
+            }
+        }
+        squares
+    }
+
+    /// The squares of a flight's blocks after its own numbers, held near zero by their usual spread, have been fitted to each column.
+    fn without_own(&self, squares: Vec<DMatrix<f64>>, correlation: f64) -> Option<Vec<DMatrix<f64>>> {
+        let common = self.members.len() + 1;
+        if self.own.is_empty() {
+            return Some(squares);
+        }
+        let size = common + self.own.len();
+        let total = squares.iter().fold(DMatrix::zeros(size, size), |total, square| total + square);
+        let mut matrix = total.view((common, common), (self.own.len(), self.own.len())).into_owned();
+        self.own.iter().enumerate().for_each(|(place, (_, spread))| matrix[(place, place)] += correlation / (spread * spread));
+        let made_of = Cholesky::new(matrix)?.solve(&total.view((common, 0), (self.own.len(), common)).into_owned());
+        // A column x becomes x - L m: squares, products and what was measured alike.
+        let one = |square: DMatrix<f64>| {
+            let mut left = square.view((0, 0), (common, common)).into_owned();
+            let across = square.view((common, 0), (self.own.len(), common));
+            let inner = square.view((common, common), (self.own.len(), self.own.len())) * &made_of - across;
+            left.gemm_tr(1.0, &made_of, &inner, 1.0);
+            left.gemm_tr(-1.0, &across, &made_of, 1.0);
+            left
+        };
+        Some(squares.into_iter().map(one).collect())
+    }
+}
+
 /// Share of a regressor that must remain once the model's regressors are taken out; less is rounding or collinearity.
 const SMALLEST_REMAINDER: f64 = 1e-6;
 
@@ -130,8 +210,8 @@ impl Raw {
     }
 }
 
-/// The layout of `base` and one coefficient more, that of the change a swap makes to the prediction.
-fn difference(base: &Trial, trial: &Trial) -> Layout {
+/// The layout of `base` and one coefficient more, that of the change a swap makes to the prediction in a flight.
+fn difference(base: &Trial, trial: &Trial, flight: &str) -> Layout {
     let mut layout = base.layout.clone();
     let new = layout.free.len();
     layout.free.push(super::design::Free { effect: trial.model.effects.len() - 1, coefficient: 0 });
@@ -143,15 +223,12 @@ fn difference(base: &Trial, trial: &Trial) -> Layout {
         };
         for (layout, sign) in [(&trial.layout, 1.0), (&base.layout, -1.0)] {
             for (free, weighted) in &layout.channels[channel].free {
-                let value = trial.values.get(*free).copied().unwrap_or_default();
+                let value = trial.value_in(*free, flight);
                 weighted.iter().for_each(|&(column, weight)| add(column, sign * weight * value));
             }
             layout.channels[channel].fixed.iter().for_each(|&column| add(column, sign));
         }
-        columns.retain(|column| column.1 != 0.0);
-        if !columns.is_empty() {
-            layout.channels[channel].free.push((new, columns));
-        }
+        layout.channels[channel].free.push((new, columns));
     }
     layout
 }
@@ -280,6 +357,27 @@ mod tests {
         };
         assert!(p(&|_| 3.0) < 0.001);
         assert!(p(&|block| if block == 5 { 1e4 } else { 0.0 }) > 0.3);
+    }
+
+    /// Two blocks of a flight with two columns in common, what was measured, and one column of the flight's own.
+    #[test]
+    fn what_a_flight_has_for_itself_is_taken_out_of_every_column() -> Result<(), &'static str> {
+        let stream = Stream::new(5, 1, 2, 3);
+        let rows: Vec<DMatrix<f64>> = (0..2)
+            .map(|block| DMatrix::from_fn(30, 4, |row, column| stream.uniform(200 * block + 4 * row as u64 + column as u64)))
+            .collect();
+        let places = Places { members: &[0, 2], own: &[(1, 0.5)] };
+        assert_eq!([0, 1, 2].map(|free| places.of(free)), [0, 3, 1]);
+        let correlation = 7.0;
+        let squares = rows.iter().map(|rows| rows.tr_mul(rows)).collect();
+        let found = places.without_own(squares, correlation).ok_or("the flight's own number is determined")?;
+        let sum = |left: usize, right: usize| rows.iter().map(|rows| rows.column(left).dot(&rows.column(right))).sum::<f64>();
+        let share = |column: usize| sum(3, column) / (sum(3, 3) + correlation / 0.25);
+        for (rows, found) in rows.iter().zip(found) {
+            let left = DMatrix::from_fn(30, 3, |row, column| rows[(row, column)] - share(column) * rows[(row, 3)]);
+            assert!((left.tr_mul(&left) - found).amax() < Tolerance::Close.relative_f64() * 30.0);
+        }
+        Ok(())
     }
 
     #[test]

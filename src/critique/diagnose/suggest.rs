@@ -39,8 +39,14 @@ pub(super) fn tried(engine: &Engine<'_>, model: &Model, unknown: &Unknown, unsee
     let held_out_mse_fall = 1.0 - engine.mse(&trial)[channel] / engine.mse(&pass.base)[channel];
     let coefficient = trial.model.effect(&effect.name).and_then(|effect| effect.coefficient(FORMULA_COEFFICIENT));
     let coefficient = coefficient.map_or(f64::NAN, |coefficient| coefficient.value);
-    let locked =
-        confirm(engine.flights, &[model.clone(), trial.model], unseen.spans, unseen.part, unseen.block_s, engine.correlation)?;
+    let locked = confirm(
+        engine.flights,
+        &[(Vec::new(), model.clone()), (Vec::new(), trial.model)],
+        unseen.spans,
+        unseen.part,
+        unseen.block_s,
+        engine.correlation,
+    )?;
     Ok(Some(TriedFormula {
         formula: suggested.formula.clone(),
         coefficient,

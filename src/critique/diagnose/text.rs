@@ -6,6 +6,7 @@ use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, Paramete
 use super::sentences::{self, percent};
 use super::signs::number_remark;
 use crate::critique::compare::PerChannel;
+use crate::critique::table::OWN_FROM_FIRST_HALF;
 use crate::critique::wrap::{clipped, wrapped};
 use crate::flight::Column;
 use std::collections::BTreeMap;
@@ -133,7 +134,7 @@ fn table(f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, [String; 6])])
 
 /// On what part of the flights a table rests, where it is not the whole.
 fn halves(f: &mut fmt::Formatter<'_>, locked: &Locked) -> fmt::Result {
-    if locked.own_from_first_half { writeln!(f, "{}", wrapped("   ", sentences::OWN_FROM_FIRST_HALF)) } else { Ok(()) }
+    if locked.own_from_first_half { writeln!(f, "{}", wrapped("   ", OWN_FROM_FIRST_HALF)) } else { Ok(()) }
 }
 
 /// What was removed on the kept part by channel: its share with interval and, with a floor, the floor and the share of what lies above it.
@@ -163,19 +164,13 @@ fn rmse_row(name: String, values: &PerChannel) -> (String, [String; 6]) {
 }
 
 /// The errors on the kept part with none, one, two … of the effects.
-fn confirmation(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Locked) -> fmt::Result {
+fn confirmation(f: &mut fmt::Formatter<'_>, locked: &Locked) -> fmt::Result {
     writeln!(f, "\nOn {} ({}):", sentences::unseen(locked.kept, locked.duration_s), locked.part)?;
-    let bar = |(step, values): (usize, &PerChannel)| {
-        let name = match step {
-            0 => "model".into(),
-            1 if locked.waterfall.len() == 2 && diagnosis.accepted.len() > 1 => "with all of them".into(),
-            step => diagnosis.accepted.get(step - 1).map_or_else(String::new, |id| format!("+ {id}")),
-        };
-        rmse_row(name, values)
-    };
-    let rows: Vec<_> = locked.waterfall.iter().enumerate().map(bar).chain(removed(locked)).collect();
+    let bars = locked.waterfall.iter().map(|bar| rmse_row(bar.name(), &bar.rmse));
+    let rows: Vec<_> = bars.chain(removed(locked)).collect();
     table(f, "RMSE", &rows)?;
     halves(f, locked)?;
+    sentences::rises(locked).map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))?;
     sentences::removable(locked)
         .filter(|_| !locked.mse_fall.is_empty())
         .map_or(Ok(()), |text| writeln!(f, "{}", wrapped("   ", &text)))
@@ -262,7 +257,7 @@ impl fmt::Display for Diagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         findings(f, self)?;
         if let Some(locked) = &self.locked {
-            confirmation(f, self, locked)?;
+            confirmation(f, locked)?;
         }
         remarks(f, self)
     }
@@ -279,13 +274,13 @@ impl fmt::Display for LoopText<'_> {
         match &whole.locked {
             // Nothing was added: what was tried, and why not.
             Some(locked) if !whole.is_confirmed() => {
-                confirmation(f, whole, locked)?;
+                confirmation(f, locked)?;
                 remarks(f, whole)?;
                 write!(f, "\n\nNothing was added: the model is the one given, calibrated")
             }
             Some(locked) => {
                 if f.alternate() {
-                    confirmation(f, whole, locked)?;
+                    confirmation(f, locked)?;
                 }
                 remarks(f, whole)?;
                 writeln!(f)?;
@@ -301,7 +296,7 @@ impl fmt::Display for LoopText<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::{Confirmation, Kept, Verdict};
+    use super::super::report::{Bar, Confirmation, Kept, Verdict};
     use super::*;
     use crate::critique::shares::Share;
 
@@ -367,7 +362,7 @@ mod tests {
                 kept: Kept::Segments,
                 duration_s: 60.0,
                 mse_fall: [("vz_dot".to_owned(), [-0.083, -0.199, -0.044])].into(),
-                waterfall: vec![PerChannel::default()],
+                waterfall: vec![Bar::default()],
                 ..Locked::default()
             }),
             ..Diagnosis::nothing(Verdict::EffectsMissing, "Said.".into())
@@ -411,7 +406,13 @@ mod tests {
             rmse_before: rmse(2.0),
             rmse_after: rmse(1.0),
             mse_fall: [("vx_dot".to_owned(), [0.75, 0.7, 0.8])].into(),
-            waterfall: (0..=count).map(|place| rmse(2.0 - place as f64 / count as f64)).collect(),
+            waterfall: (0..=count)
+                .map(|place| Bar {
+                    added: if place == 0 { Vec::new() } else { vec![name(place)] },
+                    rmse: rmse(2.0 - place as f64 / count as f64),
+                    ..Bar::default()
+                })
+                .collect(),
             ..Locked::default()
         };
         locked.set_floor(rmse(0.5));

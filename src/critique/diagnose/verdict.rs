@@ -201,7 +201,7 @@ impl Search<'_> {
         let refused: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.inapplicable.is_some()).collect();
         left.extend(self.reports(&refused, &[]));
         let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
-        let stand_ins = self.stand_ins_of(&found, [ground.before, &model], &unknown)?;
+        let stand_ins = self.stand_ins(&found, ground.before, &unknown)?;
         if stand_ins.is_empty() {
             return Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true });
         }
@@ -219,13 +219,10 @@ impl Search<'_> {
         let begun = Instant::now();
         let Heard { mut found, left, unknown, roads, at_once } = heard;
         let Ground { flights, locked, part, block_s, .. } = *ground;
-        let mut models = vec![ground.before.clone()];
-        // Effects that were found at once have one model, and one bar.
-        let steps = if at_once { found.len().saturating_sub(1) } else { 0 };
-        models.extend(found.iter().skip(steps).map(|found| found.model.clone()));
+        let rungs = self.ladder(ground.before, &found, at_once)?;
         diagnosis.both_roads = at_once;
         diagnosis.notes.extend(roads);
-        let after = models.last().cloned().unwrap_or_else(|| ground.before.clone());
+        let after = rungs.last().map_or_else(|| ground.before.clone(), |rung| rung.1.clone());
         diagnosis.accepted = found.iter().map(|found| found.step.effect.clone()).collect();
         // Two that were accepted beside each other have been told apart.
         for found in &mut found {
@@ -234,7 +231,7 @@ impl Search<'_> {
         diagnosis.steps = found.into_iter().map(|found| found.step).collect();
         diagnosis.candidates = left;
         diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
-        diagnosis.locked = confirm(flights, &models, locked, part, block_s, self.engine.correlation)?;
+        diagnosis.locked = confirm(flights, &rungs, locked, part, block_s, self.engine.correlation)?;
         diagnosis.confirmation = diagnosis.confirmed();
         diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {
             (false, _) => Verdict::EffectsMissing,
@@ -258,33 +255,13 @@ impl Search<'_> {
         diagnosis.seconds += begun.elapsed().as_secs_f64();
         Ok(Outcome { diagnosis, model: after })
     }
-}
 
-impl Search<'_> {
-    /// The same of effects that were found at once, by what the models before and after predict.
-    fn stand_ins_of(&self, found: &[Found], models: [&Model; 2], unknown: &[Unknown]) -> Result<Vec<String>> {
-        if unknown.is_empty() {
-            return Ok(Vec::new());
-        }
-        let rows = self.engine.rows().max(1) as f64;
-        let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
-        let [whole, left] = [mse(models[0])?, mse(models[1])?];
-        let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
-        let is_one = |found: &&Found| {
-            let effect = found.model.effect(&found.step.effect);
-            effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
-        };
-        Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
-    }
-}
-
-impl Search<'_> {
-    /// Effects that only stand in for a dependence outside the catalogue.
+    /// Effects that only stand in for a dependence outside the catalogue, by what the models before and after predict.
     fn stand_ins(&self, found: &[Found], before: &Model, unknown: &[Unknown]) -> Result<Vec<String>> {
         let Some(last) = found.last().filter(|_| !unknown.is_empty()) else { return Ok(Vec::new()) };
-        let pass = self.engine.pass(before, std::slice::from_ref(&last.model))?;
-        let whole = self.engine.mse(&pass.base);
-        let left = pass.trials.first().and_then(Option::as_ref).map_or(whole, |trial| self.engine.mse(trial));
+        let rows = self.engine.rows().max(1) as f64;
+        let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
+        let [whole, left] = [mse(before)?, mse(&last.model)?];
         let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
         let is_one = |found: &&Found| {
             let effect = found.model.effect(&found.step.effect);

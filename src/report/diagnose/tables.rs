@@ -5,9 +5,9 @@ use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
 use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
-use crate::critique::diagnose::sentences::{OWN_FROM_FIRST_HALF, removable, share, tried, unseen, worth};
+use crate::critique::diagnose::sentences::{removable, rises, share, tried, unseen, worth};
 use crate::critique::diagnose::{CandidateReport, Diagnosis, Locked, Status, Step, number_remark};
-use crate::critique::table::{Kind, significant};
+use crate::critique::table::{Kind, OWN_FROM_FIRST_HALF, significant};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Span};
 use crate::physics::catalogue;
@@ -209,15 +209,9 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
     let mut values: Vec<Vec<Option<f64>>> = Vec::new();
     for diagnosis in report.diagnoses {
         let Some(locked) = &diagnosis.locked else { continue };
-        for (step, rmse) in locked.waterfall.iter().enumerate().skip(usize::from(!values.is_empty())) {
-            names.push(match step {
-                0 => "model".to_owned(),
-                1 if locked.waterfall.len() == 2 && diagnosis.accepted.len() > 1 => {
-                    format!("+ {} effects", diagnosis.accepted.len())
-                }
-                _ => diagnosis.accepted.get(step - 1).map_or_else(|| "?".into(), |effect| format!("+ {effect}")),
-            });
-            values.push(rmse.channels().into());
+        for bar in locked.waterfall.iter().skip(usize::from(!values.is_empty())) {
+            names.push(bar.name());
+            values.push(bar.rmse.channels().into());
         }
     }
     if values.is_empty() {
@@ -228,10 +222,11 @@ pub(super) fn waterfall(report: &DiagnoseReport<'_>) -> Vec<Part> {
     let caption = if names.len() == 1 {
         "Nothing was added. The bar is what is left of the error on the part that no search has seen."
     } else {
-        "Each bar adds one effect, in order of acceptance. Look for the step in the channels that an effect changes; a bar that does \
-         not fall here, on the part that no search has seen, speaks against it."
+        "Each bar adds what its name says to the one before, with the numbers of all that are in fitted again. Look for the step in the channels \
+         that an effect changes; a bar that does not fall here, on the part that no search has seen, speaks against it."
     };
     let mut words = Vec::new();
+    words.extend(report.diagnoses.iter().filter_map(|diagnosis| rises(diagnosis.locked.as_ref()?)).map(Part::Text));
     if report.told().iter().any(|diagnosis| diagnosis.locked.as_ref().is_some_and(|locked| locked.own_from_first_half)) {
         words.push(Part::Text(OWN_FROM_FIRST_HALF.into()));
     }

@@ -3,6 +3,7 @@
 use super::predict::read_network;
 use super::{Context, data_sha256, explainable};
 use crate::arguments::{Data, Division};
+use phyture::critique::diagnose::{Met, met};
 use phyture::critique::shares::{self, shares};
 use phyture::critique::table::ordinal;
 use phyture::critique::uncertainty::{Effort, uncertainty};
@@ -195,11 +196,20 @@ pub struct Judged {
 impl Contest<'_> {
     /// Predicts and compares on the test part of `split`. The yardsticks come first, the models after them.
     pub fn run(&self, context: &Context, set: &DataSet, split: &Split) -> Result<Judged> {
-        let windows = windows(&split.test, self.history, self.stride);
+        let of_networks = self.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
+        let all: Vec<&Model> = self.models.iter().map(|(_, model)| model).chain(of_networks).collect();
+        let Met { models: met, judged: spans, own_from_first_half } = met(&set.flights, &all, &split.test)?;
+        let (models, of_networks) = met.split_at(self.models.len());
+        let windows = windows(&spans, self.history, self.stride);
         if windows.is_empty() {
             return Err(Error::Undetermined(format!(
-                "no run of test samples is as long as the {} samples of history; give longer flights or lock whole flights with --lock",
-                self.history
+                "no run of test samples is as long as the {} samples of history{}; give longer flights or lock whole flights with --lock",
+                self.history,
+                if own_from_first_half {
+                    ", second halves of flights judging models that know each flight from its first"
+                } else {
+                    ""
+                }
             )));
         }
         let mut rows = vec![finite_difference(&set.flights, &windows)?];
@@ -207,27 +217,31 @@ impl Contest<'_> {
             let training = phyture::flight::windows::windows(&split.training, lags, 1);
             rows.push(ridge(&set.flights, &training, &windows, &LinearConfig { lags, ..LinearConfig::default() })?);
         }
-        for (name, model) in self.models {
+        for ((name, _), model) in self.models.iter().zip(models) {
             let columns = set.flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
             let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
             rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
         }
         let reference = rows.len() - self.models.len();
         let mut judged = Vec::new();
-        for (name, hybrid) in self.networks {
+        let networks = self.networks.iter().zip(of_networks).map(|((name, hybrid), model)| Ok((name, hybrid.on(model.clone())?)));
+        let networks: Vec<(&String, Hybrid)> = networks.collect::<Result<_>>()?;
+        for (name, hybrid) in &networks {
             let stages = hybrid.stages(&set.flights, &windows, context.threads())?;
             let own = &hybrid.description().model;
             // The first model is what the shares are of, unless the network was trained on that very model.
-            let other = self.models.first().is_some_and(|(_, model)| model.effects != own.effects);
-            let model = self.models.iter().find(|(_, model)| model.effects == own.effects).map_or(&own.name, |(name, _)| name);
+            let other = models.first().is_some_and(|model| model.effects != own.effects);
+            let same = models.iter().position(|model| model.effects == own.effects);
+            let model = same.map_or(&own.name, |index| &self.models[index].0);
             let row = other.then(|| rows.get(reference)).flatten();
             judged.push(shares(&set.flights, &windows, row, &shares::Judged { name, model, stages: &stages })?);
-            rows.push(Row { name: name.clone(), predicted: stages.hybrid });
+            rows.push(Row { name: (*name).clone(), predicted: stages.hybrid });
         }
         let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
         comparison.stride = self.stride;
+        comparison.own_from_first_half = own_from_first_half;
         comparison.shares = judged;
-        for (name, hybrid) in self.networks.iter().filter(|_| self.uncertainty) {
+        for (name, hybrid) in networks.iter().filter(|_| self.uncertainty) {
             let effort = Effort::for_history(hybrid.description().config.history(), context.seed());
             comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, context.threads())?);
         }

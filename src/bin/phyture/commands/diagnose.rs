@@ -293,7 +293,7 @@ pub fn told_together(context: &Context, task: &Task<'_>, before: &Model, amended
 /// Adds lines at the end of the ledger and never changes what is there. A round that a killed run has written stands in it once.
 fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
     let mut lines = Vec::new();
-    for (index, step) in diagnosis.steps.iter().enumerate() {
+    for step in &diagnosis.steps {
         let line = LedgerLine {
             round,
             effect: &step.effect,
@@ -302,7 +302,11 @@ fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
             selection_frequency: step.selection_frequency,
             indistinguishable: &step.indistinguishable,
             p_value: step.p_value,
-            rmse_locked: diagnosis.locked.as_ref().and_then(|locked| locked.waterfall.get(index + 1).copied()),
+            rmse_locked: diagnosis
+                .locked
+                .as_ref()
+                .and_then(|locked| locked.waterfall.iter().find(|bar| bar.added.contains(&step.effect)))
+                .map(|bar| bar.rmse),
             data_sha256: &diagnosis.data_sha256,
             version: &diagnosis.version,
         };
