@@ -5,7 +5,7 @@
 //! windows into blocks and turns block sums into a mean and its 95 % interval. It does not know what is averaged.
 
 use crate::flight::{Flight, Window};
-use crate::student::quantile_975;
+use crate::student::{quantile_975, upper_quantile};
 
 /// Length of a block, s. Longer than the manoeuvres and the slow attitude and speed modes of a small helicopter (1 s to 5 s).
 pub const BLOCK_S: f64 = 10.0;
@@ -103,7 +103,12 @@ impl BlockMean {
 
     /// 95 % interval of the mean, mean ± t · standard error with B − 1 degrees of freedom.
     pub fn interval(&self) -> Option<[f64; 2]> {
-        let half = quantile_975(self.blocks.saturating_sub(1) as f64) * self.standard_error?;
+        self.interval_of(1)
+    }
+
+    /// One of so many intervals that all hold together with 95 % (Bonferroni).
+    pub fn interval_of(&self, count: usize) -> Option<[f64; 2]> {
+        let half = upper_quantile(0.025 / count.max(1) as f64, self.blocks.saturating_sub(1) as f64) * self.standard_error?;
         Some([self.mean - half, self.mean + half])
     }
 

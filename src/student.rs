@@ -1,20 +1,28 @@
-//! The quantile of Student's t that a 95 % interval needs: the one place for it. No other statistics.
+//! The quantiles of Student's t that intervals need: the one place for them. No other statistics.
 
 /// The 97.5 % quantile of Student's t with `degrees` degrees of freedom, which need not be whole; between 0 and 1 they
 /// count as 1, and without any the quantile is infinite.
 ///
 /// Bisection on the distribution function, 1/2 + sign(t) (1 - I_x(ν/2, 1/2)) / 2 with x = ν/(ν + t²).
 pub fn quantile_975(degrees: f64) -> f64 {
+    upper_quantile(0.025, degrees)
+}
+
+/// The value that Student's t exceeds with probability `tail`, above 0 and at most one half; degrees as of [`quantile_975`].
+pub fn upper_quantile(tail: f64, degrees: f64) -> f64 {
     if degrees <= 0.0 {
         return f64::INFINITY;
     }
     let degrees = if degrees >= 1.0 { degrees.min(1e7) } else { 1.0 };
     let upper_tail = |t: f64| 0.5 * incomplete_beta(0.5 * degrees, 0.5, degrees / (degrees + t * t));
-    // 12.706… is the value for one degree of freedom, the largest.
+    // 12.706… is the value for one degree of freedom and 2.5 %.
     let (mut low, mut high) = (0.0, 13.0);
+    while upper_tail(high) > tail {
+        (low, high) = (high, 2.0 * high);
+    }
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if upper_tail(middle) > 0.025 { low = middle } else { high = middle }
+        if upper_tail(middle) > tail { low = middle } else { high = middle }
     }
     0.5 * (low + high)
 }

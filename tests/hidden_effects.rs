@@ -83,6 +83,19 @@ fn many_effects_hidden_at_once_are_named_from_both_ends() -> Result<()> {
     Ok(())
 }
 
+/// Wind moves vz_dot more than all else here, and a sensor's lever ties the numbers of all channels together: neither may hide from the test of
+/// another effect what that removes, be it a change of a signal in time or a number of its own.
+#[test]
+fn what_a_flight_has_for_itself_hides_nothing_else() -> Result<()> {
+    for (others, seed) in [(&["inflow_lag"][..], 1191), (&["imu_lever", "mass_drift"][..], 1193)] {
+        let diagnosis = search(&session(15.0, others, Level::TWO, seed)?, seed)?;
+        let mut named = named(&diagnosis, Level::TWO);
+        named.sort_unstable();
+        assert!(named == others && diagnosis.accepted.iter().any(|name| name == "wind"), "{diagnosis:#}");
+    }
+    Ok(())
+}
+
 /// Of the twelve the search is to name 97 % first: eleven or more then with a probability of 95 %, ten or more with 99.5 %. Ten are
 /// asked. A name drawn from the catalogue would be right once in thirty.
 #[test]

@@ -71,7 +71,8 @@ impl Mechanism {
     /// Largest scale: beyond it the pilot is not shown to keep the aircraft in the air, in any of the classes.
     pub const fn largest_scale(self) -> f64 {
         match self {
-            Self::VortexRing | Self::Turbulence => 1.5,
+            Self::VortexRing => 1.2,
+            Self::Turbulence => 1.5,
             _ => 3.0,
         }
     }

@@ -121,7 +121,7 @@ impl Search<'_> {
         }
         let may_go = |effect: &Effect| is_found(effect) || candidates.iter().any(|candidate| candidate.id == effect.name);
         let optional = |model: &Model| (0..model.effects.len()).filter(|&index| may_go(&model.effects[index])).collect::<Vec<_>>();
-        let (quick, judging) = (self.even(QUICK, BLOCK_S), self.judging());
+        let (quick, judging) = (self.quick(), self.judging());
         let road = Road { flips: Flips::new(judging.blocks.len(), self.options.seed), engine: judging, largest_p: self.largest_p };
         let mut gone: Vec<Judged> = Vec::new();
         let mut round = 1;
@@ -159,6 +159,11 @@ impl Search<'_> {
         let engine = Engine { held: self.engine.held.clone(), ..self.judging() };
         let flips = (2 * engine.rows() <= self.engine.rows()).then(|| Flips::new(engine.blocks.len(), self.options.seed))?;
         Some(Search { engine, flips, largest_p: self.largest_p, options: self.options })
+    }
+
+    /// What is cheap to fit on.
+    pub(super) fn quick(&self) -> Engine<'_> {
+        self.even(QUICK, BLOCK_S)
     }
 
     /// What effects are judged on.

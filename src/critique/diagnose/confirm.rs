@@ -59,27 +59,31 @@ pub(super) fn confirm(
         rmse_before: rmse(first),
         rmse_after: rmse(last),
         mse_fall,
-        waterfall: rungs
-            .iter()
-            .zip(&errors)
-            .enumerate()
-            .map(|(place, ((added, _), own))| Bar {
-                added: added.clone(),
-                rmse: rmse(own),
-                rises: if place == 0 { BTreeMap::new() } else { rises(&errors[place - 1], own) },
-            })
-            .collect(),
+        waterfall: waterfall(rungs, &errors, &rmse),
         floor: None,
         removable_removed: None,
     }))
 }
 
-/// Channels whose error is larger than before by more than chance, block against block.
-fn rises(before: &Errors, after: &Errors) -> BTreeMap<String, Share> {
+/// A bar for each model.
+fn waterfall(rungs: &[Rung], errors: &[Errors], rmse: &dyn Fn(&Errors) -> PerChannel) -> Vec<Bar> {
+    let pairs: Vec<[&Errors; 2]> = errors.windows(2).map(|pair| [&pair[0], &pair[1]]).collect();
+    let differing = |[before, after]: &[&Errors; 2]| (0..6).filter(|&channel| before[channel] != after[channel]).count();
+    let comparisons: usize = pairs.iter().map(differing).sum();
+    let bar = |((added, _), own): (&Rung, &Errors)| Bar { added: added.clone(), rmse: rmse(own), rises: BTreeMap::new() };
+    let mut bars: Vec<Bar> = rungs.iter().zip(errors).map(bar).collect();
+    for (bar, pair) in bars.iter_mut().skip(1).zip(pairs) {
+        bar.rises = rises(pair, comparisons);
+    }
+    bars
+}
+
+/// Channels whose error is larger than before by more than chance, block against block; one of so many comparisons.
+fn rises([before, after]: [&Errors; 2], comparisons: usize) -> BTreeMap<String, Share> {
     let of = |channel: usize| {
         let pairs = before[channel].iter().zip(&after[channel]);
         let mean = BlockMean::ratio(pairs.map(|(before, after)| BlockSum { samples: *before, sum: after - before }))?;
-        let rise = Share { share: mean.mean, ci95: mean.interval() };
+        let rise = Share { share: mean.mean, ci95: mean.interval_of(comparisons) };
         rise.ci95.is_some_and(|[low, _]| low > 0.0).then(|| (Column::TARGETS[channel].name().to_owned(), rise))
     };
     (0..6).filter_map(of).collect()
@@ -105,6 +109,20 @@ mod tests {
     use crate::flight::Targets;
     use crate::flight::split::{Protocol, Split};
     use crate::physics::catalogue;
+
+    #[test]
+    fn a_rise_beyond_chance_is_noted_and_one_within_is_not() {
+        let blocks =
+            |values: [f64; 4]| -> Errors { std::array::from_fn(|channel| if channel == 2 { values.into() } else { vec![1.0; 4] }) };
+        let before = blocks([1.0, 1.1, 0.9, 1.0]);
+        let found = rises([&before, &blocks([1.2, 1.31, 1.1, 1.19])], 6);
+        assert!(found.len() == 1 && (found["vz_dot"].share - 0.2).abs() < 1e-12, "{found:?}");
+        assert!(rises([&before, &blocks([1.5, 0.9, 1.3, 0.8])], 6).is_empty(), "some blocks up, some down");
+        assert!(rises([&before, &blocks([0.8, 0.9, 0.7, 0.8])], 6).is_empty(), "a fall");
+        // Half the difference in every block, and its scatter: enough for one comparison, too little for many.
+        let little = blocks([1.1, 1.14, 0.97, 1.06]);
+        assert_eq!([1, 60].map(|count| rises([&before, &little], count).len()), [1, 0]);
+    }
 
     #[test]
     fn the_part_kept_is_called_what_it_is() -> Result<()> {

@@ -213,7 +213,8 @@ pub struct Bar {
     pub added: Vec<String>,
     /// Root mean square error with them.
     pub rmse: PerChannel,
-    /// Channels in which the mean squared error rises against the bar before by more than chance: by which share, and its 95 % interval.
+    /// Channels in which the mean squared error rises against the bar before by more than chance: by which share, and its interval; those of all
+    /// bars hold together with 95 %.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub rises: BTreeMap<String, Share>,
 }

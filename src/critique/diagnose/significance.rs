@@ -11,7 +11,7 @@
 
 use super::design::Layout;
 use super::engine::Trial;
-use super::fit::Reduced;
+use super::fit::{Reduced, components};
 use super::gram::BlockGram;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use ndarray::Array2;
@@ -67,13 +67,14 @@ pub(super) fn raw_scores(
     let effect = trial.model.effects.last()?;
     let one_sided = effect.coefficients.is_empty();
     let known = base.layout.free.len();
-    let is_new = |entry: &(usize, Vec<(usize, f64)>)| entry.0 >= known;
-    let channels: Vec<usize> = (0..6)
-        .filter(|&channel| match one_sided {
-            true => trial.changed[channel],
-            false => trial.layout.channels[channel].free.iter().any(is_new),
-        })
-        .collect();
+    // A number that acts in several channels is known from all of them.
+    let acts = |channel: &usize| match one_sided {
+        true => trial.changed[*channel],
+        false => trial.layout.channels[*channel].free.iter().any(|entry| entry.0 >= known),
+    };
+    let fitted_together = components(&trial.layout).into_iter().map(|(channels, _)| channels);
+    let mut channels: Vec<usize> = fitted_together.filter(|channels| channels.iter().any(acts)).flatten().collect();
+    channels.sort_unstable();
     // The model's own coefficients that act in these channels, then the effect's; of a swap that is the change it makes.
     let of_channel = |&channel: &usize| {
         let layout = if one_sided { &base.layout } else { &trial.layout };
