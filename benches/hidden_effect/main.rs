@@ -5,11 +5,13 @@
 //!                                                                        confusables or textbook
 //!     cargo bench --bench hidden_effect -- development OUT.jsonl [PART…] the same on development seeds
 //!     cargo bench --bench hidden_effect -- table OUT.jsonl               the tables
+//!     cargo bench --bench hidden_effect -- implants DATA FIXTURES        known effects in recorded flights, described by the files in FIXTURES
 //!
 //! Each run is a line of JSON, appended; a run that is there already is not repeated. Truth comes from `sim/`, which shares no code
 //! with the catalogue.
 
 mod cases;
+mod implants;
 mod run;
 mod tables;
 
@@ -22,6 +24,7 @@ fn main() -> phyture::Result<()> {
         ["run", out, parts @ ..] => run::all(Path::new(out), parts, run::REPORTED),
         ["development", out, parts @ ..] => run::all(Path::new(out), parts, run::DEVELOPMENT),
         ["table", out] => tables::print(Path::new(out)),
+        ["implants", data, fixtures] => implants::print(Path::new(data), Path::new(fixtures)),
         _ => {
             let out = std::env::temp_dir().join(format!("hidden_effect_{}.jsonl", std::process::id()));
             run::few(&out)?;
