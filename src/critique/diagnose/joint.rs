@@ -481,6 +481,14 @@ impl Point {
     /// Journal of Official Statistics 17:521), given those of each flight.
     pub fn note_intervals(&mut self, folds: &Folds) {
         let (start, open) = self.start(&[]);
+        // A number on its bound has none, whatever an earlier fit said.
+        for (number, free) in self.layout.free.iter().enumerate().filter(|(number, _)| open.binary_search(number).is_err()) {
+            if let Some((_, ci95)) =
+                self.model.effects[free.effect].number_mut(free.coefficient).filter(|_| !self.known[number].is_local)
+            {
+                *ci95 = None;
+            }
+        }
         let without: Option<Vec<Vec<f64>>> = folds.normals.iter().map(|normal| self.solve(normal, &open, &start, 0.0)).collect();
         let Some(without) = without else { return };
         let count = without.len() as f64;
