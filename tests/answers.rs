@@ -221,6 +221,40 @@ fn the_loop_ends_with_before_and_after_and_gives_each_number_once() -> Result<()
     Ok(())
 }
 
+/// A model that knows of wind meets flights that nobody fitted: it finds their wind in the first halves, and every model is judged on the second.
+#[test]
+fn wind_of_new_flights_is_found_in_their_first_halves_and_all_are_judged_on_the_second() -> Result<()> {
+    let place = folder()?;
+    let at = place.path();
+    run(at, &["simulate", "data", "--minutes", "10", "--level", "2", "--seed", "7409", "--hide", "wind"])?;
+    run(at, &["effect", "add", "wind", "-m", "data/model.toml", "-o", "with.toml"])?;
+    for (from, to) in [("data/model.toml", "calm.toml"), ("with.toml", "windy.toml")] {
+        run(at, &["calibrate", "data", "-m", from, "-o", to, "--lock", "chaos", "--lock", "descents"])?;
+    }
+    let compared = |models: &[&str], json_file: &str| -> Result<(String, Value)> {
+        let mut arguments = vec!["compare", "data", "--lock", "chaos", "--lock", "descents", "--json", json_file];
+        models.iter().for_each(|model| arguments.extend(["-m", model]));
+        let said = run(at, &arguments)?;
+        fits(&said);
+        Ok((said, json(at, json_file)?))
+    };
+    let (said, found) = compared(&["calm.toml", "windy.toml"], "both.json")?;
+    let (said_calm, calm) = compared(&["calm.toml"], "calm.json")?;
+    assert!(said.contains("Second halves of these flights") && found["own_from_first_half"] == true, "{said}");
+    assert!(!said_calm.contains("Second halves") && calm["own_from_first_half"] == false, "{said_calm}");
+    let windows = |found: &Value| found["models"].as_array().and_then(|models| models.last()?["windows"].as_u64()).unwrap_or(0);
+    let [half, whole] = [&found, &calm].map(windows);
+    assert!(half > 0 && (2 * half).abs_diff(whole) <= 8, "{half} of {whole}");
+    let rmse = |name: &str| {
+        let models = found["models"].as_array().cloned().unwrap_or_default();
+        let model = models.iter().find(|model| model["name"] == name).cloned().unwrap_or_default();
+        model["rmse"]["vz_dot"].as_f64().unwrap_or(f64::NAN)
+    };
+    // Wind is most of this error; with its mean over other flights nothing of it would be gone.
+    assert!(rmse("windy") < 0.6 * rmse("calm"), "{} {}", rmse("windy"), rmse("calm"));
+    Ok(())
+}
+
 /// The floor is beside what is found, in text, JSON and page; and what is found does not change by it.
 #[test]
 fn the_explainable_part_shows_the_floor_and_is_never_searched() -> Result<()> {

@@ -43,12 +43,11 @@ pub(super) struct Raw {
     pub one_sided: bool,
 }
 
-/// A flight of the search: its name, its blocks, and how surely the usual size of a number of its own is known, beside squares that are
-/// weighted by the inverse of an error.
+/// The blocks of a flight.
 pub(super) struct OwnBlocks<'a> {
     pub name: &'a str,
     pub blocks: Range<usize>,
-    /// Independent samples in one.
+    /// Samples that tell as much as one independent one.
     pub correlation: f64,
 }
 
@@ -87,7 +86,6 @@ pub(super) fn raw_scores(
     let (own, members): (Vec<usize>, Vec<usize>) = members.into_iter().partition(is_local);
     let own: Vec<(usize, f64)> = locals.iter().filter(|local| own.contains(&local.0)).copied().collect();
     let split = members.partition_point(|&member| member < known);
-    let (size, new) = (members.len(), members.len() - split);
     let columns = Places { members: &members, own: &own };
     let mut blocks: Vec<DMatrix<f64>> = Vec::with_capacity(grams.len());
     for flight in flights {
@@ -95,6 +93,13 @@ pub(super) fn raw_scores(
         let squares = columns.squares(layout, &channels, (grams, weights), flight.blocks.clone());
         blocks.extend(columns.without_own(squares, flight.correlation)?);
     }
+    scores(&blocks, split, one_sided)
+}
+
+/// Block scores of the columns from `split` on against those before, from squares of all columns and what was measured in the last place.
+fn scores(blocks: &[DMatrix<f64>], split: usize, one_sided: bool) -> Option<Raw> {
+    let size = blocks.first()?.nrows() - 1;
+    let new = size - split;
     let mut total = DMatrix::zeros(size + 1, size + 1);
     blocks.iter().for_each(|block| total += block);
     let scale = DVector::from_fn(size, |index, _| 1.0 / total[(index, index)].sqrt());
@@ -118,7 +123,7 @@ pub(super) fn raw_scores(
     for column in 0..new {
         tilde[(split + column, column)] = 1.0;
     }
-    let (mut scores, mut energy) = (DMatrix::zeros(grams.len(), new), DMatrix::zeros(grams.len(), new));
+    let (mut scores, mut energy) = (DMatrix::zeros(blocks.len(), new), DMatrix::zeros(blocks.len(), new));
     for (index, block) in blocks.iter().enumerate() {
         let half = block * &tilde;
         for column in 0..new {
