@@ -49,12 +49,17 @@ pub struct Coefficient {
 impl Coefficient {
     /// The value in a flight. [`Model::check_flights`](super::Model::check_flights) refuses names that could mean several.
     pub fn in_flight(&self, flight: &str) -> f64 {
-        let Some(values) = &self.by_flight else { return self.value };
+        self.own_in_flight(flight).unwrap_or(self.value)
+    }
+
+    /// The value that a flight has for itself, if the coefficient knows it.
+    pub fn own_in_flight(&self, flight: &str) -> Option<f64> {
+        let values = self.by_flight.as_ref()?;
         let of_one = || match matching(flight, values.keys().map(String::as_str)).as_slice() {
             [name] => values.get(*name),
             _ => None,
         };
-        values.get(flight).or_else(of_one).copied().unwrap_or(self.value)
+        values.get(flight).or_else(of_one).copied()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The models between the one that was given and the one with all that was found, by which it shows how the error falls. Nothing is
 //! searched or decided here, and no error measured.
 
+use super::candidate::with;
 use super::confirm::Rung;
 use super::joint::Point;
 use super::search::{Found, Search};
@@ -10,8 +11,8 @@ use crate::physics::Model;
 /// Effects that were found at once and have a rung of their own, at most; the others share the last one.
 const RUNGS: usize = 9;
 
-/// Steps in which a rung's numbers are fitted, at most, from where they are best beside all others.
-const STEPS: usize = 4;
+/// Steps in which a rung's numbers are fitted, at most, from those of the rung before.
+const STEPS: usize = 8;
 
 impl Search<'_> {
     /// The given model, then with one effect after the other as they were found. Effects that were found at once are added by what they
@@ -30,16 +31,17 @@ impl Search<'_> {
         let added: Vec<&str> = found.iter().filter(is_new).map(|found| found.step.effect.as_str()).collect();
         let alone = if added.len() <= RUNGS + 1 { added.len().saturating_sub(1) } else { RUNGS };
         let engine = self.quick();
-        let place = |name: &&str| last.model.effects.iter().position(|effect| effect.name == **name);
-        let point = Point::at(&engine, last.model.clone(), added.iter().filter_map(place).collect())?;
-        let mut waiting: Vec<String> = Vec::new();
-        for (index, effect) in added.iter().enumerate().take(alone) {
+        let (mut waiting, mut rung) = (Vec::new(), before.clone());
+        for effect in added.iter().take(alone) {
             waiting.push((*effect).to_owned());
-            let absent: Vec<usize> = (index + 1..added.len()).collect();
-            // Where the flights do not determine the others without all these, the effect shares the next rung.
-            let Some(model) = point.without(&engine, &absent) else { continue };
-            match Point::fitted(&engine, model, STEPS) {
-                Ok(model) => rungs.push((std::mem::take(&mut waiting), model)),
+            // The numbers of the rung before, and the effect with those that it has beside all others.
+            rung = with(&rung, last.model.effect(effect).expect("it was found"));
+            match Point::fitted(&engine, rung.clone(), STEPS) {
+                Ok(model) => {
+                    rungs.push((std::mem::take(&mut waiting), model.clone()));
+                    rung = model;
+                }
+                // Where the flights do not determine the others' numbers yet, the effect shares the next rung.
                 Err(Error::Undetermined(_)) => {}
                 Err(error) => return Err(error),
             }

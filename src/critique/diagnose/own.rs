@@ -119,8 +119,7 @@ fn own_numbers(model: &Model) -> Vec<(usize, usize)> {
 }
 
 fn is_known(model: &Model, effect: usize, index: usize, flight: &str) -> bool {
-    let values = &model.effects[effect].coefficients[index].by_flight;
-    values.as_ref().is_some_and(|values| values.contains_key(flight))
+    model.effects[effect].coefficients[index].own_in_flight(flight).is_some()
 }
 
 /// What one flight says of its own numbers, by channel: `JᵀJ`, `Jᵀr` and `rᵀr`.
