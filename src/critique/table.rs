@@ -262,8 +262,8 @@ pub const FLOOR: &str = "Floor: what is left of the recorded accelerations witho
                          remove it.";
 
 /// What flights that no fit has seen are judged on, where a model has numbers of each flight.
-pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its first half. The same for \
-     every row.";
+pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its \
+                                       first half. The same for every row.";
 
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

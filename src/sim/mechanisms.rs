@@ -72,7 +72,7 @@ impl Mechanism {
     pub const fn largest_scale(self) -> f64 {
         match self {
             Self::VortexRing => 1.2,
-            Self::Turbulence => 1.5,
+            Self::StallSaturation | Self::Turbulence => 1.5,
             _ => 3.0,
         }
     }

@@ -98,13 +98,13 @@ pub fn worth(of: &str, all_refitted: bool) -> String {
     let others =
         if all_refitted { "and the others were fitted again" } else { "and the others, where that is possible, fitted again" };
     format!(
-        "the largest share first, by the lower end of its interval. Share: how much of the mean squared error before would come back on {of} if that effect alone were taken away \
-         {others}."
+        "the largest share first, by the lower end of its interval. Share: how much of the mean squared error before would come back on \
+         {of} if that effect alone were taken away {others}."
     )
 }
 
-/// `wx_dot 42 % [38, 46], wy_dot 30 % [27, 33]`: what one effect is worth, by the lower ends of the intervals, the largest first. Of the other channels only those of half a
-/// percent and more, and more than chance.
+/// `wx_dot 42 % [38, 46], wy_dot 30 % [27, 33]`: what one effect is worth, by the lower ends of the intervals, the largest first. Of the other
+/// channels only those of half a percent and more, and more than chance.
 pub fn share(worth: &Worth) -> String {
     const SHOWN: f64 = 0.005;
     let sure = |share: &Share| share.ci95.is_none_or(|[low, high]| low > 0.0 || high < 0.0);
