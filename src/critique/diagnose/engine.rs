@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::flight::{Flight, Span};
 use crate::physics::{Model, Regressor, Wanted, calibrate, catalogue};
 use phyture_kernels::random::permutation;
+use std::ops::Range;
 
 /// Folds over the blocks.
 pub(super) const FOLDS: usize = 10;
@@ -86,6 +87,16 @@ pub(super) fn priors(model: &Model, layout: &Layout, held: &[(String, String)]) 
 impl Engine<'_> {
     pub fn rows(&self) -> usize {
         self.blocks.iter().map(|block| block.end - block.start).sum()
+    }
+
+    /// The blocks of each flight, as ranges.
+    pub fn runs(&self) -> impl Iterator<Item = Range<usize>> {
+        let mut next = 0;
+        self.blocks.chunk_by(|left, right| left.flight == right.flight).map(move |run| {
+            let start = next;
+            next += run.len();
+            start..next
+        })
     }
 
     /// Mean squared error of each channel.

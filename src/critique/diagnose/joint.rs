@@ -19,7 +19,6 @@ use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use normal::Normal;
 use std::collections::BTreeMap;
-use std::ops::Range;
 
 /// Weight at first of what holds numbers where they are, beside that of their usual sizes; and its factor with each step that succeeds or fails.
 const DAMPING: f64 = 1.0;
@@ -88,7 +87,7 @@ impl Point {
     /// Error and cost at the present numbers.
     fn weigh(&mut self, engine: &Engine<'_>) {
         let mut sums = [0.0; 6];
-        for run in runs(engine) {
+        for run in engine.runs() {
             let values = self.values(engine.blocks[run.start].flight);
             for block in run {
                 let errors = self.errors(block, &values);
@@ -264,7 +263,7 @@ impl Point {
             let known = self.known.iter().zip(values).filter(|(known, _)| known.is_local == is_local);
             known.map(|(known, value)| known.misfit(*value)).sum::<f64>()
         };
-        let of_flights = runs(engine).map(|run| misfit(&self.values_of(model, engine.blocks[run.start].flight), true));
+        let of_flights = engine.runs().map(|run| misfit(&self.values_of(model, engine.blocks[run.start].flight), true));
         of_flights.sum::<f64>() + misfit(&self.values_of(model, usize::MAX), false)
     }
 
@@ -340,7 +339,7 @@ impl Point {
     }
 
     fn errors_of_fold(&self, engine: &Engine<'_>, (folds, fold): (&Folds, usize), solved: &[f64], errors: &mut Errors) {
-        for run in runs(engine) {
+        for run in engine.runs() {
             let mut values = solved.to_vec();
             let flight = engine.blocks[run.start].flight;
             match folds.normals[fold].by_flight.get(&flight) {
@@ -425,16 +424,6 @@ fn own(made_of: &DMatrix<f64>, solved: &[f64]) -> DVector<f64> {
     let target = solved.len() - 1;
     let common = DVector::from_column_slice(&solved[..target]);
     made_of.column(target) - made_of.columns(0, target) * common
-}
-
-/// The blocks of each flight, as ranges.
-fn runs<'a>(engine: &'a Engine<'_>) -> impl Iterator<Item = Range<usize>> + 'a {
-    let mut next = 0;
-    engine.blocks.chunk_by(|left, right| left.flight == right.flight).map(move |run| {
-        let start = next;
-        next += run.len();
-        start..next
-    })
 }
 
 #[cfg(test)]

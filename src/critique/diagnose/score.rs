@@ -11,6 +11,7 @@ use crate::error::Result;
 use crate::flight::Column;
 use crate::physics::Model;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// One candidate on one step.
 pub(super) struct Scored<'a> {
@@ -176,13 +177,11 @@ impl Search<'_> {
     /// The flights with their blocks.
     fn flights(&self) -> Vec<OwnBlocks<'_>> {
         let Engine { flights, blocks, correlation, .. } = &self.engine;
-        let mut next = 0;
-        let runs = blocks.chunk_by(|left, right| left.flight == right.flight).map(|run| {
-            let start = next;
-            next += run.len();
-            OwnBlocks { name: &flights[run[0].flight].name, blocks: start..next, correlation: *correlation }
-        });
-        runs.collect()
+        let one = |range: Range<usize>| {
+            let name = &flights[blocks[range.start].flight].name;
+            OwnBlocks { name, blocks: range, correlation: *correlation }
+        };
+        self.engine.runs().map(one).collect()
     }
 
     /// What a model has for each flight: place in its layout, and usual spread.
@@ -267,9 +266,7 @@ pub(super) fn gains_of(before: &[Vec<f64>; 6], after: &[Vec<f64>; 6], channels: 
 
 /// Gains of blocks, added up by flight.
 pub(super) fn by_flight_of(engine: &Engine<'_>, gains: &[f64]) -> Vec<f64> {
-    let runs = engine.blocks.chunk_by(|left, right| left.flight == right.flight);
-    let mut gains = gains.iter();
-    runs.map(|run| gains.by_ref().take(run.len()).sum()).collect()
+    engine.runs().map(|run| gains[run].iter().sum()).collect()
 }
 
 /// Mean difference of paired gains times their number, and its standard error.

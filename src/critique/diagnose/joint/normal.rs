@@ -1,7 +1,7 @@
 //! Sums of the squares of blocks, all at once or without one fold after the other, with the numbers of each flight eliminated. What is
 //! done with them is the business of `joint`.
 
-use super::{Point, runs};
+use super::Point;
 use crate::critique::diagnose::engine::Engine;
 use nalgebra::{Cholesky, DMatrix};
 use std::collections::BTreeMap;
@@ -42,7 +42,7 @@ impl Point {
     /// The squares of the blocks of all folds but one, for each of the `held` folds, with the numbers of each flight eliminated. Flights are
     /// worked off in parts, always the same ones, so that no sum depends on the number of threads.
     pub(super) fn normals(&self, engine: &Engine<'_>, locals: &[usize], held: &[Option<usize>]) -> Option<Vec<Normal>> {
-        let flights: Vec<Range<usize>> = runs(engine).collect();
+        let flights: Vec<Range<usize>> = engine.runs().collect();
         let parts: Vec<&[Range<usize>]> = flights.chunks(flights.len().div_ceil(PARTS).max(1)).collect();
         let one = |part: &&[Range<usize>]| {
             let mut sums: Vec<Normal> = held.iter().map(|_| Normal::empty(self.size())).collect();
