@@ -81,7 +81,7 @@ impl Layout {
     pub(super) fn own_columns(&self, model: &Model) -> by_flight::Own {
         let deviation = |&(effect, index): &Free| {
             let effect = model.effects.get(effect)?;
-            catalogue::definition(&effect.kind)?.coefficient(&effect.coefficients.get(index)?.name)?.by_flight
+            catalogue::definition(&effect.kind)?.coefficient(&effect.coefficients.get(index)?.name)?.deviation_in(effect)
         };
         // A coefficient of a flight that is not from the catalogue: one of its unit.
         by_flight::Own {

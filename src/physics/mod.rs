@@ -30,8 +30,8 @@ pub(crate) use calibrate::off_zero;
 pub use calibrate::{Calibration, Estimate, calibrate};
 pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
 pub use definition::{
-    AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SwapDefinition, Vehicle, change,
-    coefficient, parameter,
+    AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SPREAD, SwapDefinition, Vehicle,
+    change, coefficient, parameter,
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};

@@ -2,7 +2,7 @@
 //! values of its open parameters.
 
 use crate::flight::Flight;
-use crate::physics::{Columns, Definition, Effect, Model, Wanted, catalogue};
+use crate::physics::{Columns, Definition, Effect, Model, SPREAD, Wanted, catalogue};
 
 /// An effect that may be missing.
 #[derive(Clone, Debug)]
@@ -20,9 +20,10 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Coefficients and open parameters: what a fit can turn.
+    /// Coefficients and open parameters: what a fit can turn. A spread holds numbers back and turns nothing.
     pub fn freedom(&self) -> usize {
-        self.effect.coefficients.len() + self.effect.parameters.iter().filter(|parameter| !parameter.fixed).count()
+        let open = self.effect.parameters.iter().filter(|parameter| !parameter.fixed && parameter.name != SPREAD);
+        self.effect.coefficients.len() + open.count()
     }
 
     /// Whether its coefficients are properties of each flight.

@@ -76,7 +76,7 @@ pub(super) fn priors(model: &Model, layout: &Layout, held: &[(String, String)]) 
                     let is_held = held.iter().any(|(kind, name)| *kind == effect.kind && name == known.name);
                     let sign = known.physical_sign().filter(|_| is_held);
                     let bounds = sign.map_or(known.bounds, |(sign, _)| sign.bounds(known.bounds));
-                    Prior { bounds, by_flight: known.by_flight }
+                    Prior { bounds, by_flight: known.deviation_in(effect) }
                 }
                 None => Prior::FREE,
             }

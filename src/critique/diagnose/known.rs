@@ -54,7 +54,7 @@ pub(super) fn known(model: &Model, free: Free) -> Known {
     if let Some(known) = definition.coefficient(&number.name) {
         let bounds = known.physical_sign().map_or(known.bounds, |(sign, _)| sign.bounds(known.bounds));
         let usual = known.expected.map(|[low, high]| low.abs().max(high.abs()));
-        return Known { centre: 0.0, size: known.by_flight.or(usual), bounds, is_local: number.by_flight.is_some() };
+        return Known { centre: 0.0, size: known.deviation_in(effect).or(usual), bounds, is_local: number.by_flight.is_some() };
     }
     let plain = definition.effect(model.mass_kg, model.rotor_radius_m);
     let start = plain.parameters.iter().find(|parameter| parameter.name == number.name).map_or(0.0, |parameter| parameter.value);

@@ -145,9 +145,10 @@ impl Search<'_> {
         let raw_scores = |trial: &&Trial, weights| raw_scores(&pass.base, trial, &pass.grams, weights, &flights, &locals);
         let raw: Vec<Option<Raw>> = trials.iter().map(|trial| raw_scores(trial, weights)).collect();
         let p_value = if candidate.is_by_flight() {
-            // The blocks of a flight share its numbers: a flight is flipped as a whole.
-            let by_flight: Vec<Vec<f64>> = gains.iter().map(|gains| self.by_flight(gains)).collect();
-            self.flips.p_value_of_sums(&by_flight)
+            // Its variants differ in their spread alone, and have the same scores.
+            let runs: Vec<Range<usize>> = self.engine.runs().collect();
+            let of = |raw: &Raw| self.flips.p_value_between_flights(&raw.scores, &usual_spreads(candidate), &runs);
+            raw.first().and_then(Option::as_ref).map_or(1.0, of)
         } else {
             let whitened: Vec<_> = raw.iter().flatten().filter_map(Raw::whitened).collect();
             if whitened.is_empty() { 1.0 } else { self.flips.p_value(&whitened) }
@@ -204,10 +205,6 @@ impl Search<'_> {
         trial.layout.channels[channel] != base.layout.channels[channel]
     }
 
-    pub(super) fn by_flight(&self, gains: &[f64]) -> Vec<f64> {
-        by_flight_of(&self.engine, gains)
-    }
-
     pub(super) fn movement(&self, candidate: &Candidate, trial: &Trial, raw: &Raw) -> Movement {
         let rows = self.engine.rows() as f64;
         let effect = trial.model.effects.last();
@@ -242,6 +239,12 @@ impl Search<'_> {
         }
         Movement { detection: detection.min(1.0), ..largest }
     }
+}
+
+/// How far the numbers of a candidate usually spread from flight to flight.
+fn usual_spreads(candidate: &Candidate) -> Vec<f64> {
+    let known = |name: &str| candidate.definition?.coefficient(name)?.by_flight;
+    candidate.effect.coefficients.iter().map(|coefficient| known(&coefficient.name).unwrap_or(1.0)).collect()
 }
 
 /// A block's gain: half the logarithm of the ratio of its held-out errors, over the channels, within bounds.

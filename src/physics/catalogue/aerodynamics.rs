@@ -1,6 +1,6 @@
 //! Forces and moments of the air on fuselage, fin and tail rotor. The main rotor is in `thrust` and `rotor`.
 
-use super::super::definition::{Definition, Notes, change, coefficient};
+use super::super::definition::{Definition, Notes, change, coefficient, spread};
 use super::{ANY, HELICOPTER};
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -65,7 +65,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("wind_n", "m/s", "motion of the air to the north").within(-15.0, 15.0).usually(-5.0, 5.0).each_flight(3.0),
             coefficient("wind_e", "m/s", "motion of the air to the east").within(-15.0, 15.0).usually(-5.0, 5.0).each_flight(3.0),
         ],
-        parameters: &[],
+        parameters: &[spread()],
         terms: &[],
         swaps: &[
             change("air_vx", "air_vx - wind_n * cos(pitch) * cos(yaw) - wind_e * cos(pitch) * sin(yaw)"),

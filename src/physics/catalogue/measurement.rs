@@ -3,7 +3,7 @@
 //! The rest of the model is made of the true motion: each effect here turns what was recorded into it, and adds what the recorded
 //! derivative has beside that of the true quantity.
 
-use super::super::definition::{Definition, Notes, change, coefficient};
+use super::super::definition::{Definition, Notes, change, coefficient, spread};
 use super::ANY;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -84,7 +84,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("b_wy", "rad/s", "recorded minus true pitch rate").within(-0.2, 0.2).usually(-0.03, 0.03).each_flight(0.02),
             coefficient("b_wz", "rad/s", "recorded minus true yaw rate").within(-0.2, 0.2).usually(-0.03, 0.03).each_flight(0.02),
         ],
-        parameters: &[],
+        parameters: &[spread()],
         terms: &[],
         swaps: &[
             change("vx", "vx - b_vx"),
