@@ -25,9 +25,11 @@ mod memory;
 mod operation;
 mod parser;
 mod print;
+mod shared;
 
 pub use graph::{Graph, Node};
 pub use machine::{Machine, StreamingFormula};
+pub use shared::{Shared, shared};
 
 use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;

@@ -33,7 +33,7 @@ fn formulas() -> impl Strategy<Value = String> {
 }
 
 /// Formulas about as long as they may be, many of which grow when printed.
-fn long_formulas() -> impl Strategy<Value = String> {
+pub(super) fn long_formulas() -> impl Strategy<Value = String> {
     let words = prop::sample::select(vec![
         "a",
         "b",

@@ -6,7 +6,7 @@ use super::evaluate::standard_names;
 use crate::error::{Error, Result};
 use crate::flight::Column;
 use crate::flight::names::matching;
-use crate::formula::Formula;
+use crate::formula::{Formula, Shared, shared};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -306,28 +306,31 @@ impl Effect {
     }
 }
 
-/// One line a term, with the numbers in place: `vz_dot += -20.1 m/s² * u4`.
+/// One line a term and a change, with the numbers in place: `vz_dot += -20.1 m/s² * u4`; what several lines share is said once, after them.
 impl fmt::Display for Effect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let number = |name: &str| {
+            let value = self.number_named(name).and_then(|index| self.number(index)).map(|number| number.value)?;
+            Formula::parse(&if value < 0.0 { format!("({value:?})") } else { format!("{value:?}") }).ok()
+        };
+        let formulas: Vec<Formula> =
+            self.formulas().map(|formula| formula.substitute(&number).unwrap_or_else(|_| formula.clone())).collect();
+        let Shared { formulas, parts } = shared(&formulas);
+        let (terms, swaps) = formulas.split_at(self.terms.len());
         let mut gap = "";
-        for term in &self.terms {
+        for (term, regressor) in self.terms.iter().zip(terms) {
             let channel = Column::TARGETS.get(term.channel).map_or("?", |column| column.name());
             write!(f, "{gap}{channel} += ")?;
             match term.coefficient.as_deref().and_then(|name| self.coefficient(name)) {
-                Some(Coefficient { value, unit, .. }) => write!(f, "{value} {unit} * ({})", term.regressor)?,
-                None => write!(f, "{}", term.regressor)?,
+                Some(Coefficient { value, unit, .. }) => write!(f, "{value} {unit} * ({regressor})")?,
+                None => write!(f, "{regressor}")?,
             }
             gap = "\n";
         }
-        for swap in &self.swaps {
-            let number = |name: &str| {
-                let value = self.number_named(name).and_then(|index| self.number(index)).map(|number| number.value)?;
-                Formula::parse(&if value < 0.0 { format!("({value:?})") } else { format!("{value:?}") }).ok()
-            };
-            let with = swap.with.substitute(&number).unwrap_or_else(|_| swap.with.clone());
+        for (swap, with) in self.swaps.iter().zip(swaps) {
             write!(f, "{gap}{} := {with}", swap.name)?;
             gap = "\n";
         }
-        Ok(())
+        parts.iter().try_for_each(|(name, part)| write!(f, "\n  where {name} = {part}"))
     }
 }

@@ -129,7 +129,8 @@ impl Search<'_> {
             model = Point::fitted(&quick, model, STEPS[0])?;
             model = Point::fitted(&road.engine, model, STEPS[1])?;
             let places = optional(&model);
-            let point = Point::at(&road.engine, model, places)?;
+            let mut point = Point::at(&road.engine, model, places)?;
+            point.choose_spreads(&road.engine);
             let Pruned { absent, needed, needless } = road.pruned(&point)?;
             gone.extend(needless);
             model = point.without(&road.engine, &absent).ok_or_else(undetermined)?;

@@ -6,6 +6,7 @@
 //! is least squares on them. Each number but the baseline's has its usual size as a prior, so that many effects at once stay determined.
 
 mod normal;
+mod spread;
 
 use super::design::{Design, Free, Layout};
 use super::engine::{Engine, FOLDS};

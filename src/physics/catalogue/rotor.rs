@@ -5,9 +5,31 @@ use super::HELICOPTER;
 
 /// Speed squared of the rotor, relative: power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum
 /// theory: T (v_i + v_c), the induced part as thrust to the 3/2, the climbing part with the speed along the thrust.
+/// Power in induced powers of hover: of a thrust, and of climbing with it.
+macro_rules! power {
+    ($thrust:expr) => {
+        concat!("(abs(", $thrust, " / 9.80665)^1.5 + ", $thrust, " / 9.80665 * air_vz / induced_m_s)")
+    };
+}
+
+/// Speed squared as the governor has it behind its lag. The guards are for windmills.
+macro_rules! behind_governor {
+    ($error:expr) => {
+        concat!("clamp(1 + 0.5 * k * lag(", $error, ", tau_s), 0.2, 2)^2")
+    };
+}
+
+/// Speed squared. A rotor that has slowed down to the share r takes less power P, r³ of it but for the climb, and its speed follows that:
+/// r + tau r' = 1 + k/2 (P - 1). Solved for r - 1 to first order, then once more with the thrust that is left at that speed.
 macro_rules! speed_squared {
     () => {
-        "max(1 + k * lag(abs(thrust / 9.80665)^1.5 + thrust / 9.80665 * air_vz / induced_m_s - 1, tau_s), 0.04)"
+        behind_governor!(concat!(power!(concat!("(thrust * ", first_speed_squared!(), ")")), " - 1"))
+    };
+}
+
+macro_rules! first_speed_squared {
+    () => {
+        behind_governor!(concat!("(", power!("thrust"), " - 1) / max(1 - 1.5 * k * ", power!("thrust"), ", 0.3)"))
     };
 }
 
@@ -56,9 +78,16 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .starting(0.3)
                 .tried(&[0.15, 0.3, 0.6, 1.2])
                 .within(0.03, 4.0),
+            parameter("damping_share", "1", "share of the roll and pitch damping that comes through the rotor")
+                .starting(1.0)
+                .tried(&[0.5, 1.0])
+                .within(0.0, 1.5),
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
-        terms: &[],
+        terms: &[
+            (3, None, concat!("damping_share * rate_damping_b_x * wx * (", speed_squared!(), " - 1)")),
+            (4, None, concat!("damping_share * rate_damping_b_y * wy * (", speed_squared!(), " - 1)")),
+        ],
         swaps: &[
             change("rotor_speed", concat!("rotor_speed * sqrt(", speed_squared!(), ")")),
             change("thrust", concat!("thrust * ", speed_squared!())),

@@ -3,9 +3,9 @@
 use super::Context;
 use crate::arguments::EffectCommand;
 use phyture::flight::Column;
-use phyture::formula::Formula;
+use phyture::formula::{Formula, Shared, shared};
 use phyture::physics::catalogue::{definition, definitions};
-use phyture::physics::{Definition, Effect, Model, Origin, SIGNALS, Signal, signal_named, standard_names};
+use phyture::physics::{Definition, Effect, Model, Origin, SIGNALS, Signal, Term, signal_named, standard_names};
 use phyture::suggest::did_you_mean;
 use phyture::{Error, Result};
 use serde_json::{Value, json};
@@ -104,18 +104,23 @@ fn text(definition: &Definition) -> String {
         let _ = writeln!(text, "{:indent$}{content}", "");
     };
     line(0, String::new());
-    for (channel, coefficient, regressor) in definition.terms {
-        let column = Column::TARGETS[*channel];
-        let product = coefficient.map_or_else(|| (*regressor).to_owned(), |name| format!("{name} * ({regressor})"));
-        // Printed with no more brackets than it needs.
-        let product = Formula::parse(&product).map_or(product, |formula| formula.to_string());
+    let effect = definition.effect(1.0, 1.0);
+    let product = |term: &Term| match &term.coefficient {
+        Some(name) => Formula::parse(&format!("{name} * ({})", term.regressor)).expect("a product of what parses"),
+        None => term.regressor.clone(),
+    };
+    let changes = effect.swaps.iter().map(|swap| swap.with.clone());
+    let Shared { formulas, parts } = shared(&effect.terms.iter().map(product).chain(changes).collect::<Vec<_>>());
+    let (products, changes) = formulas.split_at(effect.terms.len());
+    for (term, product) in effect.terms.iter().zip(products) {
+        let column = Column::TARGETS[term.channel];
         line(2, format!("{:<6} += {product}   [{}]", column.name(), column.unit()));
     }
-    for swap in definition.swaps {
+    for (swap, with) in effect.swaps.iter().zip(changes) {
         let within = if swap.within.is_empty() { String::new() } else { format!("   in {}", swap.within.join(", ")) };
-        line(2, format!("{:<6} := {}{within}", swap.name, swap.with));
+        line(2, format!("{:<6} := {with}{within}", swap.name));
     }
-    let effect = definition.effect(1.0, 1.0);
+    parts.iter().for_each(|(name, part)| line(4, format!("where {name} = {part}")));
     line(0, format!("\nReads signals     {}\nChanges signals   {}", names(&effect.reads()), names(&effect.changes())));
     if !definition.coefficients.is_empty() {
         line(0, "\nCoefficients".into());
