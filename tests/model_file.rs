@@ -226,3 +226,23 @@ proptest! {
         let _ = parse(&text);
     }
 }
+
+/// A file of an earlier format is read where it means the same, and refused with the reason where it does not.
+#[test]
+fn numbers_found_for_another_formula_are_refused() {
+    let read = |format: &str, effect: &str| {
+        let text = format!("[model]\n{format}\nbaseline = \"paper\"\n\n[[effect]]\n{effect}\n");
+        Model::from_toml(&text, Path::new("old.toml")).map_err(|error| error.to_string())
+    };
+    let droop = "kind = \"rotor_droop\"\ncoefficients = { k = -0.1 }";
+    let wind = "kind = \"weathercock\"\ncoefficients = { k_fin = 0.03 }";
+    for format in ["", "format = 2", "format = 3"] {
+        assert!(read(format, wind).is_ok(), "{format}");
+    }
+    assert!(read("format = 3", droop).is_ok() && read("format = 2", "kind = \"rotor_droop\"").is_ok());
+    for format in ["", "format = 2"] {
+        let refused = read(format, droop).err().unwrap_or_default();
+        assert!(refused.contains("numbers of `rotor_droop`") && refused.contains("phyture calibrate"), "{refused}");
+    }
+    assert!(read("format = 4", wind).err().is_some_and(|refused| refused.contains("1, 2 or 3")));
+}

@@ -23,10 +23,13 @@ const NOMINAL_MASS_KG: f64 = 4.58;
 const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
 
-/// What effects mean: since 2 they read and change the signals of the model.
-const FORMAT: u32 = 2;
+/// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power and damps less.
+const FORMAT: u32 = 3;
 
-/// Effects of the catalogue that, alone beside the baseline, mean in format 2 what they meant before.
+/// Effects of the catalogue that mean something else in format 3 than in format 2.
+const CHANGED: [&str; 1] = ["rotor_droop"];
+
+/// Effects of the catalogue that, alone beside the baseline, mean since format 2 what they meant before.
 const UNCHANGED: [&str; 15] = [
     "climb_inflow",
     "collective_lag",
@@ -47,14 +50,14 @@ const UNCHANGED: [&str; 15] = [
 
 fn read_format(model: &Section<'_>) -> Result<u32> {
     let Some(format) = model.number("format")? else { return Ok(1) };
-    if format == 1.0 || format == f64::from(FORMAT) {
+    if (1..=FORMAT).any(|known| format == f64::from(known)) {
         return Ok(format as u32);
     }
-    Err(model.fault("format", format.to_string(), "1 or 2, the formats that this version reads"))
+    Err(model.fault("format", format.to_string(), "1, 2 or 3, the formats that this version reads"))
 }
 
-/// Refuses numbers of effects that a file of format 1 found for other formulas.
-fn check_meaning(file: &Section<'_>, effects: &[Effect]) -> Result<()> {
+/// Refuses numbers of effects that a file of an earlier format found for other formulas.
+fn check_meaning(file: &Section<'_>, effects: &[Effect], format: u32) -> Result<()> {
     let has_numbers = |effect: &&Effect| {
         let of_catalogue = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
         let given = |definition: &super::definition::Definition| {
@@ -66,6 +69,14 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect]) -> Result<()> {
         effect.enabled && of_catalogue.is_some_and(given)
     };
     let found: Vec<&Effect> = effects.iter().filter(has_numbers).collect();
+    if format == 2 {
+        let Some(changed) = found.iter().find(|effect| CHANGED.contains(&effect.kind.as_str())) else { return Ok(()) };
+        return Err(file.fault(
+            "model.format",
+            format!("2, and numbers of `{}`, found for another formula", changed.name),
+            "`format = 3` under [model], and then `phyture calibrate`: a rotor that slows down now takes less power and damps less",
+        ));
+    }
     let changed = match found.as_slice() {
         [] => return Ok(()),
         [only] if UNCHANGED.contains(&only.kind.as_str()) => return Ok(()),
@@ -74,14 +85,15 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect]) -> Result<()> {
     Err(file.fault(
         "model.format",
         format!("nothing, and numbers of `{}`, found when effects did not see each other", changed.name),
-        "`format = 2` under [model], and then `phyture calibrate`: effects now read thrust, air velocity and controls as the other effects leave them",
+        "`format = 3` under [model], and then `phyture calibrate`: effects now read thrust, air velocity and controls as the other effects leave them",
     ))
 }
 
 impl Model {
     /// Reads a model file.
     ///
-    /// A file without `format = 2` was written when effects did not see each other: it is read where that means the same.
+    /// A file without `format` was written when effects did not see each other: it is read where that means the same. So is one of format 2,
+    /// whose effects are those of today but for `rotor_droop`.
     ///
     /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
     /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m) and are marked in [`Model::assumed`], the name to the file's, and without `baseline` the model holds
@@ -151,7 +163,7 @@ impl Model {
             }
         }
         if format < FORMAT {
-            check_meaning(&file, &effects)?;
+            check_meaning(&file, &effects, format)?;
         }
         let mut data = ModelData::default();
         if let Some(section) = file.section("data", "data")? {
