@@ -1,6 +1,7 @@
 //! The network as judge: stages of a hybrid, what it learned as flights to search, and how its predictions move with the
 //! coefficients of its model. The networks are small and untrained: what is tested holds for any weights.
 
+use phyture::critique::PerChannel;
 use phyture::critique::uncertainty::{Effort, Uncertainty, uncertainty};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::windows::windows;
@@ -9,7 +10,7 @@ use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::sensitivity::{HALF_WIDTH, half_width};
 use phyture::hybrid::{Description, Hybrid, network_target, sequence};
 use phyture::nn::{Architecture, PhyTureConfig, Variant};
-use phyture::physics::{Estimate, Model, calibrate};
+use phyture::physics::{Correlation, Estimate, Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
 use phyture::{Error, Result};
@@ -142,11 +143,16 @@ fn drawing_coefficients_anew_agrees_with_reverse_mode_where_the_network_is_nearl
     let estimates = hybrid.estimates();
     let (flights, windows) = (&case.set.flights, &case.windows);
     let movements = hybrid.movements(flights, windows, &estimates, Threads(2))?;
+    let correlations = hybrid.correlations(&estimates);
     let resampled = hybrid.resampled(flights, windows, &estimates, DRAWS, 5, Threads(2))?;
     for channel in 0..6 {
         let count = windows.len() as f64;
-        let by_reverse = movements.iter().flatten().map(|movement| movement.hybrid[channel].powi(2)).sum::<f64>();
-        let by_reverse = (by_reverse / count).sqrt() / HALF_WIDTH;
+        let square = |window: usize| {
+            let moved = |one: usize| movements[one][window].hybrid[channel];
+            let pairs = (0..estimates.len()).flat_map(|i| (0..estimates.len()).map(move |j| (i, j)));
+            pairs.map(|(i, j)| moved(i) * correlations[(i, j)] * moved(j)).sum::<f64>()
+        };
+        let by_reverse = ((0..windows.len()).map(square).sum::<f64>() / count).sqrt() / HALF_WIDTH;
         let by_draws = (resampled.iter().map(|sd| sd[channel].powi(2)).sum::<f64>() / count).sqrt();
         // Four standard errors of a standard deviation from so many draws.
         let chance = 4.0 / (2.0 * (DRAWS - 1) as f64).sqrt();
@@ -165,6 +171,8 @@ fn the_uncertainty_of_a_network_is_a_table_with_totals() -> Result<()> {
     for coefficient in model.effect_mut("moment_bias").into_iter().flat_map(|effect| &mut effect.coefficients) {
         coefficient.ci95 = None;
     }
+    // What is known of each by itself.
+    model.correlations.clear();
     let hybrid = case.hybrid(&model)?;
     let effort = Effort { windows: 10, draws: 4, seed: 1 };
     let found = uncertainty("run", &hybrid, &case.set.flights, &case.windows, effort, Threads(2))?;
@@ -186,6 +194,42 @@ fn the_uncertainty_of_a_network_is_a_table_with_totals() -> Result<()> {
     let none = case.hybrid(&Model::paper("bare", 4.58, [0.18, 0.34, 0.28], 0.8))?;
     let refused = uncertainty("run", &none, &case.set.flights, &case.windows, effort, Threads(2));
     assert!(refused.is_err_and(|error| error.to_string().contains("calibrate")));
+    Ok(())
+}
+
+/// Thrust and its bias, all else being known: that they err together or against each other makes what the parallelogram of their movements says.
+#[test]
+fn totals_are_of_coefficients_that_vary_together() -> Result<()> {
+    let case = Case::new(Variant::PhyTure)?;
+    let calibrated = &case.description.model;
+    assert!(calibrated.correlations.iter().any(|group| group.numbers.contains(&"vertical_bias.d_z".to_owned())));
+    let of = |correlation: Option<f64>| {
+        let mut model = calibrated.clone();
+        for effect in &mut model.effects {
+            let keeps = ["collective_thrust", "vertical_bias"].contains(&effect.name.as_str());
+            effect.coefficients.iter_mut().filter(|_| !keeps).for_each(|coefficient| coefficient.ci95 = None);
+        }
+        let numbers = ["collective_thrust.c_z", "vertical_bias.d_z"].map(str::to_owned).to_vec();
+        model.correlations = correlation.map(|value| Correlation { numbers, below: vec![value] }).into_iter().collect();
+        let effort = Effort { windows: 30, draws: 60, seed: 1 };
+        uncertainty("run", &case.hybrid(&model)?, &case.set.flights, &case.windows, effort, Threads(2))
+    };
+    let [against, apart, along] = [of(Some(-1.0))?, of(None)?, of(Some(1.0))?];
+    assert!(against.note().contains("together") && apart.note().contains("independent"));
+    let value = |of: PerChannel| of.vz_dot.unwrap_or(f64::NAN);
+    for pick in [|found: &Uncertainty| found.sd, |found: &Uncertainty| found.sd_of_physics] {
+        let [against, apart, along] = [&against, &apart, &along].map(|found| value(pick(found)));
+        let halves = (against.powi(2) + along.powi(2)) / 2.0;
+        assert!(
+            (halves - apart.powi(2)).abs() < Tolerance::Close.relative_f64() * halves && along > 1.5 * against,
+            "{against} {apart} {along}"
+        );
+    }
+    // Draws vary together, too: 60 of them are right to 9 %.
+    for found in [&against, &apart, &along] {
+        let [drawn, sd] = [value(found.sd_resampled), value(found.sd)];
+        assert!((drawn - sd).abs() < 0.35 * sd, "{drawn} {sd}");
+    }
     Ok(())
 }
 

@@ -1,7 +1,7 @@
 //! The model file: what it means, that it reads back as written, and how it refuses.
 #![cfg(feature = "files")]
 
-use phyture::physics::{Assumed, Effect, Entry, Model, Parameter};
+use phyture::physics::{Assumed, Correlation, Effect, Entry, Model, Parameter};
 use phyture::{Error, Result};
 use proptest::prelude::*;
 use std::path::Path;
@@ -245,4 +245,25 @@ fn numbers_found_for_another_formula_are_refused() {
         assert!(refused.contains("numbers of `rotor_droop`") && refused.contains("phyture calibrate"), "{refused}");
     }
     assert!(read("format = 4", wind).err().is_some_and(|refused| refused.contains("1, 2 or 3")));
+}
+
+/// Correlations are kept beside the intervals, and read back as they were written.
+#[test]
+fn correlations_are_kept_in_the_file() -> Result<()> {
+    let mut model = Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8);
+    let numbers = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    model.correlations = vec![
+        Correlation { numbers: numbers(&["linear_drag.a_x", "my \"own\".k", "vertical_bias.d_z"]), below: vec![0.5, -0.25, 1.0] },
+        Correlation { numbers: numbers(&["moment_bias.d_x", "control_moment.c_x"]), below: vec![-0.9876] },
+    ];
+    let text = model.to_toml()?;
+    assert!(text.contains("below = [\n    0.5,\n    -0.25, 1.0,\n]"), "{text}");
+    assert_eq!(parse(&text)?.correlations, model.correlations);
+    for (given, part) in
+        [("0.5", "one number for each pair"), ("0.5, 1.0, 2.0", "from -1 to 1"), ("\"a\"", "a list of finite numbers")]
+    {
+        let group = format!("[model]\n[[correlation]]\nnumbers = [\"a.x\", \"b.y\", \"c.z\"]\nbelow = [{given}]\n");
+        assert!(message(parse(&group))?.contains(part), "{given}");
+    }
+    Ok(())
 }

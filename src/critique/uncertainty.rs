@@ -1,9 +1,8 @@
 //! What the uncertainty of the physical coefficients does to a hybrid's prediction, per coefficient and channel. The numbers of
 //! single windows come from `hybrid::sensitivity`; here they become root mean squares, totals and a table.
 //!
-//! Coefficients count as independent: a calibration gives intervals, not covariances. Where two coefficients are known well only
-//! together (thrust and its bias at a nearly constant collective), the totals are too large. The uncertainty of the network's own
-//! weights is no part of it.
+//! Totals use the correlations that the model keeps: where two coefficients are known well only together (thrust and its bias at a nearly
+//! constant collective), both move the prediction far and their sum does not. The uncertainty of the network's own weights is no part of it.
 
 use super::compare::PerChannel;
 use super::table::{Kind, aligned};
@@ -12,6 +11,7 @@ use crate::flight::{Column, Flight, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::sensitivity::{HALF_WIDTH, Movement};
 use crate::tape::Threads;
+use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -67,9 +67,13 @@ pub struct Uncertainty {
     pub draws: usize,
     /// One entry a coefficient with an interval, in the order of the model.
     pub coefficients: Vec<OfCoefficient>,
+    /// Whether the model keeps correlations of its coefficients; they count as independent where it does not.
+    #[serde(default)]
+    pub correlated: bool,
     /// Coefficients without an interval, as `effect.coefficient`: they are taken as known.
     pub without_interval: Vec<String>,
-    /// Standard deviation of the hybrid's prediction by reverse mode: √(Σ movement²) / 1.96; m/s² and rad/s².
+    /// Standard deviation of the hybrid's prediction by reverse mode, root mean square over the windows of √(Σ m_i r_ij m_j) / 1.96 with
+    /// movements m and correlations r; m/s² and rad/s².
     pub sd: PerChannel,
     /// The same of the model alone.
     pub sd_of_physics: PerChannel,
@@ -114,10 +118,17 @@ pub fn uncertainty(
         movements.iter().map(|of_windows| root_mean_square(of_windows.iter().map(pick))).collect()
     };
     let (whole, physics) = (of(|movement| movement.hybrid), of(|movement| movement.physics));
-    let total = |of: &[[f64; 6]]| -> [f64; 6] {
-        std::array::from_fn(|channel| of.iter().map(|one| one[channel].powi(2)).sum::<f64>().sqrt() / HALF_WIDTH)
+    let correlations = hybrid.correlations(&estimates);
+    let total = |pick: fn(&Movement) -> [f64; 6]| -> [f64; 6] {
+        root_mean_square((0..windows.len()).map(|window| {
+            std::array::from_fn(|channel| {
+                let moved = DVector::from_fn(estimates.len(), |one, _| pick(&movements[one][window])[channel]);
+                // Rounded correlations may take a little too much away.
+                moved.dot(&(&correlations * &moved)).max(0.0).sqrt() / HALF_WIDTH
+            })
+        }))
     };
-    let sd = total(&whole);
+    let sd = total(|movement| movement.hybrid);
     let effects = hybrid.description().model.effects.iter().filter(|effect| effect.enabled);
     let all = effects.flat_map(|effect| effect.coefficients.iter().map(move |one| (effect, one)));
     let known = |(effect, name): (&str, &str)| estimates.iter().any(|estimate| estimate.effect == effect && estimate.name == name);
@@ -135,12 +146,13 @@ pub fn uncertainty(
         windows: windows.len(),
         draws: if resampled.is_empty() { 0 } else { effort.draws },
         coefficients: coefficients.collect(),
+        correlated: !hybrid.description().model.correlations.is_empty(),
         without_interval: all
             .filter(|(effect, one)| !known((effect.name.as_str(), one.name.as_str())))
             .map(|(effect, one)| format!("{}.{}", effect.name, one.name))
             .collect(),
         sd: per_channel(sd),
-        sd_of_physics: per_channel(total(&physics)),
+        sd_of_physics: per_channel(total(|movement| movement.physics)),
         sd_resampled: if resampled.is_empty() {
             PerChannel::default()
         } else {
@@ -184,7 +196,8 @@ impl Uncertainty {
 
     /// What the numbers rest on, and what they leave out.
     pub fn note(&self) -> String {
-        let mut note = format!("On {} windows. Coefficients count as independent, weights of the network as known.", self.windows);
+        let together = if self.correlated { "vary together as the model file says" } else { "count as independent" };
+        let mut note = format!("On {} windows. Coefficients {together}, weights of the network count as known.", self.windows);
         if !self.without_interval.is_empty() {
             note.push_str(&format!(" Taken as known, for want of an interval: {}.", self.without_interval.join(", ")));
         }

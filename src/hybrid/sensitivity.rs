@@ -9,9 +9,10 @@ use super::{CHUNK, Description, Hybrid};
 use crate::error::Result;
 use crate::flight::{Accelerations, Flight, Window};
 use crate::nn::{LossRule, Network};
-use crate::physics::{Estimate, Model};
+use crate::physics::{Estimate, Model, correlation_matrix};
 use crate::tape::ops::{LastRows, Linear};
 use crate::tape::{Graph, Session, Threads, Var};
+use nalgebra::{DMatrix, DVector};
 use phyture_kernels::random::Stream;
 use std::collections::BTreeMap;
 
@@ -46,6 +47,12 @@ impl Hybrid {
             })
         })
         .collect()
+    }
+
+    /// The correlations of these estimates, as the model keeps them.
+    pub fn correlations(&self, estimates: &[Estimate]) -> DMatrix<f64> {
+        let label = |estimate: &Estimate| format!("{}.{}", estimate.effect, estimate.name);
+        correlation_matrix(&self.description.model.correlations, &estimates.iter().map(label).collect::<Vec<_>>())
     }
 
     /// For each estimate, its [`Movement`] at the last row t of each window.
@@ -115,9 +122,9 @@ impl Hybrid {
         Ok(found)
     }
 
-    /// The standard deviation of the prediction at each window over `draws` hybrids whose coefficients are drawn independently
-    /// from normal distributions about their values, with half the width of the 95 % interval as 1.96 standard deviations. The
-    /// whole hybrid is run for each: no linearisation.
+    /// The standard deviation of the prediction at each window over `draws` hybrids whose coefficients are drawn from a normal
+    /// distribution about their values, with half the width of the 95 % interval as 1.96 standard deviations and the model's
+    /// correlations. The whole hybrid is run for each: no linearisation.
     ///
     /// The same seed draws the same coefficients. The relative standard error of a standard deviation from n draws is about
     /// 1/√(2 n − 2): 13 % for 30.
@@ -136,10 +143,12 @@ impl Hybrid {
         self.check_windows(flights, windows)?;
         // Mean and sum of squared deviations, updated draw by draw (Welford 1962).
         let mut moments = vec![[(0.0, 0.0); 6]; windows.len()];
+        let root = square_root(self.correlations(estimates));
         for draw in 0..draws {
             let mut model = self.description.model.clone();
-            for (index, estimate) in estimates.iter().enumerate() {
-                shift(&mut model, estimate, half_width(estimate) / HALF_WIDTH * normal(seed, draw as u64, index as u64));
+            let drawn = &root * DVector::from_fn(estimates.len(), |index, _| normal(seed, draw as u64, index as u64));
+            for (estimate, drawn) in estimates.iter().zip(drawn.iter()) {
+                shift(&mut model, estimate, half_width(estimate) / HALF_WIDTH * drawn);
             }
             let hybrid = Self::new(Description { model, ..self.description.clone() }, self.parameters.clone())?;
             for (flight, members) in by_flight(windows) {
@@ -158,6 +167,14 @@ impl Hybrid {
         let freedom = draws.saturating_sub(1).max(1) as f64;
         Ok(moments.into_iter().map(|window| window.map(|(_, squares)| (squares / freedom).sqrt())).collect())
     }
+}
+
+/// The symmetric square root of a matrix of correlations. Rounded ones, and those of fewer worlds than numbers, may have an eigenvalue below zero,
+/// which counts as zero.
+fn square_root(correlations: DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = correlations.symmetric_eigen();
+    let roots = DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.max(0.0).sqrt()));
+    &eigen.eigenvectors * roots * eigen.eigenvectors.transpose()
 }
 
 /// Half the width of the 95 % interval; zero without one.

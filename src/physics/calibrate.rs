@@ -7,6 +7,7 @@ use super::by_flight;
 use super::catalogue;
 use super::columns::{Columns, Wanted};
 use super::compose::Free;
+use super::correlation::Correlation;
 use super::effect::Effect;
 use super::evaluate::{composed_for, standard_names};
 use super::layout::Layout;
@@ -401,6 +402,7 @@ impl Pass {
         let layout = &self.layout;
         let mut clusters = self.clusters.clone();
         let mut found = model.clone();
+        found.correlations.clear();
         let hold = |members: &[Free]| {
             damped.map(|(damping, held)| Hold {
                 weights: self.weights.clone(),
@@ -448,6 +450,11 @@ impl Pass {
                 if let Some(vague) = (0..members.len()).find(|&at| !solution.ci95[at].iter().all(|end| end.is_finite())) {
                     return Err(failed(Failure::OneCluster(vague)));
                 }
+                let label = |&(effect, index): &Free| {
+                    let number = model.effects[effect].number(index).expect("a number of the model");
+                    Correlation::label(&model.effects[effect], &number.name)
+                };
+                found.correlations.extend(Correlation::of_deviations(members.iter().map(label).collect(), &solution.deviations));
                 let halves = solution.ci95.iter().map(|[low, high]| 0.5 * (high - low)).collect();
                 (solution.values, halves, solution.ci95.into_iter().map(Some).collect())
             } else {

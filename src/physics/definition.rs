@@ -105,7 +105,7 @@ impl CoefficientDefinition {
         self.sign.or(bounded.map(|sign| (sign, "the opposite of its physics")))
     }
 
-    /// Of a property of each flight: its standard deviation from flight to flight in an effect, at the effect's [`spread`].
+    /// Of a property of each flight: its standard deviation from flight to flight in an effect, at the effect's [`SPREAD`].
     pub fn deviation_in(&self, effect: &Effect) -> Option<f64> {
         let spread = effect.parameters.iter().find(|parameter| parameter.name == SPREAD);
         Some(self.by_flight? * spread.map_or(1.0, |spread| spread.value))
@@ -186,7 +186,7 @@ pub const fn parameter(name: &'static str, unit: &'static str, meaning: &'static
     ParameterDefinition { name, unit, meaning, origin: Origin::Number(0.0), grid: &[], bounds, tied_to: None }
 }
 
-/// Name of the parameter that says how far the numbers of flights spread; see [`spread`].
+/// Name of the parameter that says how far the numbers of flights spread, as a share of the usual.
 pub const SPREAD: &str = "spread";
 
 /// How far what each flight has for itself (wind, biases) spreads from flight to flight, as a share of what is usual. No formula reads it: it scales

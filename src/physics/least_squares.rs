@@ -167,6 +167,8 @@ impl Hold {
 pub(super) struct Solution {
     pub values: Vec<f64>,
     pub ci95: Vec<[f64; 2]>,
+    /// By how much the values are others without each cluster: what their covariances are made of.
+    pub deviations: Vec<Vec<f64>>,
     pub condition_number: f64,
 }
 
@@ -219,8 +221,8 @@ pub(super) fn solve(problem: &Problem, clusters: &mut [Cluster], hold: Option<&H
     let wanted = problem.coefficients;
     let fine: Vec<Information> = clusters.iter().map(|cluster| Information::of(cluster, problem, &weights, &fit)).collect();
     let coarse = merge_neighbours(&fine);
-    let half_length = jackknife(&fit, &fine);
-    let full_length = jackknife(&fit, &coarse);
+    let changes = jackknife(&fit, &coarse);
+    let (half_length, full_length) = (variances(&jackknife(&fit, &fine), wanted), variances(&changes, wanted));
     let ci95 = (0..wanted)
         .map(|index| {
             let variance = full_length[index].max(2.0 * full_length[index] - half_length[index]);
@@ -228,7 +230,8 @@ pub(super) fn solve(problem: &Problem, clusters: &mut [Cluster], hold: Option<&H
             [fit.values[index] - reach, fit.values[index] + reach]
         })
         .collect();
-    Ok(Solution { values: fit.values.iter().copied().collect(), ci95, condition_number: fit.condition_number })
+    let deviations = changes.iter().map(|change| change.iter().copied().collect()).collect();
+    Ok(Solution { values: fit.values.iter().copied().collect(), ci95, deviations, condition_number: fit.condition_number })
 }
 
 /// An estimate without intervals, and the weights of the channels that it rests on.
@@ -389,17 +392,24 @@ fn merge_neighbours(fine: &[Information]) -> Vec<Information> {
     merged
 }
 
-/// Variance of each coefficient by leaving out one cluster at a time: `θ₋ᵦ − θ = −R⁻¹ (I − Q_bᵀQ_b)⁻¹ Q_bᵀ e_b`.
-fn jackknife(fit: &Fit, clusters: &[Information]) -> Vec<f64> {
-    let count = clusters.len() as f64;
-    let mut variances = vec![0.0; fit.values.len()];
-    for cluster in clusters {
+/// By how much the coefficients are others without each cluster: `θ₋ᵦ − θ = −R⁻¹ (I − Q_bᵀQ_b)⁻¹ Q_bᵀ e_b`.
+fn jackknife(fit: &Fit, clusters: &[Information]) -> Vec<DVector<f64>> {
+    let without = |cluster: &Information| {
         let eigen = cluster.share.clone().symmetric_eigen();
         let mut along = eigen.eigenvectors.transpose() * &cluster.score;
         for (part, information) in along.iter_mut().zip(eigen.eigenvalues.iter()) {
             *part /= (1.0 - information).max(SMALLEST_REMAINDER);
         }
-        let change = &fit.inverse * (eigen.eigenvectors * along);
+        &fit.inverse * (eigen.eigenvectors * along)
+    };
+    clusters.iter().map(without).collect()
+}
+
+/// The jackknife variance of each coefficient.
+fn variances(changes: &[DVector<f64>], coefficients: usize) -> Vec<f64> {
+    let count = changes.len() as f64;
+    let mut variances = vec![0.0; coefficients];
+    for change in changes {
         for (variance, change) in variances.iter_mut().zip(change.iter()) {
             *variance += change * change * (count - 1.0) / count;
         }
@@ -465,7 +475,7 @@ mod tests {
         let fit = Fit::new(&[(wide, count)], &[1.0], 2)?;
         let information: Vec<Information> =
             clusters.iter().map(|cluster| Information::of(cluster, &problem(), &[1.0], &fit)).collect();
-        let variances = jackknife(&fit, &information);
+        let variances = variances(&jackknife(&fit, &information), 2);
         for index in 0..2 {
             assert!((solution.values[index] - expected[index]).abs() < Tolerance::Close.relative_f64());
             let refitted: f64 = (0..5)

@@ -10,6 +10,7 @@ mod calibrate;
 pub mod catalogue;
 mod columns;
 mod compose;
+mod correlation;
 mod definition;
 mod effect;
 mod evaluate;
@@ -29,6 +30,7 @@ pub use baseline::PAPER;
 pub(crate) use calibrate::off_zero;
 pub use calibrate::{Calibration, Estimate, calibrate};
 pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
+pub use correlation::{Correlation, correlation_matrix};
 pub use definition::{
     AIR_DENSITY_KG_M3, CoefficientDefinition, Definition, Notes, Origin, ParameterDefinition, SPREAD, SwapDefinition, Vehicle,
     change, coefficient, parameter,

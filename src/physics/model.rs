@@ -2,6 +2,7 @@
 //! to a file is in `model_file`; how its numbers are found, in `calibrate`.
 
 use super::baseline;
+use super::correlation::Correlation;
 use super::definition::Vehicle;
 use super::effect::Effect;
 use super::evaluate::{self, StreamingModel};
@@ -59,6 +60,9 @@ pub struct Model {
     pub assumed: Assumed,
     /// Effects, in the order in which they are summed.
     pub effects: Vec<Effect>,
+    /// How the errors of the numbers go together, beside their intervals.
+    #[serde(default)]
+    pub correlations: Vec<Correlation>,
     /// What is known about the data.
     pub data: ModelData,
     /// Where the numbers come from; free form.
@@ -82,6 +86,7 @@ impl Model {
             vehicle: Vehicle::default(),
             assumed: Assumed::default(),
             effects: baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
+            correlations: Vec::new(),
             data: ModelData::default(),
             provenance: BTreeMap::new(),
         }

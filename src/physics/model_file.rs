@@ -2,6 +2,7 @@
 
 use super::baseline::{self, PAPER};
 use super::catalogue;
+use super::correlation::Correlation;
 use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::evaluate::standard_names;
@@ -117,7 +118,7 @@ impl Model {
             Error::File { path: path.into(), message: format!("line {line}: {}; a model file is TOML", error.message()) }
         })?;
         let file = Section { path, text, name: "", table: parsed.get_ref() };
-        file.allow(&["model", "data", "effect", "provenance"])?;
+        file.allow(&["model", "data", "effect", "correlation", "provenance"])?;
         let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
         model.allow(&["format", "name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
         let format = read_format(&model)?;
@@ -187,6 +188,7 @@ impl Model {
             vehicle,
             assumed,
             effects,
+            correlations: file.sections("correlation", "correlation")?.iter().map(read_correlation).collect::<Result<_>>()?,
             data,
             provenance,
         };
@@ -231,6 +233,7 @@ impl Model {
         for effect in &self.effects {
             write_effect(&mut text, effect);
         }
+        self.correlations.iter().for_each(|group| write_correlation(&mut text, group));
         if !self.provenance.is_empty() {
             let table = toml::Table::from_iter([("provenance".to_owned(), Entry::Table(self.provenance.clone()).to_toml())]);
             let _ = write!(text, "\n{table}");
@@ -356,6 +359,30 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
     effect.added_by = section.text("added_by")?.map(str::to_owned);
     effect.check(&section.path.display().to_string()).map_err(|error| located(section, &effect.name, error))?;
     Ok(effect)
+}
+
+fn read_correlation(section: &Section<'_>) -> Result<Correlation> {
+    section.allow(&["numbers", "below"])?;
+    let group = Correlation { numbers: section.texts("numbers")?, below: section.list("below")? };
+    match group.fault() {
+        Some(expected) => Err(section.fault("below", format!("{} for {}", group.below.len(), group.numbers.len()), expected)),
+        None => Ok(group),
+    }
+}
+
+/// One line a row.
+fn write_correlation(text: &mut String, group: &Correlation) {
+    let numbers: Vec<String> = group.numbers.iter().map(|number| quoted(number)).collect();
+    let mut left = group.below.as_slice();
+    let rows = (1..group.numbers.len()).map(|row| {
+        let (own, rest) = left.split_at(row);
+        left = rest;
+        let values: Vec<String> = own.iter().map(|value| format!("{value:?}")).collect();
+        format!("    {},\n", values.join(", "))
+    });
+    let rows: String = rows.collect();
+    // Writing to a String does not fail.
+    let _ = write!(text, "\n[[correlation]]\nnumbers = [{}]\nbelow = [\n{rows}]\n", numbers.join(", "));
 }
 
 fn names(effect: &Effect) -> Vec<&str> {

@@ -96,14 +96,20 @@ impl<'a> Section<'a> {
         number(value).map(Some).ok_or_else(|| self.fault(key, describe(value), "a finite number"))
     }
 
-    /// A list of `COUNT` finite numbers.
-    pub(super) fn numbers<const COUNT: usize>(&self, key: &str) -> Result<Option<[f64; COUNT]>> {
-        let Some(value) = self.value(key) else { return Ok(None) };
+    /// A list of finite numbers; none if it is not there.
+    pub(super) fn list(&self, key: &str) -> Result<Vec<f64>> {
+        let Some(value) = self.value(key) else { return Ok(Vec::new()) };
         let list: Option<Vec<f64>> = match value {
             DeValue::Array(values) => values.iter().map(|value| number(value.get_ref())).collect(),
             _ => None,
         };
-        let array = list.and_then(|list| <[f64; COUNT]>::try_from(list).ok());
+        list.ok_or_else(|| self.fault(key, describe(value), "a list of finite numbers"))
+    }
+
+    /// A list of `COUNT` finite numbers.
+    pub(super) fn numbers<const COUNT: usize>(&self, key: &str) -> Result<Option<[f64; COUNT]>> {
+        let Some(value) = self.value(key) else { return Ok(None) };
+        let array = self.list(key).ok().and_then(|list| <[f64; COUNT]>::try_from(list).ok());
         array.map(Some).ok_or_else(|| self.fault(key, describe(value), format!("a list of {COUNT} numbers")))
     }
 

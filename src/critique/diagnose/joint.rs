@@ -15,7 +15,7 @@ use super::gram::grams;
 use super::known::{Known, known};
 use super::own::prediction_errors;
 use crate::error::{Error, Result};
-use crate::physics::{Model, Wanted};
+use crate::physics::{Correlation, Model, Wanted};
 use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use normal::Normal;
@@ -375,9 +375,21 @@ impl Point {
         let without: Option<Vec<Vec<f64>>> = folds.normals.iter().map(|normal| self.solve(normal, &open, &start, 0.0)).collect();
         let Some(without) = without else { return };
         let count = without.len() as f64;
-        for number in open {
-            let mean = without.iter().map(|values| values[number]).sum::<f64>() / count;
-            let variance = without.iter().map(|values| (values[number] - mean).powi(2)).sum::<f64>() * (count - 1.0) / count;
+        let mean = |number: usize| without.iter().map(|values| values[number]).sum::<f64>() / count;
+        let deviations: Vec<Vec<f64>> = {
+            let means: Vec<f64> = open.iter().map(|&number| mean(number)).collect();
+            let of = |values: &Vec<f64>| open.iter().zip(&means).map(|(&number, mean)| values[number] - mean).collect();
+            without.iter().map(of).collect()
+        };
+        let label = |&number: &usize| {
+            let effect = &self.model.effects[self.layout.free[number].effect];
+            let found = effect.number(self.layout.free[number].coefficient).expect("a number of the model");
+            Correlation::label(effect, &found.name)
+        };
+        let labels = open.iter().map(label).collect();
+        self.model.correlations = Correlation::of_deviations(labels, &deviations).into_iter().collect();
+        for (place, number) in open.into_iter().enumerate() {
+            let variance = deviations.iter().map(|values| values[place].powi(2)).sum::<f64>() * (count - 1.0) / count;
             let half = quantile_975(count - 1.0) * variance.sqrt();
             let free = self.layout.free[number];
             if let Some((value, ci95)) = self.model.effects[free.effect].number_mut(free.coefficient) {

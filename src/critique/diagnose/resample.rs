@@ -4,7 +4,7 @@
 use super::engine::{Engine, priors};
 use super::fit::{Reduced, components};
 use crate::error::Result;
-use crate::physics::Model;
+use crate::physics::{Correlation, Model};
 use phyture_kernels::random::Stream;
 use std::collections::BTreeMap;
 
@@ -25,12 +25,20 @@ pub(super) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted.get((last as f64 * share).round() as usize).copied().unwrap_or(f64::NAN)
 }
 
-/// 95 % intervals of the coefficients of a model, by effect and coefficient; properties of a flight have none.
-pub(super) fn intervals(engine: &Engine<'_>, model: &Model, seed: u64) -> Result<BTreeMap<(usize, usize), [f64; 2]>> {
+/// What resampled blocks say of the coefficients of a model; properties of a flight are left out.
+pub(super) struct Resampled {
+    /// 95 % intervals, by effect and coefficient.
+    pub intervals: BTreeMap<(usize, usize), [f64; 2]>,
+    /// How the coefficients vary together.
+    pub correlations: Vec<Correlation>,
+}
+
+/// Intervals and correlations of the coefficients of a model.
+pub(super) fn resampled(engine: &Engine<'_>, model: &Model, seed: u64) -> Result<Resampled> {
     let pass = engine.pass(model, &[])?;
     let layout = &pass.base.layout;
     let (weights, priors) = (engine.weights(&pass.base), priors(model, layout, &engine.held));
-    let mut found = BTreeMap::new();
+    let mut found = Resampled { intervals: BTreeMap::new(), correlations: Vec::new() };
     for (channels, members) in components(layout) {
         let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(layout, channel, &pass.grams)).collect();
         let component = engine.component(&channels, &members, &reduced, &weights, &priors);
@@ -50,11 +58,21 @@ pub(super) fn intervals(engine: &Engine<'_>, model: &Model, seed: u64) -> Result
         if worlds.len() < RESAMPLES * 9 / 10 {
             continue;
         }
-        for (position, &member) in members.iter().enumerate().filter(|(_, member)| priors[**member].by_flight.is_none()) {
+        let common: Vec<usize> = (0..members.len()).filter(|&at| priors[members[at]].by_flight.is_none()).collect();
+        let label = |&at: &usize| {
+            let effect = &model.effects[layout.free[members[at]].effect];
+            Correlation::label(effect, &effect.coefficients[layout.free[members[at]].coefficient].name)
+        };
+        let mean = |at: usize| worlds.iter().map(|values| values[at]).sum::<f64>() / worlds.len() as f64;
+        let means: Vec<f64> = common.iter().map(|&at| mean(at)).collect();
+        let deviations = |values: &Vec<f64>| common.iter().zip(&means).map(|(&at, mean)| values[at] - mean).collect();
+        let deviations: Vec<Vec<f64>> = worlds.iter().map(deviations).collect();
+        found.correlations.extend(Correlation::of_deviations(common.iter().map(label).collect(), &deviations));
+        for position in common {
             let mut values: Vec<f64> = worlds.iter().map(|values| values[position]).collect();
             values.sort_by(f64::total_cmp);
-            let free = layout.free[member];
-            found.insert((free.effect, free.coefficient), [quantile(&values, 0.025), quantile(&values, 0.975)]);
+            let free = layout.free[members[position]];
+            found.intervals.insert((free.effect, free.coefficient), [quantile(&values, 0.025), quantile(&values, 0.975)]);
         }
     }
     Ok(found)
@@ -106,7 +124,7 @@ mod tests {
             let cut: Vec<Block> = blocks(&flights, &whole(&flights), block_s);
             let fold = (0..cut.len()).map(|block| block % 10).collect();
             let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
-            let found = intervals(&engine, &model(), 1)?;
+            let found = resampled(&engine, &model(), 1)?.intervals;
             Ok(found.get(&(index(), 0)).map_or(f64::NAN, |[low, high]| high - low))
         };
         let (by_block, by_row) = (width(10.0)?, width(0.1)?);

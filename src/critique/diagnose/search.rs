@@ -6,7 +6,7 @@ use super::describe::{dropped, stability};
 use super::engine::{Engine, Trial};
 use super::gates::{CONTENDER, MANY, MOST_CONTENDERS, SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
 use super::report::{CandidateReport, Step};
-use super::resample::{RESAMPLES, draw, intervals};
+use super::resample::{RESAMPLES, Resampled, draw, resampled};
 use super::score::{Scored, gains, paired};
 use super::significance::Flips;
 use super::verdict::Options;
@@ -245,7 +245,7 @@ impl Search<'_> {
     /// Intervals of the accepted effects' coefficients, all of them in the model.
     pub(super) fn intervals(&self, found: &mut [Found]) -> Result<()> {
         let Some(model) = found.last().map(|last| last.model.clone()) else { return Ok(()) };
-        let intervals = intervals(&self.engine, &model, self.options.seed)?;
+        let Resampled { intervals, correlations } = resampled(&self.engine, &model, self.options.seed)?;
         for found in found.iter_mut() {
             let Some(index) = model.effects.iter().position(|effect| effect.name == found.step.effect) else { continue };
             for (position, number) in found.step.coefficients.iter_mut().enumerate() {
@@ -257,6 +257,7 @@ impl Search<'_> {
             found.step.formula = model.effects[index].to_string();
         }
         if let Some(last) = found.last_mut() {
+            last.model.correlations = correlations;
             for (&(effect, coefficient), interval) in &intervals {
                 if let Some(coefficient) =
                     last.model.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(coefficient))

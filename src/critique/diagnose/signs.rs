@@ -31,7 +31,7 @@ impl Search<'_> {
     /// What is to be said of the model's own numbers: those with the wrong sign.
     pub(super) fn sign_notes(&self, model: &Model) -> Result<Vec<String>> {
         let mut model = model.clone();
-        for ((effect, coefficient), interval) in super::resample::intervals(&self.engine, &model, self.options.seed)? {
+        for ((effect, coefficient), interval) in super::resample::resampled(&self.engine, &model, self.options.seed)?.intervals {
             if let Some(coefficient) = model.effects.get_mut(effect).and_then(|effect| effect.coefficients.get_mut(coefficient)) {
                 coefficient.ci95 = Some(interval);
             }
