@@ -153,7 +153,7 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
     }
     let is_in = |step: &&Step| model.effect(&step.effect).is_some_and(|effect| effect.enabled);
     whole.verdict = Verdict::EffectsMissing;
-    whole.steps = added.iter().flat_map(|round| &round.steps).filter(is_in).cloned().collect();
+    whole.steps = each_once(added.iter().flat_map(|round| &round.steps).filter(is_in));
     whole.accepted = whole.steps.iter().map(|step| step.effect.clone()).collect();
     for step in &mut whole.steps {
         step.indistinguishable.retain(|other| !whole.accepted.contains(other));
@@ -182,6 +182,18 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
     whole.summary = summary(&whole);
     weigh(&mut whole, flights, model, split)?;
     Ok(whole)
+}
+
+/// Each effect once, where it was accepted first, as the last round has it: a search from the other end names again what an earlier one had found.
+fn each_once<'s>(steps: impl Iterator<Item = &'s Step>) -> Vec<Step> {
+    let mut kept: Vec<Step> = Vec::new();
+    for step in steps {
+        match kept.iter_mut().find(|known| known.effect == step.effect) {
+            Some(known) => known.clone_from(step),
+            None => kept.push(step.clone()),
+        }
+    }
+    kept
 }
 
 /// The bars of several rounds in one row: what a round begins with is what the one before has ended with.
@@ -301,6 +313,15 @@ mod tests {
         assert!((found[0] - first).abs() < 1e-9 && (found[1] - last).abs() < 1e-9, "{found:?} {first} {last}");
         assert_eq!((whole.verdict, whole.is_confirmed()), (Verdict::EffectsMissing, true));
         Ok(())
+    }
+
+    #[test]
+    fn what_two_rounds_name_is_told_once_as_the_last_has_it() {
+        let step = |effect: &str, p_value: f64| Step { effect: effect.into(), p_value, ..Step::default() };
+        let rounds = [vec![step("one", 0.1), step("two", 0.2)], vec![step("three", 0.3), step("one", 0.4)]];
+        let kept = each_once(rounds.iter().flatten());
+        let told: Vec<(&str, f64)> = kept.iter().map(|step| (step.effect.as_str(), step.p_value)).collect();
+        assert_eq!(told, [("one", 0.4), ("two", 0.2), ("three", 0.3)]);
     }
 
     #[test]

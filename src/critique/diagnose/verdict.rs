@@ -261,7 +261,13 @@ impl Search<'_> {
         let Some(last) = found.last().filter(|_| !unknown.is_empty()) else { return Ok(Vec::new()) };
         let rows = self.engine.rows().max(1) as f64;
         let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
-        let [whole, left] = [mse(before)?, mse(&last.model)?];
+        // What an earlier search had found is in the model that was given: it, too, is held against what is left without it.
+        let mut bare = before.clone();
+        bare.effects.retain(|effect| !found.iter().any(|found| found.step.effect == effect.name));
+        if bare.effects.len() < before.effects.len() {
+            bare = self.engine.pass(&bare, &[])?.base.model;
+        }
+        let [whole, left] = [mse(&bare)?, mse(&last.model)?];
         let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
         let is_one = |found: &&Found| {
             let effect = found.model.effect(&found.step.effect);
@@ -273,9 +279,11 @@ impl Search<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::candidate::with;
     use super::super::gram::tests::{model, noise, whole};
-    use super::super::report::Status;
+    use super::super::report::{Status, Step};
     use super::*;
+    use crate::critique::unknown::Dependence;
     use crate::flight::Column;
     use crate::physics::{calibrate, catalogue};
 
@@ -291,6 +299,49 @@ mod tests {
             Flight::new(flight.name.clone(), "noise", 0.0, flight.step_s, Column::ALL.map(column), flight.targets)
         };
         noise(1, &[6000; 6]).into_iter().enumerate().map(one).collect()
+    }
+
+    /// An effect that an earlier search found is in the model that is given: what it removes is what is left without it.
+    #[test]
+    fn an_effect_of_an_earlier_search_is_no_stand_in_for_being_in_already() -> Result<()> {
+        let mut flights = noise(5, &[6000; 6]);
+        for flight in &mut flights {
+            let mut accelerations = model().predict(flight)?;
+            for (channel, values) in accelerations.iter_mut().enumerate() {
+                let noise = flight.column(Column::TARGETS[channel]);
+                let stick = flight.column(Column::U1).iter().map(|u1| if channel == 0 { *u1 } else { 0.0 });
+                values.iter_mut().zip(noise).zip(stick).for_each(|((value, noise), stick)| *value += 0.1 * noise + stick);
+            }
+            *flight = flight.with_accelerations(&accelerations)?;
+        }
+        let spans = whole(&flights);
+        let (before, _) = calibrate(&with(&model(), &Effect::formula("stick", 0, "u1", 0.0)?), &flights, &spans)?;
+        let cut = blocks(&flights, &spans, 10.0);
+        let fold = (0..cut.len()).map(|block| block % 10).collect();
+        let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
+        let options = Options::default();
+        let search = Search { flips: Flips::new(engine.blocks.len(), 1), engine, largest_p: 0.05, options: &options };
+        let found = [Found {
+            step: Step { effect: "stick".into(), ..Step::default() },
+            gain: 1.0,
+            model: before.clone(),
+            channels: vec![0],
+            confusable: &[],
+            mse_before: [1.0; 6],
+            removed: [0.0; 6],
+        }];
+        let unknown = Unknown {
+            channel: "vx_dot",
+            r2: 0.5,
+            r2_with_feedback: 0.5,
+            null_r2_95: 0.1,
+            depends_on: vec![Dependence { variable: "u1".into(), share: 1.0 }],
+            suggested_formula: None,
+            skeleton: String::new(),
+        };
+        assert!(search.stand_ins(&found, &before, std::slice::from_ref(&unknown))?.is_empty());
+        assert!(search.stand_ins(&found, &model(), &[unknown])?.is_empty(), "and of this search");
+        Ok(())
     }
 
     fn refusal(flights: &[Flight]) -> String {

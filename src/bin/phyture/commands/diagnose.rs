@@ -369,7 +369,12 @@ pub fn run_loop(context: &Context, data: &Data, wanted: &Loop<'_>, division: &Di
 /// `amended.ledger.jsonl: a line for each effect, in order of acceptance: wind, drag`.
 fn written(ledger: &Path, rounds: &[Diagnosis]) -> String {
     let steps = rounds.iter().filter(|round| round.is_confirmed()).flat_map(|round| &round.steps);
-    let names: Vec<&str> = steps.map(|step| step.effect.as_str()).collect();
+    let mut names: Vec<&str> = Vec::new();
+    steps.map(|step| step.effect.as_str()).for_each(|name| {
+        if !names.contains(&name) {
+            names.push(name)
+        }
+    });
     let what = match names.as_slice() {
         [] => "nothing added; what it holds is of an earlier run".to_owned(),
         [one] => format!("a line for {one}"),
@@ -403,6 +408,8 @@ mod tests {
         assert_eq!(progress(&round(&[], false)), "search: nothing more found in 2.0 s");
         let said = written(Path::new("a.ledger.jsonl"), &rounds);
         assert_eq!(said, "a.ledger.jsonl, a line for each effect, in order of acceptance: wind, drag, lag");
+        let again = [round(&["wind", "drag"], true), round(&["lag", "wind"], true)];
+        assert!(written(Path::new("l"), &again).ends_with(": wind, drag, lag"), "one that a later search names again");
         assert_eq!(written(Path::new("l"), &rounds[1..]), "l, a line for lag");
         assert!(written(Path::new("l"), &rounds[2..]).contains("of an earlier run"));
     }
