@@ -6,6 +6,8 @@
 //! normality (Hemerik, Goeman & Finos 2020, J. Royal Statistical Society B 82:841). The statistic is studentised, S = sᵀ V⁻¹ s with
 //! s the sum and V the sum of squares of the block scores, and the largest over the effect's grid, under the same signs.
 //!
+//! Numbers that each flight has for itself are tested as a variance between flights: the scores of a flight's blocks then lean one way.
+//!
 //! A lag or a delay has no coefficient; its regressor is the change it makes to the prediction, and its test is one-sided. Blocks are weighted by the
 //! inverse of their error, or a few aerobatic ones would decide everything.
 
