@@ -116,7 +116,7 @@ impl Graph {
         let [signal, time, tangent, limit] = operands;
         let is_zero = |graph: &Self, node| graph.is(node, 0.0);
         let nothing = match recall {
-            Recall::SlewTangent => is_zero(self, tangent) && is_zero(self, limit),
+            Recall::LagTangent | Recall::SlewTangent => is_zero(self, tangent) && is_zero(self, limit),
             _ => is_zero(self, signal),
         };
         // A lag or a delay of no time passes its signal on.
@@ -166,6 +166,10 @@ impl Graph {
                 let (dx, dtime) = (of(x), of(time));
                 match recall {
                     Recall::History(History::Rate) => dx.map(|dx| self.remember(Recall::History(History::Rate), [dx])),
+                    Recall::History(History::Lag) if dtime.is_some() && self.uniform(time).is_none() => {
+                        let zero = self.number(0.0);
+                        Some(self.remember(Recall::LagTangent, [x, time, dx.unwrap_or(zero), dtime.unwrap_or(zero)]))
+                    }
                     Recall::History(history @ (History::Lag | History::Delay)) => {
                         let by_signal = dx.map(|dx| self.remember(Recall::History(history), [dx, time]));
                         let by_time = dtime.map(|dtime| {
@@ -180,7 +184,7 @@ impl Graph {
                         (dx.is_some() || dtime.is_some())
                             .then(|| self.remember(Recall::SlewTangent, [x, time, dx.unwrap_or(zero), dtime.unwrap_or(zero)]))
                     }
-                    Recall::LagByTime | Recall::DelayByTime | Recall::SlewTangent => {
+                    Recall::LagByTime | Recall::LagTangent | Recall::DelayByTime | Recall::SlewTangent => {
                         unreachable!("derivatives are taken of formulas, not of derivatives")
                     }
                 }
@@ -347,6 +351,8 @@ mod tests {
                 "tanh(rate(lag(X, 0.05)) / 50)",
                 "lag(X, 0.1 + p / 10)",
                 "lag(X, q * q / 20)",
+                "lag(a, 0.05 + p * (1 + tanh(X)) / 20)",
+                "lag(X, 0.03 + q * b * b / 10)",
                 "delay(X, 0.017 + p / 1000)",
             ]);
             let two = prop::sample::select(vec![

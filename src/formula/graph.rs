@@ -18,6 +18,8 @@ pub(super) enum Recall {
     History(History),
     /// Derivative of a lag by its time constant: signal, time constant.
     LagByTime,
+    /// Derivative of a lag whose time constant varies: signal, time constant, derivative of the signal, derivative of the time constant.
+    LagTangent,
     /// Derivative of a delay by its time: signal, time.
     DelayByTime,
     /// Derivative of a slew: signal, limit, derivative of the signal, derivative of the limit.
@@ -98,7 +100,7 @@ impl Graph {
     /// A formula whose names stand for what `resolve` gives; a name for which it gives nothing is a column.
     ///
     /// # Errors
-    /// [`Error::Formula`] at a `lag`, `delay` or `slew` whose second argument varies or is out of range; those of `resolve`.
+    /// [`Error::Formula`] at a `delay` or `slew` whose second argument varies, or one or a `lag` whose is out of range; those of `resolve`.
     pub fn add(&mut self, formula: &Formula, resolve: &mut dyn FnMut(&mut Self, &str) -> Result<Option<Node>>) -> Result<Node> {
         let mut names = Vec::with_capacity(formula.names.len());
         for (name, _) in &formula.names {
@@ -191,10 +193,13 @@ impl Graph {
             }
             History::Lag | History::Delay => {
                 let (name, largest) = if history == History::Lag { ("lag", f64::MAX) } else { ("delay", MAX_DELAY_S) };
-                let Some(time_s) = value else {
-                    return Err(format!(
-                        "the time of `{name}` must be a number or a parameter, not something that varies in flight"
-                    ));
+                let time_s = match value {
+                    Some(time_s) => time_s,
+                    None if history == History::Lag => 0.0,
+                    None => {
+                        let message = "the time of `delay` must be a number or a parameter, not something that varies in flight";
+                        return Err(message.into());
+                    }
                 };
                 if !(0.0..=largest).contains(&time_s) {
                     let limit = if history == History::Lag { String::new() } else { format!(" and at most {largest}") };
@@ -236,7 +241,7 @@ impl Graph {
                 of(signal).map(|_| 0.0)
             }
             Kind::Recall(Recall::History(_), [signal, ..]) => of(signal),
-            Kind::Recall(Recall::SlewTangent, [signal, _, tangent, _]) => of(signal).and(of(tangent)),
+            Kind::Recall(Recall::LagTangent | Recall::SlewTangent, [signal, _, tangent, _]) => of(signal).and(of(tangent)),
         }
     }
 

@@ -26,7 +26,7 @@ enum Step {
     One { operation: Operation, x: Slot, out: Slot },
     Two { operation: Operation, x: Slot, y: Slot, out: Slot },
     PowerInteger { x: Slot, exponent: i32, out: Slot },
-    Recall { memory: u32, x: Slot, tangents: [Slot; 2], out: Slot },
+    Recall { memory: u32, x: Slot, number: Slot, tangents: [Slot; 2], out: Slot },
 }
 
 /// Some values of a [`Graph`] ready to be evaluated, with the hidden state of what remembers. Samples come in order; the first one after
@@ -137,23 +137,20 @@ impl Machine {
                     None => Step::Two { operation, x: left, y: right, out: slots.take(node) },
                 }
             }
-            Kind::Recall(recall, [x, number, tangent, limit]) => {
-                let number = match recall {
-                    Recall::History(History::Rate) => 0.0,
-                    _ => uniform[number.0 as usize].expect("a time or a limit is the same at all samples"),
-                };
-                let samples = number / step_s;
+            Kind::Recall(recall, [x, time, tangent, limit]) => {
+                let number = uniform[time.0 as usize];
+                let samples = number.unwrap_or(0.0) / step_s;
                 if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) && samples > MAX_DELAY_SAMPLES {
                     return Err(Error::Config {
                         place: "formula".into(),
                         field: "delay".into(),
-                        found: format!("{number} s, {samples:.1e} samples of {step_s:e} s"),
+                        found: format!("{} s, {samples:.1e} samples of {step_s:e} s", samples * step_s),
                         expected: format!("at most {MAX_DELAY_SAMPLES:e} samples, which can be kept"),
                     });
                 }
                 self.memory.push(Memory::new(recall, number, step_s));
-                let (x, tangents) = (slots.of(x), [slots.of(tangent), slots.of(limit)]);
-                Step::Recall { memory: self.memory.len() as u32 - 1, x, tangents, out: slots.take(node) }
+                let (x, number, tangents) = (slots.of(x), slots.of(time), [slots.of(tangent), slots.of(limit)]);
+                Step::Recall { memory: self.memory.len() as u32 - 1, x, number, tangents, out: slots.take(node) }
             }
         };
         self.steps.push(step);
@@ -193,8 +190,8 @@ impl Machine {
                 Step::One { operation, x, .. } => operation.of_column(*level, column(x), values),
                 Step::Two { operation, x, y, .. } => operation.of_columns(*level, column(x), column(y), values),
                 Step::PowerInteger { x, exponent, .. } => whole_power_of_column(*level, exponent, column(x), values),
-                Step::Recall { memory: index, x, tangents, .. } => {
-                    memory[index as usize].run(*level, column(x), tangents.map(column), values);
+                Step::Recall { memory: index, x, number, tangents, .. } => {
+                    memory[index as usize].run(*level, column(x), column(number), tangents.map(column), values);
                 }
             }
             columns[out as usize] = result;
@@ -298,7 +295,7 @@ impl Formula {
     /// Evaluates whole columns of `samples` samples taken every `step_s` seconds; `get` gives a column or a parameter by name.
     ///
     /// # Errors
-    /// [`Error::Formula`] at the first name `get` does not know, or at a `lag` or `delay` whose time varies or is out of range;
+    /// [`Error::Formula`] at the first name `get` does not know, or at a `delay` whose time varies or one or a `lag` whose is out of range;
     /// [`Error::Shape`] if a column's length is not `samples`.
     pub fn evaluate<'a>(&self, samples: usize, step_s: f64, get: &dyn Fn(&str) -> Option<Value<'a>>) -> Result<Vec<f64>> {
         let mut columns: Vec<Cow<'a, [f64]>> = Vec::new();
@@ -321,7 +318,7 @@ impl Formula {
     /// The formula for one sample at a time, every name being a column.
     ///
     /// # Errors
-    /// [`Error::Formula`] at a `lag` or `delay` whose time varies or is out of range.
+    /// [`Error::Formula`] at a `delay` whose time varies, or one or a `lag` whose is out of range.
     pub fn stream(&self, step_s: f64) -> Result<StreamingFormula> {
         self.stream_with(step_s, &|_| None)
     }

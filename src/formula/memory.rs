@@ -33,7 +33,11 @@ pub(super) enum Memory {
     /// `y' = (x - y) / tau`, exact for a piecewise linear `x`:
     /// `y[k] = y[k-1] + (1 - a) (x[k-1] - y[k-1]) + ramp (x[k] - x[k-1])`, `a = exp(-T/tau)`, `ramp = 1 - (1 - a) tau/T`.
     Lag { approach: f64, ramp: f64, last: Option<(f64, f64)> },
-    /// `dy/dtau` of that recursion; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
+    /// The same where the time constant varies: the coefficients of a step are those of its end.
+    VaryingLag { steps: LagSteps, last: Option<(f64, f64)> },
+    /// Derivative of that by a number, from those of `x` and of the time constant. The last `x`, `y`, `dx` and `dy`.
+    LagTangent { steps: LagSteps, last: Option<[f64; 4]> },
+    /// `dy/dtau` of the recursion of a lag; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
     LagByTime { approach: f64, ramp: f64, slopes: [f64; 2], last: Option<(f64, f64, f64)> },
     /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before.
     Delay { whole: usize, part: f64, past: Past },
@@ -55,6 +59,27 @@ fn lag_coefficients(tau_s: f64, step_s: f64) -> ([f64; 2], [f64; 2]) {
     let approach = -(-step_s / tau_s).exp_m1();
     let slope = -(-step_s / tau_s).exp() * step_s / (tau_s * tau_s);
     ([approach, 1.0 - approach * tau_s / step_s], [slope, -(approach + tau_s * slope) / step_s])
+}
+
+/// The coefficients of a lag from step to step; they are worked out when the time constant changes.
+#[derive(Clone, Debug)]
+pub(super) struct LagSteps {
+    step_s: f64,
+    tau_s: f64,
+    coefficients: ([f64; 2], [f64; 2]),
+}
+
+impl LagSteps {
+    fn new(step_s: f64) -> Self {
+        Self { step_s, tau_s: 0.0, coefficients: lag_coefficients(0.0, step_s) }
+    }
+
+    fn at(&mut self, tau_s: f64) -> ([f64; 2], [f64; 2]) {
+        if tau_s != self.tau_s {
+            (self.tau_s, self.coefficients) = (tau_s, lag_coefficients(tau_s, self.step_s));
+        }
+        self.coefficients
+    }
 }
 
 /// The latest samples of a signal, the newest at the back; before the first one it was at rest.
@@ -79,14 +104,23 @@ impl Past {
 }
 
 impl Memory {
-    /// Of an operator with its time or limit, which is unused by a rate.
-    pub(super) fn new(recall: Recall, number: f64, step_s: f64) -> Self {
+    /// Of an operator with its time or limit; a rate has none, and that of a lag may vary.
+    pub(super) fn new(recall: Recall, number: Option<f64>, step_s: f64) -> Self {
+        let steps = LagSteps::new(step_s);
+        let number = match (recall, number) {
+            (_, Some(number)) => number,
+            (Recall::History(History::Rate), None) => 0.0,
+            (Recall::History(History::Lag), None) => return Self::VaryingLag { steps, last: None },
+            (Recall::LagTangent, None) => return Self::LagTangent { steps, last: None },
+            _ => unreachable!("a time that varies is that of a lag"),
+        };
         let whole = (number / step_s).floor();
         match recall {
             Recall::History(History::Lag) => {
                 let ([approach, ramp], _) = lag_coefficients(number, step_s);
                 Self::Lag { approach, ramp, last: None }
             }
+            Recall::LagTangent => Self::LagTangent { steps, last: None },
             Recall::LagByTime => {
                 let ([approach, ramp], slopes) = lag_coefficients(number, step_s);
                 Self::LagByTime { approach, ramp, slopes, last: None }
@@ -104,15 +138,16 @@ impl Memory {
     /// Forgets everything: the next sample is a first one.
     pub(super) fn reset(&mut self) {
         match self {
-            Self::Lag { last, .. } | Self::SlewTangent { last, .. } => *last = None,
+            Self::Lag { last, .. } | Self::VaryingLag { last, .. } | Self::SlewTangent { last, .. } => *last = None,
+            Self::LagTangent { last, .. } => *last = None,
             Self::LagByTime { last, .. } => *last = None,
             Self::Delay { past, .. } | Self::DelayByTime { past, .. } => past.0.clear(),
             Self::Rate { last, .. } | Self::Slew { last, .. } => *last = None,
         }
     }
 
-    /// Takes samples in order. `tangents`, of the signal and of the limit, are read by a slew's derivative alone.
-    pub(super) fn run(&mut self, level: Level, signal: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
+    /// Takes samples in order. `number` is the time or limit, `tangents` are those of the signal and of that; they are read where they vary.
+    pub(super) fn run(&mut self, level: Level, signal: &[f64], number: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
         let samples = out.iter_mut().zip(signal.iter().copied());
         match self {
             Self::Lag { approach, ramp, last } => {
@@ -120,6 +155,25 @@ impl Memory {
                     let (x_before, y_before) = last.unwrap_or((x, x));
                     *out = y_before + *approach * (x_before - y_before) + *ramp * (x - x_before);
                     *last = Some((x, *out));
+                }
+            }
+            Self::VaryingLag { steps, last } => {
+                for ((out, x), &tau_s) in samples.zip(number) {
+                    let ([approach, ramp], _) = steps.at(tau_s);
+                    let (x_before, y_before) = last.unwrap_or((x, x));
+                    *out = y_before + approach * (x_before - y_before) + ramp * (x - x_before);
+                    *last = Some((x, *out));
+                }
+            }
+            Self::LagTangent { steps, last } => {
+                let [of_signal, of_time] = tangents;
+                for (((out, x), &tau_s), (&dx, &dtau)) in samples.zip(number).zip(of_signal.iter().zip(of_time)) {
+                    let ([approach, ramp], [of_approach, of_ramp]) = steps.at(tau_s);
+                    let [x_before, y_before, dx_before, dy_before] = last.unwrap_or([x, x, dx, dx]);
+                    let by_signal = dy_before + approach * (dx_before - dy_before) + ramp * (dx - dx_before);
+                    *out = by_signal + dtau * (of_approach * (x_before - y_before) + of_ramp * (x - x_before));
+                    let y = y_before + approach * (x_before - y_before) + ramp * (x - x_before);
+                    *last = Some([x, y, dx, *out]);
                 }
             }
             Self::LagByTime { approach, ramp, slopes: [of_approach, of_ramp], last } => {
@@ -186,7 +240,7 @@ mod tests {
 
     fn recalled(recall: Recall, number: f64, step_s: f64, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        Memory::new(recall, number, step_s).run(Level::PLAIN, values, [&[], &[]], &mut out);
+        Memory::new(recall, Some(number), step_s).run(Level::PLAIN, values, &[], [&[], &[]], &mut out);
         out
     }
 
@@ -199,6 +253,30 @@ mod tests {
             let exact = 3.0 * (t - tau_s * (1.0 - (-t / tau_s).exp()));
             assert!((y - exact).abs() < Tolerance::Close.relative_f64(), "{k}: {y} against {exact}");
         }
+    }
+
+    #[test]
+    fn a_lag_whose_time_varies_is_the_exact_solution_of_its_equation() {
+        // tau = (1 + t) / 4 and x = 0 from 1: y = (1 + t)^-4; steps are taken with the time constant of their ends.
+        let error = |step_s: f64| {
+            let samples = (1.0 / step_s).round() as usize;
+            let signal: Vec<f64> = (0..=samples).map(|k| f64::from(u8::from(k == 0))).collect();
+            let times: Vec<f64> = (0..=samples).map(|k| (1.0 + step_s * k as f64) / 4.0).collect();
+            let mut out = vec![0.0; signal.len()];
+            let mut memory = Memory::new(Recall::History(History::Lag), None, step_s);
+            memory.run(Level::PLAIN, &signal, &times, [&[], &[]], &mut out);
+            (out[samples] - 1.0 / 16.0).abs()
+        };
+        assert!(error(1e-3) < 1e-3 && error(1e-4) < 0.11 * error(1e-3), "{:e} {:e}", error(1e-3), error(1e-4));
+    }
+
+    #[test]
+    fn a_time_that_could_vary_and_does_not_gives_the_bits_of_a_constant() {
+        let values: Vec<f64> = (0..300).map(|k| (f64::from(k) * 0.13).sin()).collect();
+        let mut out = vec![0.0; values.len()];
+        let mut memory = Memory::new(Recall::History(History::Lag), None, STEP_S);
+        memory.run(Level::PLAIN, &values, &[0.04; 300], [&[], &[]], &mut out);
+        assert_eq!(out, run(History::Lag, 0.04, &values));
     }
 
     #[test]

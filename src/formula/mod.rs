@@ -14,8 +14,9 @@
 //! | `rate(x)` | backward difference over one step, per second: causal, hence half a step late |
 //! | `slew(x, per_s)` | follows `x`, changing by at most so much per second: a servo at its largest speed |
 //!
-//! The last four remember. Before the first sample their argument is taken to have rested at its first value. Their second
-//! arguments are numbers or parameters, never columns.
+//! The last four remember. Before the first sample their argument is taken to have rested at its first value. The second
+//! arguments of `delay` and `slew` are numbers or parameters, never columns; the time constant of a `lag` may vary from step to step, and where it
+//! is not above 0 nothing lags.
 
 mod derivative;
 mod graph;

@@ -97,7 +97,7 @@ pub(super) const fn described(function: Function) -> (&'static str, &'static str
             Operation::Less | Operation::LessOrEqual | Operation::Greater | Operation::GreaterOrEqual => ("a op b", "comparison"),
         },
         Function::History(history) => match history {
-            History::Lag => ("lag(x, tau_s)", "first-order lag, tau y' = x - y, tau in s"),
+            History::Lag => ("lag(x, tau_s)", "first-order lag, tau y' = x - y, tau in s; may vary"),
             History::Delay => ("delay(x, s)", "x so many seconds ago, 0 to 60 s"),
             History::Rate => ("rate(x)", "change over the last step, per second"),
             History::Slew => ("slew(x, per_s)", "follows x, changing by at most so much per second"),

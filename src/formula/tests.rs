@@ -194,7 +194,7 @@ fn errors_point_at_the_character_and_say_what_to_do() {
         ("vx $ 2", 3, "unexpected character `$`"),
         ("lag(vx, -1)", 0, "expected at least 0"),
         ("delay(vx, 1e9)", 0, "at most 60"),
-        ("1 + lag(vx, vx)", 4, "must be a number or a parameter"),
+        ("1 + delay(vx, vx)", 4, "must be a number or a parameter"),
         ("slew(vx, 0)", 0, "is 0 per second, expected a number or a parameter above 0"),
         ("slew(vx, vx)", 0, "varies in flight"),
     ] {

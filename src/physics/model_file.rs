@@ -24,11 +24,12 @@ const NOMINAL_MASS_KG: f64 = 4.58;
 const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
 
-/// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power and damps less.
+/// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power
+/// and damps less, and the induced flow settles sooner the more air passes.
 const FORMAT: u32 = 3;
 
 /// Effects of the catalogue that mean something else in format 3 than in format 2.
-const CHANGED: [&str; 1] = ["rotor_droop"];
+const CHANGED: [&str; 2] = ["inflow_lag", "rotor_droop"];
 
 /// Effects of the catalogue that, alone beside the baseline, mean since format 2 what they meant before.
 const UNCHANGED: [&str; 15] = [
@@ -75,7 +76,8 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect], format: u32) -> Result<
         return Err(file.fault(
             "model.format",
             format!("2, and numbers of `{}`, found for another formula", changed.name),
-            "`format = 3` under [model], and then `phyture calibrate`: a rotor that slows down now takes less power and damps less",
+            "`format = 3` under [model], and then `phyture calibrate`: a rotor that slows down now takes less power and damps less, and induced flow \
+             settles sooner at speed",
         ));
     }
     let changed = match found.as_slice() {
@@ -94,7 +96,7 @@ impl Model {
     /// Reads a model file.
     ///
     /// A file without `format` was written when effects did not see each other: it is read where that means the same. So is one of format 2,
-    /// whose effects are those of today but for `rotor_droop`.
+    /// whose effects are those of today but for `inflow_lag` and `rotor_droop`.
     ///
     /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
     /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m) and are marked in [`Model::assumed`], the name to the file's, and without `baseline` the model holds

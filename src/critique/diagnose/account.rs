@@ -175,9 +175,10 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
         }
     }
     whole.confirmation = whole.confirmed();
-    if !last.is_confirmed() && !last.accepted.is_empty() {
+    let besides: Vec<String> = last.accepted.iter().filter(|effect| !whole.accepted.contains(effect)).cloned().collect();
+    if !last.is_confirmed() && !besides.is_empty() {
         let on = last.locked.as_ref().map_or_else(String::new, |locked| sentences::unseen(locked.kept, locked.duration_s));
-        whole.notes.push(sentences::not_added(&last.accepted, &on));
+        whole.notes.push(sentences::not_added(&besides, &on));
     }
     whole.summary = summary(&whole);
     weigh(&mut whole, flights, model, split)?;

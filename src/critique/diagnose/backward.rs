@@ -175,8 +175,7 @@ impl Search<'_> {
     /// An even selection of the searched flights, cut into blocks.
     fn even(&self, most: (f64, usize), block_s: f64) -> Engine<'_> {
         let Engine { flights, correlation, .. } = self.engine;
-        let spans: Vec<Span> =
-            self.engine.blocks.iter().map(|block| Span { flight: block.flight, start: block.start, end: block.end }).collect();
+        let spans: Vec<Span> = self.engine.spans().collect();
         let cut = blocks(flights, &joined(selection(flights, &spans, most)), block_s);
         let fold = permuted_folds(cut.len(), self.options.seed);
         Engine { flights, blocks: cut, fold, correlation, held: Vec::new() }

@@ -12,6 +12,9 @@ use crate::flight::{Column, Flight, Span};
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
+/// A rise by less than this share of the error is one of rounding: the same numbers, found on another way.
+const ROUNDING: f64 = 1e-6;
+
 /// A model, and the effects that it adds to the one before it.
 pub(super) type Rung = (Vec<String>, Model);
 
@@ -84,7 +87,7 @@ fn rises([before, after]: [&Errors; 2], comparisons: usize) -> BTreeMap<String, 
         let pairs = before[channel].iter().zip(&after[channel]);
         let mean = BlockMean::ratio(pairs.map(|(before, after)| BlockSum { samples: *before, sum: after - before }))?;
         let rise = Share { share: mean.mean, ci95: mean.interval_of(comparisons) };
-        rise.ci95.is_some_and(|[low, _]| low > 0.0).then(|| (Column::TARGETS[channel].name().to_owned(), rise))
+        rise.ci95.is_some_and(|[low, _]| low > ROUNDING).then(|| (Column::TARGETS[channel].name().to_owned(), rise))
     };
     (0..6).filter_map(of).collect()
 }
@@ -119,6 +122,7 @@ mod tests {
         assert!(found.len() == 1 && (found["vz_dot"].share - 0.2).abs() < 1e-12, "{found:?}");
         assert!(rises([&before, &blocks([1.5, 0.9, 1.3, 0.8])], 6).is_empty(), "some blocks up, some down");
         assert!(rises([&before, &blocks([0.8, 0.9, 0.7, 0.8])], 6).is_empty(), "a fall");
+        assert!(rises([&before, &blocks([1.0, 1.1, 0.9, 1.0].map(|error| error * (1.0 + 1e-12)))], 6).is_empty(), "rounding");
         // Half the difference in every block, and its scatter: enough for one comparison, too little for many.
         let little = blocks([1.1, 1.14, 0.97, 1.06]);
         assert_eq!([1, 60].map(|count| rises([&before, &little], count).len()), [1, 0]);

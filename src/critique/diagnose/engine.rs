@@ -89,6 +89,10 @@ impl Engine<'_> {
         self.blocks.iter().map(|block| block.end - block.start).sum()
     }
 
+    pub fn spans(&self) -> impl Iterator<Item = Span> {
+        self.blocks.iter().map(|block| Span { flight: block.flight, start: block.start, end: block.end })
+    }
+
     /// The blocks of each flight, as ranges.
     pub fn runs(&self) -> impl Iterator<Item = Range<usize>> {
         let mut next = 0;

@@ -19,7 +19,7 @@ use crate::physics::{Correlation, Model, Wanted};
 use crate::student::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use normal::Normal;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Weight at first of what holds numbers where they are, beside that of their usual sizes; and its factor with each step that succeeds or fails.
 const DAMPING: f64 = 1.0;
@@ -36,6 +36,8 @@ pub(super) struct Point {
     /// Effects that may be left out, by their index in the model.
     pub optional: Vec<usize>,
     layout: Layout,
+    /// What may move beside the numbers of each flight; all where it is empty.
+    movable: Vec<usize>,
     known: Vec<Known>,
     /// By channel, the squares of `[J | A | y - rest]` of each block; columns are numbered as in `layout.free`, then `optional`.
     reduced: Vec<Reduced>,
@@ -46,6 +48,16 @@ pub(super) struct Point {
     pub mse: [f64; 6],
     /// Minus twice the logarithm of likelihood and prior, in independent samples, but for a constant.
     pub cost: f64,
+}
+
+/// Which numbers a fit moves; those of each flight always.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Moving<'a> {
+    All,
+    /// All that act on an acceleration on which this effect acts.
+    Beside(&'a str),
+    /// Those of this effect.
+    Own(&'a str),
 }
 
 /// The blocks of all folds but one, for each fold, with these numbers of each flight.
@@ -80,7 +92,7 @@ impl Point {
         let names = engine.flights.iter().map(|flight| flight.name.clone()).collect();
         let correlation = engine.correlation;
         let (mse, cost) = ([0.0; 6], 0.0);
-        let mut point = Self { model, optional, layout, known, reduced, names, correlation, mse, cost };
+        let mut point = Self { model, optional, layout, movable: Vec::new(), known, reduced, names, correlation, mse, cost };
         point.weigh(engine);
         Ok(point)
     }
@@ -133,6 +145,26 @@ impl Point {
         absent.iter().any(|&place| self.optional[place] == self.layout.free[number].effect)
     }
 
+    fn movable(&self, moving: Moving<'_>) -> Vec<usize> {
+        let is_of = |name: &str, number: usize| self.model.effects[self.layout.free[number].effect].name == name;
+        let numbers = 0..self.known.len();
+        match moving {
+            Moving::All => Vec::new(),
+            Moving::Own(name) => numbers.filter(|&number| is_of(name, number)).collect(),
+            Moving::Beside(name) => {
+                let of_channel = |channel: usize| self.layout.channels[channel].free.iter().map(|entry| entry.0);
+                let changed =
+                    (0..6).filter(|&channel| of_channel(channel).any(|number| number < self.known.len() && is_of(name, number)));
+                let beside: BTreeSet<usize> = changed.flat_map(of_channel).collect();
+                numbers.filter(|number| beside.contains(number)).collect()
+            }
+        }
+    }
+
+    fn may_move(&self, number: usize, absent: &[usize]) -> bool {
+        !self.is_absent(number, absent) && (self.movable.is_empty() || self.movable.contains(&number))
+    }
+
     /// Values of the numbers common to all flights, the others 0; `values` holds those that are not `open`, and the absences.
     fn solve(&self, normal: &Normal, open: &[usize], values: &[f64], damping: f64) -> Option<Vec<f64>> {
         let target = self.size() - 1;
@@ -169,7 +201,7 @@ impl Point {
     fn step(&self, normal: &Normal, absent: &[usize], damping: f64) -> Option<Model> {
         let locals = self.locals(absent);
         let (mut values, mut open) = self.start(absent);
-        open.extend((0..self.known.len()).filter(|&at| self.is_on_bound(at) && !self.is_absent(at, absent)));
+        open.extend((0..self.known.len()).filter(|&at| self.is_on_bound(at) && self.may_move(at, absent)));
         open.sort_unstable();
         let solved = loop {
             let solved = self.solve(normal, &open, &values, damping)?;
@@ -208,7 +240,19 @@ impl Point {
     /// # Errors
     /// [`Error::Undetermined`] where the blocks do not determine the numbers of the baseline; as [`Model::predict`].
     pub fn fitted(engine: &Engine<'_>, model: Model, most: usize) -> Result<Model> {
-        let mut point = Self::at(engine, model, Vec::new())?;
+        Self::fitted_in(engine, model, Moving::All, most)
+    }
+
+    /// As [`Point::fitted`], with numbers held that are not among the moving.
+    ///
+    /// # Errors
+    /// As [`Point::fitted`].
+    pub fn fitted_in(engine: &Engine<'_>, model: Model, moving: Moving<'_>, most: usize) -> Result<Model> {
+        let near = |model: Model| {
+            let point = Self::at(engine, model, Vec::new())?;
+            Ok::<_, Error>(Self { movable: point.movable(moving), ..point })
+        };
+        let mut point = near(model)?;
         let mut damping = DAMPING;
         for step in 1..=most {
             let Some((model, cost, found)) = point.best_step(engine, damping)? else { break };
@@ -216,7 +260,7 @@ impl Point {
             if point.cost - cost < SETTLED || step == most {
                 return Ok(model);
             }
-            point = Self::at(engine, model, Vec::new())?;
+            point = near(model)?;
         }
         Ok(point.model)
     }
@@ -275,7 +319,7 @@ impl Point {
         for (number, value) in values.iter_mut().enumerate().take(self.known.len()) {
             if self.known[number].is_local || self.is_absent(number, absent) {
                 *value = 0.0;
-            } else if !self.is_on_bound(number) {
+            } else if !self.is_on_bound(number) && self.may_move(number, absent) {
                 open.push(number);
             }
         }

@@ -199,8 +199,89 @@ fn droop_and_inflow_answer_a_step_of_the_collective() -> Result<()> {
     // Less thrust (positive is down), and more and more so.
     let droop = step(effect("rotor_droop", &[-0.1])?)?;
     assert!(droop[99].abs() < 0.01 && droop[110] > 0.1 && droop[390] > 2.0 * droop[110]);
-    // The swap overshoots upwards at once by 40 % of 6.7 m/s² and dies out.
+    // It overshoots upwards at once, by less than 40 % of 6.7 m/s² as more thrust means more flow, and dies out.
     let inflow = step(effect("inflow_lag", &[])?)?;
     assert!(inflow[99].abs() < EXACT && inflow[100] < -2.0 && inflow[390].abs() < 1e-6, "{} {}", inflow[100], inflow[390]);
+    Ok(())
+}
+
+/// Momentum theory of a rotor whose blades lift, per mass: thrust = pitch - slope * (v + climb) = g / v_h² * v * hypot(speed, v + climb).
+struct Rotor {
+    hover_m_s: f64,
+    slope_per_s: f64,
+    /// Of the air that moves with the flow, over that of the aircraft.
+    apparent_mass: f64,
+}
+
+impl Rotor {
+    fn excess(&self, pitch: f64, [speed, climb]: [f64; 2], flow: f64) -> [f64; 2] {
+        let thrust = pitch - self.slope_per_s * (flow + climb);
+        let carried = GRAVITY_M_S2 / self.hover_m_s.powi(2) * flow * speed.hypot(flow + climb);
+        [thrust, thrust - carried]
+    }
+
+    /// Induced velocity at which thrust and momentum agree.
+    fn steady(&self, pitch: f64, air: [f64; 2]) -> f64 {
+        let mut bounds = [0.0, 50.0];
+        for _ in 0..80 {
+            let middle = 0.5 * (bounds[0] + bounds[1]);
+            bounds[usize::from(self.excess(pitch, air, middle)[1] < 0.0)] = middle;
+        }
+        bounds[0]
+    }
+}
+
+#[test]
+fn the_lag_of_the_inflow_is_that_of_momentum_theory_in_hover_climb_and_forward_flight() -> Result<()> {
+    let (step_s, samples, begin) = (0.0005, 1000, 40);
+    let rotor = Rotor { hover_m_s: 3.2, slope_per_s: 3.0, apparent_mass: 0.35 };
+    // In hover dT/dv of the momentum is 2 g / v_h.
+    let stiffness = 2.0 * GRAVITY_M_S2 / rotor.hover_m_s;
+    let given = [
+        ("tau_s", rotor.apparent_mass / (stiffness + rotor.slope_per_s)),
+        ("overshoot", rotor.slope_per_s / stiffness),
+        ("induced_m_s", rotor.hover_m_s),
+    ];
+    let lag = effect("inflow_lag", &[])?;
+    for (air, step, bound) in [
+        // Steps of pitch in level flight, in climbs and in a descent; then gusts.
+        ([0.0, 0.0], [0.5, 0.0], 0.02),
+        ([0.0, 0.0], [5.0, 0.0], 0.03),
+        ([4.0, 0.0], [0.5, 0.0], 0.02),
+        ([15.0, 0.0], [0.5, 0.0], 0.02),
+        ([15.0, 0.0], [5.0, 0.0], 0.02),
+        ([0.0, 1.5], [0.5, 0.0], 0.02),
+        ([10.0, 4.0], [0.5, 0.0], 0.08),
+        ([3.0, -1.0], [0.5, 0.0], 0.05),
+        ([0.0, 0.0], [0.0, 0.3], 0.02),
+        ([10.0, 0.0], [0.0, 0.3], 0.03),
+    ] {
+        let at = |k: usize| {
+            let share = f64::from(u8::from(k >= begin));
+            (GRAVITY_M_S2 + 2.0 * rotor.slope_per_s + share * step[0], [air[0], air[1] + share * step[1]])
+        };
+        let mut flow = rotor.steady(at(0).0, at(0).1);
+        let (mut truth, mut steady) = (Vec::new(), Vec::new());
+        for k in 0..samples {
+            let (pitch, air) = at(k);
+            truth.push(rotor.excess(pitch, air, flow)[0]);
+            steady.push(-rotor.excess(pitch, air, rotor.steady(pitch, air))[0]);
+            for _ in 0..4 {
+                flow += step_s / 4.0 * rotor.excess(pitch, air, flow)[1] / rotor.apparent_mass;
+            }
+        }
+        let column = |of: &dyn Fn(usize) -> f64| crate::formula::Value::from((0..samples).map(of).collect::<Vec<_>>());
+        let found = lag.swaps[0].with.evaluate(samples, step_s, &|name| match name {
+            "thrust" => Some(steady.clone().into()),
+            "air_vx" => Some(column(&|k| at(k).1[0])),
+            "air_vy" => Some(column(&|_| 0.0)),
+            "air_vz" => Some(column(&|k| -at(k).1[1])),
+            name => given.iter().find(|known| known.0 == name).map(|known| known.1.into()),
+        })?;
+        // Of the transient, its size at once: what is left of it where the formula has followed.
+        let transient = (truth[begin] + steady[begin]).abs();
+        let worst = (begin..samples).map(|k| (found[k] + truth[k]).abs()).fold(0.0, f64::max) / transient;
+        assert!(transient > 0.01 && worst < bound, "{air:?} {step:?}: {worst:.3} of {transient:.3}");
+    }
     Ok(())
 }

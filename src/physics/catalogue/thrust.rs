@@ -10,6 +10,49 @@ macro_rules! hover_flow {
     };
 }
 
+/// Square of the speed in the disc's plane, m²/s².
+macro_rules! across {
+    () => {
+        "(air_vx^2 + air_vy^2)"
+    };
+}
+
+/// h = V^2/2 + v^2 of this thrust in level flight, m²/s². Glauert's v sqrt(V^2 + v^2) = v_h^2, with v_h the induced velocity that it has
+/// in hover, gives h = sqrt(V^4/4 + v_h^4). The guard is for no thrust and no speed.
+macro_rules! level_flow {
+    () => {
+        concat!("max(hypot(0.5 * ", across!(), ", ", hover_flow!(), "), 1e-6)")
+    };
+}
+
+/// Speed of the air at the disc in level flight, m/s: sqrt(V^2 + v^2).
+macro_rules! flow_at_disc {
+    () => {
+        concat!("sqrt(", level_flow!(), " + 0.5 * ", across!(), ")")
+    };
+}
+
+/// By how much a climb takes from the flow it meets, m/s: half of the climb in hover, little at speed.
+macro_rules! relief {
+    () => {
+        concat!("0.5 * sign(thrust) * air_vz * (1 - 0.5 * ", across!(), " / ", level_flow!(), ")")
+    };
+}
+
+/// Induced velocity, m/s, up negative as the thrust. Exact in level flight and in a climb from hover; to the first order of the climb between.
+macro_rules! induced {
+    () => {
+        concat!("sign(thrust) * (hypot(", relief!(), ", ", hover_flow!(), " / ", flow_at_disc!(), ") - ", relief!(), ")")
+    };
+}
+
+/// Pitt and Peters' mass-flow parameter over that of hover: by how much thrust grows with the induced velocity.
+macro_rules! mass_flow {
+    () => {
+        concat!(level_flow!(), " / (", flow_at_disc!(), " * induced_m_s)")
+    };
+}
+
 pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
         kind: "ground_effect",
@@ -50,8 +93,6 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         parameters: &[parameter("induced_m_s", "m/s", "induced velocity in hover")
             .known_by(Origin::HoverInduced)
             .within(0.1, 30.0)],
-        // Glauert's flow in level flight, solved for the induced velocity: v_i = v_h^2 / sqrt(sqrt(V^4/4 + v_h^4) + V^2/2), with
-        // v_h the induced velocity that this thrust has in hover. The guard is for no thrust and no speed.
         terms: &[],
         swaps: &[change(
             "thrust",
@@ -60,15 +101,15 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 hover_flow!(),
                 " - ",
                 hover_flow!(),
-                " / sqrt(max(hypot(0.5 * (air_vx^2 + air_vy^2), ",
-                hover_flow!(),
-                ") + 0.5 * (air_vx^2 + air_vy^2), 1e-6))) + k_mu * thrust * (hypot(air_vx, air_vy) / induced_m_s)^2"
+                " / ",
+                flow_at_disc!(),
+                ") + k_mu * thrust * (hypot(air_vx, air_vy) / induced_m_s)^2"
             ),
         )],
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "speeds from hover to three times the induced velocity",
-            confusable_with: &["climb_inflow", "quad_drag", "ctrl_nonlin"],
+            confusable_with: &["climb_inflow", "inflow_lag", "quad_drag", "ctrl_nonlin"],
             would_tell_apart: "level flight at constant height at 0, 3, 6 and 12 m/s, and climbs at each",
             source: "Glauert: v_i = T / (2 rho A sqrt(V^2 + v_i^2)); thrust as 1/3 + mu^2/2: Gavrilets eq. 15.12, Padfield ch. 3",
             searched: true,
@@ -159,26 +200,42 @@ pub(super) const DEFINITIONS: &[Definition] = &[
     },
     Definition {
         kind: "inflow_lag",
-        meaning: "thrust follows a change of pitch or climb at once and in excess, then the induced flow builds up and takes some back",
+        meaning: "thrust follows a change of pitch or climb at once and in excess, then the induced flow builds up and takes some back, \
+                  the sooner and the less the more air passes the rotor",
         coefficients: &[],
         parameters: &[
-            parameter("tau_s", "s", "time constant of the induced flow")
+            parameter("tau_s", "s", "time constant of the induced flow in hover")
                 .starting(0.06)
                 .tried(&[0.03, 0.06, 0.12, 0.25])
                 .within(0.005, 0.6),
-            parameter("overshoot", "1", "excess at once over the steady change")
+            parameter("overshoot", "1", "excess at once over the steady change, in hover")
                 .starting(0.4)
                 .tried(&[0.15, 0.4, 1.0])
                 .within(0.0, 2.0),
+            parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
         terms: &[],
-        swaps: &[change("thrust", "thrust + overshoot * (thrust - lag(thrust, tau_s))")],
+        // Momentum: m_a v' = T - 2 rho A v |V|. Blade elements: T = T_0 - B (v + climb). About the steady flow v_s the thrust is
+        // T_s + B (v_s - v), and v follows v_s with the time constant m_a / (S + B), where S = 2 rho A * mass flow is dT/dv of the momentum. In hover
+        // S is 2 g / v_h of the mass, and overshoot = B / S; with s = S over that of hover tau is tau_s (1 + overshoot) / (s + overshoot).
+        swaps: &[change(
+            "thrust",
+            concat!(
+                "thrust + overshoot * 2 * 9.80665 / induced_m_s * (",
+                induced!(),
+                " - lag(",
+                induced!(),
+                ", tau_s * (1 + overshoot) / (",
+                mass_flow!(),
+                " + overshoot)))"
+            ),
+        )],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "quick collective inputs",
-            confusable_with: &["collective_lag", "rotor_droop", "climb_inflow", "sync"],
+            confusable_with: &["collective_lag", "rotor_droop", "climb_inflow", "transl_lift", "sync"],
             would_tell_apart: "collective steps: the flow overshoots, a servo lag never does",
-            source: "Carpenter & Fridovich, NACA TN 3044, 1953; apparent mass 8/3 rho R^3: Pitt & Peters 1981",
+            source: "Carpenter & Fridovich, NACA TN 3044, 1953; apparent mass 8/3 rho R^3 and mass-flow parameter: Pitt & Peters 1981",
             searched: true,
         }),
     },

@@ -28,7 +28,7 @@ pub fn grammar() -> String {
         let _ = writeln!(text, "  {form:<20} {meaning}");
     };
     OPERATORS.into_iter().for_each(|operator| row(&mut text, operator));
-    text.push_str("\nFunctions (the last four remember; their second argument is a number or a parameter):\n");
+    text.push_str("\nFunctions (the last four remember; the second argument of delay and slew is a number or a parameter):\n");
     functions().for_each(|function| row(&mut text, function));
     text.push('\n');
     let mut line = String::from("Names:");
