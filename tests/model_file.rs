@@ -235,14 +235,18 @@ fn numbers_found_for_another_formula_are_refused() {
         Model::from_toml(&text, Path::new("old.toml")).map_err(|error| error.to_string())
     };
     let droop = "kind = \"rotor_droop\"\ncoefficients = { k = -0.1 }";
+    let inflow = "kind = \"inflow_lag\"\nparameters = { tau_s = 0.08, overshoot = 0.3 }";
     let wind = "kind = \"weathercock\"\ncoefficients = { k_fin = 0.03 }";
     for format in ["", "format = 2", "format = 3"] {
         assert!(read(format, wind).is_ok(), "{format}");
     }
     assert!(read("format = 3", droop).is_ok() && read("format = 2", "kind = \"rotor_droop\"").is_ok());
-    for format in ["", "format = 2"] {
-        let refused = read(format, droop).err().unwrap_or_default();
-        assert!(refused.contains("numbers of `rotor_droop`") && refused.contains("phyture calibrate"), "{refused}");
+    assert!(read("format = 3", inflow).is_ok() && read("format = 2", "kind = \"inflow_lag\"").is_ok());
+    for (format, effect, name) in
+        [("", droop, "rotor_droop"), ("format = 2", droop, "rotor_droop"), ("format = 2", inflow, "inflow_lag")]
+    {
+        let refused = read(format, effect).err().unwrap_or_default();
+        assert!(refused.contains(&format!("numbers of `{name}`")) && refused.contains("phyture calibrate"), "{refused}");
     }
     assert!(read("format = 4", wind).err().is_some_and(|refused| refused.contains("1, 2 or 3")));
 }

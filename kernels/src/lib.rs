@@ -1,8 +1,8 @@
 //! Kernels of phyture: numbers in, numbers out.
 //!
 //! Slices with shapes and row strides; no tape, no model, no input or output, no dependency (`matrixmultiply` is an oracle of
-//! tests and benches). All `unsafe` of the project lives in this crate: the call of a kernel compiled for an instruction-set level
-//! ([`level`]), the registers of the innermost loops (`vector`), and their unchecked reads (`tile`). Everything else is plain Rust,
+//! tests and benches), but for `mapped`, a feature: memory that lies in a file. All `unsafe` of the project lives in this crate: the call of a kernel compiled for an instruction-set level
+//! ([`level`]), the registers of the innermost loops (`vector`), and their unchecked reads (`tile`), and that memory. Everything else is plain Rust,
 //! compiled once a level and a float type, in `compiled`.
 //!
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
@@ -29,6 +29,8 @@ pub mod level;
 pub mod linear;
 pub mod loss;
 pub mod lstm;
+#[cfg(feature = "mapped")]
+pub mod mapped;
 pub mod moving_average;
 pub mod peak;
 pub mod pool;

@@ -34,6 +34,7 @@ mod source;
 pub mod split;
 #[cfg(feature = "files")]
 pub mod stanford;
+mod store;
 #[cfg(feature = "files")]
 mod table;
 #[cfg(feature = "files")]
@@ -53,6 +54,7 @@ pub use source::Source;
 use crate::error::{Error, Result};
 use ndarray::Array2;
 use std::collections::BTreeMap;
+use store::Store;
 
 /// Standard gravity g₀, m/s² (exact by definition; 3rd CGPM 1901).
 pub const GRAVITY_M_S2: f64 = 9.806_65;
@@ -95,7 +97,7 @@ pub struct Flight {
     /// see [`Flight::gives_target_away`].
     pub tainted: BTreeMap<String, String>,
     /// `[22, samples]`, one row a [`Column`], in the order of [`Column::ALL`].
-    canonical: Array2<f64>,
+    canonical: Store,
 }
 
 impl Flight {
@@ -140,14 +142,14 @@ impl Flight {
             absent: Vec::new(),
             extra: BTreeMap::new(),
             tainted: BTreeMap::new(),
-            canonical,
+            canonical: Store::Held(canonical),
             name,
         })
     }
 
     /// Number of samples.
     pub fn len(&self) -> usize {
-        self.canonical.ncols()
+        self.canonical.samples()
     }
 
     /// Never true: a flight has at least one sample.
@@ -159,7 +161,7 @@ impl Flight {
     pub fn column(&self, column: Column) -> &[f64] {
         let samples = self.len();
         let start = column as usize * samples;
-        &self.canonical.as_slice().unwrap_or_default()[start..start + samples]
+        &self.canonical.as_slice()[start..start + samples]
     }
 
     /// A column by the name it has in the log: canonical, or one of [`Flight::extra`].
@@ -181,6 +183,18 @@ impl Flight {
     /// All canonical columns as a `[22, samples]` view, rows in the order of [`Column::ALL`].
     pub fn canonical(&self) -> ndarray::ArrayView2<'_, f64> {
         self.canonical.view()
+    }
+
+    /// Says that its columns are not needed for now: of a very long set, which is read from a temporary file, they leave the memory until the
+    /// next look. Values do not change.
+    pub fn rest(&self) {
+        self.canonical.rest();
+    }
+
+    /// The same flight with its canonical columns in a temporary file, which goes with the process; in memory where there can be none.
+    #[cfg(feature = "files")]
+    pub(crate) fn out_of_memory(self) -> Self {
+        Self { canonical: self.canonical.out_of_memory(), ..self }
     }
 
     /// Time of a sample, s.
@@ -234,7 +248,7 @@ impl Flight {
             absent: self.absent.clone(),
             extra: self.extra.iter().map(|(name, values)| (name.clone(), values[range.clone()].to_vec())).collect(),
             tainted: self.tainted.clone(),
-            canonical: self.canonical.slice_axis(ndarray::Axis(1), range.into()).as_standard_layout().into_owned(),
+            canonical: self.canonical.slice(range),
         })
     }
 }

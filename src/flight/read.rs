@@ -9,10 +9,11 @@ use super::listing::{Listing, Log, check_unique, ending, list};
 use super::schema::Schema;
 use super::source::Read;
 use super::table::{fault, read_csv};
-use super::{DataSet, Source, stanford};
+use super::{DataSet, Flight, Source, stanford};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// How to read a data set.
 #[derive(Clone, Debug, Default)]
@@ -24,6 +25,9 @@ pub struct ReadOptions {
     /// A `dataset.toml` that lies elsewhere; it is taken in place of the one in the folder.
     pub dataset: Option<PathBuf>,
 }
+
+/// Columns that a data set holds in memory, bytes; four hours of flight at 100 Hz.
+const LARGEST_HELD: usize = 256 << 20;
 
 pub(super) const DESCRIPTION: &str = "dataset.toml";
 
@@ -50,7 +54,8 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     check_unique(path, &logs)?;
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
 
-    let results = in_parallel(&logs, |log| read_log(log, &schema, cuts));
+    let held = AtomicUsize::new(0);
+    let results = in_parallel(&logs, |log| Ok(sparing(read_log(log, &schema, cuts)?, &held)));
     let mut data = DataSet { notes, ..DataSet::default() };
     let (mut read, mut quaternions) = (Vec::new(), 0);
     let mut common: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -76,8 +81,20 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let quaternion = (quaternions == logs.len()).then_some(schema.quaternion);
     data.source = Source { axes: schema.axes, quaternion, stated: schema.stated, ..Source::default() };
     data.source.record(path, read, described);
+    if held.into_inner() > LARGEST_HELD {
+        data.flights = data.flights.into_iter().map(Flight::out_of_memory).collect();
+    }
     data.flights.sort_by(|a, b| (&a.manoeuvre, a.name.len(), &a.name).cmp(&(&b.manoeuvre, b.name.len(), &b.name)));
     Ok(data)
+}
+
+/// Flights beyond what a set may hold in memory go to temporary files at once.
+fn sparing(done: Assembled, held: &AtomicUsize) -> Assembled {
+    let place = |flight: Flight| {
+        let bytes = size_of_val(flight.canonical().as_slice().unwrap_or_default());
+        if held.fetch_add(bytes, Ordering::Relaxed) + bytes <= LARGEST_HELD { flight } else { flight.out_of_memory() }
+    };
+    Assembled { flights: done.flights.into_iter().map(place).collect(), ..done }
 }
 
 #[cfg(feature = "rayon")]

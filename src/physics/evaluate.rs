@@ -137,6 +137,7 @@ impl Bound {
             machine.advance(range.len(), &column);
             visit(range.clone(), Block { machine, samples: range.len() })?;
         }
+        flight.rest();
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! What the flights contain: how far each state and control moves, for how long, and whether the columns of the baseline can be
 //! told apart. A coefficient can be no better than this.
 
+use super::of_all;
 use super::report::{Finding, Subject, Verdict};
 use crate::blocks::BLOCK_S;
 use crate::flight::{Column, Flight};
@@ -65,17 +66,17 @@ pub(super) fn movements(flights: &[Flight]) -> Vec<Excitation> {
 }
 
 fn movement(flights: &[Flight], column: Column) -> Excitation {
-    let values = || flights.iter().flat_map(|flight| flight.column(column).iter().map(|value| (*value, flight.step_s)));
+    let values = || of_all(flights, column);
     let duration_s: f64 = flights.iter().map(Flight::duration_s).sum();
     let mean = values().map(|(value, step_s)| value * step_s).sum::<f64>() / duration_s;
     let square: f64 = values().map(|(value, step_s)| (value - mean).powi(2) * step_s).sum();
     let deviation = (square / duration_s).sqrt();
     let blocks = flights.iter().flat_map(|flight| {
         let samples = (BLOCK_S / flight.step_s).round().max(1.0) as usize;
-        flight
-            .column(column)
-            .chunks(samples)
-            .map(move |block| block.iter().map(|value| (value - mean).powi(2)).sum::<f64>() * flight.step_s)
+        let square = |block: &[f64]| block.iter().map(|value| (value - mean).powi(2)).sum::<f64>() * flight.step_s;
+        let squares: Vec<f64> = flight.column(column).chunks(samples).map(square).collect();
+        flight.rest();
+        squares
     });
     let mut blocks: Vec<f64> = blocks.collect();
     blocks.sort_unstable_by(|a, b| b.total_cmp(a));
@@ -117,6 +118,7 @@ fn channel_collinearity(flights: &[Flight], channel: &str, columns: [Column; 2])
             let row = [*first, *second, 1.0];
             row.iter().enumerate().for_each(|(i, left)| row.iter().enumerate().for_each(|(j, right)| gram[(i, j)] += left * right));
         }
+        flight.rest();
     }
     let count = gram[(2, 2)];
     let scaled = DMatrix::from_fn(3, 3, |i, j| gram[(i, j)] / (gram[(i, i)] * gram[(j, j)]).sqrt());

@@ -49,6 +49,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         gains.add(index, &motion);
         forces.add(index, &motion);
         timing.add(index, &motion);
+        flight.rest();
     }
 
     let mut findings = vec![origin(&data.flights)];
@@ -124,11 +125,22 @@ fn origin(flights: &[Flight]) -> Finding {
     finding("targets", Verdict::Ok, message, None)
 }
 
+/// A column of all flights with their steps; each flight leaves the memory behind it.
+fn of_all(flights: &[Flight], column: Column) -> impl Iterator<Item = (f64, f64)> {
+    flights.iter().flat_map(move |flight| {
+        let left = std::iter::from_fn(move || {
+            flight.rest();
+            None
+        });
+        flight.column(column).iter().map(|value| (*value, flight.step_s)).chain(left)
+    })
+}
+
 /// Ranges that no aircraft of this kind leaves.
 fn plausibility(flights: &[Flight]) -> Vec<Finding> {
     let largest = |columns: &[Column]| {
-        let values = flights.iter().flat_map(|flight| columns.iter().flat_map(|column| flight.column(*column)));
-        values.fold(0.0_f64, |largest, value| largest.max(value.abs()))
+        let values = columns.iter().flat_map(|column| of_all(flights, *column));
+        values.fold(0.0_f64, |largest, (value, _)| largest.max(value.abs()))
     };
     let mut findings = Vec::new();
     let pitch = largest(&[Column::Pitch]);
@@ -140,16 +152,15 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
     }
     let controls = [Column::U1, Column::U2, Column::U3, Column::U4];
     let beyond = |column: Column| {
-        let values = || flights.iter().flat_map(move |flight| flight.column(column));
-        values().filter(|value| value.abs() > LARGEST_CONTROL).count() as f64 > RARE_SHARE * values().count() as f64
+        let samples: usize = flights.iter().map(Flight::len).sum();
+        of_all(flights, column).filter(|(value, _)| value.abs() > LARGEST_CONTROL).count() as f64 > RARE_SHARE * samples as f64
     };
     if controls.into_iter().any(beyond) {
         let message = format!(
             "controls reach {:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]",
             largest(&controls)
         );
-        let least =
-            flights.iter().flat_map(|flight| flight.column(Column::U4)).fold(f64::INFINITY, |least, value| least.min(*value));
+        let least = of_all(flights, Column::U4).fold(f64::INFINITY, |least, (value, _)| least.min(value));
         let set = match largest(&controls) {
             percent if percent <= 150.0 && percent > 15.0 => "[units] controls = \"%\"",
             pulses if pulses <= 2300.0 && least >= 700.0 => {
@@ -161,7 +172,9 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
     }
     let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
-        (below + flight.column(Column::Z).iter().filter(|z| **z > 0.0).count(), samples + flight.len())
+        let own = flight.column(Column::Z).iter().filter(|z| **z > 0.0).count();
+        flight.rest();
+        (below + own, samples + flight.len())
     });
     if 2 * below > samples {
         let message = format!(

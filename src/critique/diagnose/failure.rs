@@ -79,6 +79,7 @@ fn variance(flights: &[Flight], spans: &[Span], column: Column) -> Option<f64> {
     let count = values().count() as f64;
     let mean = values().sum::<f64>() / count;
     let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / count;
+    flights.iter().for_each(Flight::rest);
     (variance > 0.0 && variance.is_finite()).then_some(variance)
 }
 

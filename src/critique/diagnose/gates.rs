@@ -11,6 +11,8 @@ pub(super) const FEWEST_BLOCKS: usize = 30;
 pub(super) const ENOUGH_BLOCKS: usize = 60;
 /// Time over which a residual is taken to be correlated, s: only for weighing the prior of a property of each flight.
 pub(super) const CORRELATION_S: f64 = 0.5;
+/// With more blocks than this they are made longer: what is kept of a block are squares of all columns, and so many are scatter enough.
+pub(super) const MOST_BLOCKS: usize = 2000;
 /// Probability of naming any effect at all where none is missing, before the worth gate.
 pub(super) const FAMILY_WISE: f64 = 0.05;
 /// An effect has to remove this share of a channel's held-out mean squared error.

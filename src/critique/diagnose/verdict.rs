@@ -6,7 +6,9 @@ use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, permuted_folds};
 use super::failure::{Measured, failure};
-use super::gates::{BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL};
+use super::gates::{
+    BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, MOST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL,
+};
 use super::gram::blocks;
 use super::own::prediction_errors;
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
@@ -73,6 +75,9 @@ pub fn diagnose(
     let mut cut = blocks(flights, searched, block_s);
     if cut.len() < ENOUGH_BLOCKS {
         block_s = SHORTEST_BLOCK_S;
+        cut = blocks(flights, searched, block_s);
+    } else if cut.len() > MOST_BLOCKS {
+        block_s *= cut.len() as f64 / MOST_BLOCKS as f64;
         cut = blocks(flights, searched, block_s);
     }
     let fold = permuted_folds(cut.len(), options.seed);

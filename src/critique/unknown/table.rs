@@ -154,6 +154,7 @@ impl ResidualTable {
                 }
                 blocks = table.block.last().map_or(0, |last| last + 1);
             }
+            flight.rest();
         }
         if table.block.is_empty() {
             return Err(Error::Undetermined("no rows to look at: the spans are empty; give at least one flight".into()));
