@@ -390,6 +390,102 @@ fn shifted_streams_are_measured() {
 }
 
 #[test]
+fn angular_targets_that_come_late_are_told_from_the_linear_ones() {
+    let report = planted(Targets::Recorded, |columns| {
+        for column in [Column::WxDot, Column::WyDot, Column::WzDot] {
+            let values = &mut columns[column as usize];
+            values.rotate_right(5);
+            values[..5].fill(0.0);
+        }
+    });
+    let angular = finding(&report, "angular_targets_offset");
+    let near = angular.measured.is_some_and(|offset_s| (offset_s - 0.05).abs() < STEP_S);
+    assert!(near && angular.verdict == Verdict::Warning && angular.message.contains("later than the rates by"), "{report}");
+    assert_eq!(finding(&report, "targets_offset").verdict, Verdict::Ok, "{report}");
+}
+
+/// What the check makes of four flights of which some have other values in some columns.
+fn changed(flights: &[usize], change: impl Fn(&Flight, Column) -> Option<Vec<f64>>) -> CheckReport {
+    let mut data = data(4, 0, Targets::Recorded, |_| ());
+    for &flight in flights {
+        data.flights[flight] = data.flights[flight].with_columns(|column| change(&data.flights[flight], column)).unwrap();
+    }
+    let report = check(&data, None);
+    println!("{report}");
+    report
+}
+
+fn scaled(flight: &Flight, column: Column, by: f64) -> Vec<f64> {
+    flight.column(column).iter().map(|value| by * value).collect()
+}
+
+#[test]
+fn sticks_that_are_exchanged_reversed_scaled_or_missing_are_named_with_their_flights() {
+    let sticks = [Column::U1, Column::U2, Column::U3, Column::U4];
+    let exchange = |one: usize, other: usize| {
+        move |flight: &Flight, column: Column| {
+            let place = sticks.iter().position(|stick| *stick == column)?;
+            let from = if place == one {
+                other
+            } else if place == other {
+                one
+            } else {
+                place
+            };
+            Some(flight.column(sticks[from]).to_vec())
+        }
+    };
+    for (one, other) in [(0, 1), (0, 2), (2, 3)] {
+        let both = format!("u{} and u{} are exchanged", one + 1, other + 1);
+        for (flights, which) in [(&[0, 1, 2, 3][..], ":"), (&[2], " in 1 of 4 flights (2):")] {
+            let report = changed(flights, exchange(one, other));
+            assert_fault(&report, "stick_order", &format!("{both}{which}"));
+            assert!(report.summary.contains(&both), "{report}");
+        }
+    }
+    for stick in sticks {
+        let name = stick.name();
+        let of = |by: f64| move |flight: &Flight, column: Column| (column == stick).then(|| scaled(flight, column, by));
+        assert_fault(
+            &changed(&[1, 3], of(-1.0)),
+            &format!("sign_{name}"),
+            &format!("{name} acts with the other sign in 2 of 4 flights"),
+        );
+        assert_fault(&changed(&[1], of(-1.0)), &format!("sign_{name}"), "in 1 of 4 flights (1)");
+        assert_fault(&changed(&[3], of(100.0)), &format!("gain_{name}"), "0.01 times the gain of the other flights in 1 of 4 (3)");
+        assert_fault(&changed(&[0, 2], of(0.0)), &format!("still_{name}"), "stands still in 2 of 4 flights (0, 2)");
+        // A sign or a unit that all flights share is nobody's business but the calibration's.
+        for by in [-1.0, 0.3] {
+            let report = changed(&[0, 1, 2, 3], of(by));
+            assert!(!report.fault && finding(&report, "sticks").verdict == Verdict::Ok, "{name} {by}: {report}");
+        }
+    }
+}
+
+#[test]
+fn cells_that_cannot_be_are_counted_with_the_rule_that_mends_them() {
+    let filled = |value: f64| {
+        move |flight: &Flight, column: Column| {
+            let mut values = flight.column(column).to_vec();
+            values[1000..1007].fill(value);
+            (column == Column::U4).then_some(values)
+        }
+    };
+    let report = changed(&[2], filled(30.0));
+    assert_fault(
+        &report,
+        "spikes_u4",
+        "7 cells of u4, 0.070 s at most in one piece, are far outside of what it does otherwise, in 2",
+    );
+    let rule = finding(&report, "spikes_u4").set.clone().unwrap();
+    assert!(rule.starts_with("[[repair]] columns = [\"u4\"], valid = [\"value > ") && rule.contains("max_gap_s = 0.105"), "{rule}");
+    // The sticks are told as they are, and nothing else is blamed for the cells.
+    assert!(!report.findings.iter().any(|finding| finding.verdict == Verdict::Fault && finding.name != "spikes_u4"), "{report}");
+    // A full deflection is none, however short.
+    assert!(!changed(&[2], filled(1.0)).findings.iter().any(|finding| finding.name == "spikes_u4"));
+}
+
+#[test]
 fn the_delay_of_the_controls_is_measured() {
     for delay in [0, 2, 4] {
         let report = check(&data(3, delay, Targets::Recorded, |_| ()), None);

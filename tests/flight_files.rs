@@ -199,11 +199,11 @@ fn standing_on_the_ground_is_left_out_and_said() -> Outcome {
 #[test]
 fn what_is_written_in_the_stanford_layout_is_read_again() -> Outcome {
     let folder = tempfile::tempdir()?;
-    let sheet = Sheet::canonical(400);
-    write::stanford(folder.path(), &[flight("loops_1", "loops", &sheet)?, flight("chaos_1", "chaos", &sheet)?])?;
+    let [chaos, loops] = [Sheet::canonical(300), Sheet::canonical(400)];
+    write::stanford(folder.path(), &[flight("loops_1", "loops", &loops)?, flight("chaos_1", "chaos", &chaos)?])?;
     let data = data_set(folder.path(), &ReadOptions::default())?;
     assert_eq!(data.manoeuvres(), ["chaos", "loops"]);
-    for flight in &data.flights {
+    for (flight, sheet) in data.flights.iter().zip([chaos, loops]) {
         assert_same(flight, &sheet, Tolerance::Close.relative_f64());
     }
     Ok(())

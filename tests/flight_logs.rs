@@ -333,12 +333,13 @@ fn another_rate_and_jittering_stamps_are_resampled() -> Outcome {
 fn the_folder_gives_names_and_classes() -> Outcome {
     let folder = tempfile::tempdir()?;
     let (csv, root) = (Sheet::canonical(50).csv(), folder.path());
+    let other = |samples: usize| Sheet::canonical(samples).csv();
     let names = |path: &std::path::Path, options: &ReadOptions| -> phyture::Result<Vec<String>> {
         Ok(data_set(path, options)?.flights.iter().map(|flight| format!("{}: {}", flight.manoeuvre, flight.name)).collect())
     };
     put(root, "turn/b.csv", &csv)?;
-    put(root, "hover/a10.csv", &csv)?;
-    put(root, "hover/a9.csv", &csv)?;
+    put(root, "hover/a10.csv", &other(51))?;
+    put(root, "hover/a9.csv", &other(52))?;
     put(root, "hover/notes.txt", "windy")?;
     let plain = ReadOptions::default();
     assert_eq!(names(root, &plain)?, ["hover: hover/a9", "hover: hover/a10", "turn: turn/b"]);
@@ -346,7 +347,7 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     assert_eq!(names(&root.join("hover"), &plain)?, ["hover: a9", "hover: a10"]);
     assert_eq!(names(&root.join("turn/b.csv"), &plain)?, ["turn: b"]);
 
-    put(root, "turn/a9.csv", &csv)?;
+    put(root, "turn/a9.csv", &other(53))?;
     assert_eq!(names(root, &plain)?, ["hover: hover/a9", "hover: hover/a10", "turn: turn/b", "turn: turn/a9"]);
     put(root, "turn/a9.CSV", &csv)?;
     assert_says(&refusal(data_set(root, &plain)), &["two flights named `turn/a9`", "a9.CSV", "a9.csv", "rename one"]);
@@ -361,7 +362,7 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     let options = ReadOptions { dataset: Some(root.join("other.toml")), ..ReadOptions::default() };
     assert_says(&refusal(data_set(root, &options)), &["other.toml", "`exclud` is an unknown key", "did you mean `exclude`?"]);
 
-    put(root, "loose.csv", &csv)?;
+    put(root, "loose.csv", &other(54))?;
     assert_says(&refusal(data_set(root, &plain)), &["logs beside folders of logs: loose.csv"]);
     assert_says(&refusal(data_set(&root.join("hover/notes.txt"), &plain)), &["a file of the kind `.txt`", ".csv or .parquet"]);
     assert_says(&refusal(data_set(&root.join("nowhere"), &plain)), &["nowhere"]);

@@ -209,3 +209,21 @@ fn no_bit_of_a_damaged_parquet_file_gets_a_panic_past_the_reader() -> Outcome {
     assert!(refused > 1000 && accepted > 0, "{refused} refused, {accepted} accepted");
     Ok(())
 }
+
+#[test]
+fn a_copy_of_a_flight_under_another_name_is_left_out_and_said() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let data = folder.path().join("data");
+    let sheet = Sheet::canonical(60);
+    put(&data, "hover/a.csv", &sheet.csv())?;
+    put(&data, "hover/b.csv", &Sheet::canonical(60).cell("u1", 3, 0.5).csv())?;
+    put(&data, "turn/a.csv", &sheet.csv())?;
+    put(&data, "turn/c.csv", &sheet.csv())?;
+    let set = data_set(&data, &ReadOptions::default())?;
+    let names: Vec<&str> = set.flights.iter().map(|flight| flight.name.as_str()).collect();
+    assert_eq!(names, ["hover/a", "hover/b"]);
+    assert_says(&set.notes.join("\n"), &["left out, since they hold the same numbers as `hover/a`: turn/a, turn/c"]);
+    // It was read, and the hash says so.
+    assert_eq!(set.source.files.len(), 4);
+    Ok(())
+}

@@ -11,7 +11,9 @@ use super::source::Read;
 use super::table::{fault, read_csv};
 use super::{DataSet, Flight, Source, stanford};
 use crate::error::{Error, Result};
-use std::collections::BTreeMap;
+use std::collections::hash_map::{DefaultHasher, Entry};
+use std::collections::{BTreeMap, HashMap};
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -55,14 +57,27 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
 
     let held = AtomicUsize::new(0);
-    let results = in_parallel(&logs, |log| Ok(sparing(read_log(log, &schema, cuts)?, &held)));
+    let results = in_parallel(&logs, |log| {
+        let done = read_log(log, &schema, cuts)?;
+        let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
+        Ok((sparing(done, &held), prints))
+    });
     let mut data = DataSet { notes, ..DataSet::default() };
     let (mut read, mut quaternions) = (Vec::new(), 0);
     let mut common: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut own = Vec::new();
+    let (mut seen, mut copies) = (HashMap::new(), BTreeMap::<String, Vec<String>>::new());
     for (log, result) in logs.iter().zip(results) {
-        let done = result?;
-        data.flights.extend(done.flights);
+        let (done, prints): (Assembled, Vec<u64>) = result?;
+        for (flight, print) in done.flights.into_iter().zip(prints) {
+            match seen.entry(print) {
+                Entry::Vacant(entry) => {
+                    entry.insert(flight.name.clone());
+                    data.flights.push(flight);
+                }
+                Entry::Occupied(entry) => copies.entry(entry.get().clone()).or_default().push(flight.name),
+            }
+        }
         read.extend(done.files);
         quaternions += usize::from(done.quaternion);
         own.extend(done.own_notes);
@@ -73,6 +88,11 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     data.notes.extend(schema.notes.iter().cloned());
     data.notes.extend(gather(common, logs.len()));
     data.notes.extend(own);
+    data.notes.extend(
+        copies
+            .iter()
+            .map(|(first, others)| format!("left out, since they hold the same numbers as `{first}`: {}", others.join(", "))),
+    );
     if data.flights.is_empty() {
         let found = format!("{} logs of which no piece is left", logs.len());
         let expected = format!("at least one flight; what was left out: {}", data.notes.join("; "));
@@ -86,6 +106,18 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     }
     data.flights.sort_by(|a, b| (&a.manoeuvre, a.name.len(), &a.name).cmp(&(&b.manoeuvre, b.name.len(), &b.name)));
     Ok(data)
+}
+
+/// What two flights share only if all their numbers are the same.
+fn fingerprint(flight: &Flight) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    flight.step_s.to_bits().hash(&mut hasher);
+    flight.canonical().iter().for_each(|value| value.to_bits().hash(&mut hasher));
+    for (name, values) in &flight.extra {
+        name.hash(&mut hasher);
+        values.iter().for_each(|value| value.to_bits().hash(&mut hasher));
+    }
+    hasher.finish()
 }
 
 /// Flights beyond what a set may hold in memory go to temporary files at once.

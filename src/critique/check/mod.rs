@@ -5,6 +5,7 @@
 //! little (`forces`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
+mod cells;
 mod excitation;
 mod forces;
 mod gains;
@@ -12,6 +13,7 @@ mod increments;
 mod regression;
 mod relations;
 mod report;
+mod sticks;
 mod timing;
 
 pub use excitation::{Collinearity, Excitation};
@@ -43,16 +45,22 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         relations::Relation::angular_targets(),
     ];
     let (mut gains, mut forces, mut timing) = (gains::Gains::new(), forces::Forces::new(quaternion), timing::Timing::new());
+    let mut sticks = sticks::Sticks::new();
     for (index, flight) in data.flights.iter().enumerate() {
         let motion = increments::Motion::new(flight, &data.source);
         relations.iter_mut().for_each(|relation| relation.add(index, &motion));
         gains.add(index, &motion);
         forces.add(index, &motion);
         timing.add(index, &motion);
+        sticks.add(index, &motion);
         flight.rest();
     }
 
     let mut findings = vec![origin(&data.flights)];
+    findings.extend(cells::spikes(&data.flights));
+    findings.extend(sticks.findings(&data.flights));
+    // What thrust does along z is known from the collective alone.
+    let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
     for relation in &relations {
         let Some(finding) = relation.finding() else { continue };
         // Gains of a relation that is known to be read wrongly say nothing more.
@@ -63,7 +71,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         }
     }
     findings.extend(forces.lateral());
-    findings.extend(forces.coefficients());
+    findings.extend(forces.coefficients().into_iter().map(|finding| if unsure { not_judged(finding) } else { finding }));
     findings.extend(plausibility(&data.flights));
     findings.extend(timing.offsets());
     let (delay, control_delay) = timing.control_delay(model.map(|model| model.data.control_delay_s));
@@ -112,6 +120,15 @@ fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> 
     }
 }
 
+/// A coefficient along z that a wrong stick, or wrong cells of it, explain.
+fn not_judged(finding: Finding) -> Finding {
+    if finding.verdict != Verdict::Fault || !finding.name.ends_with("_z") {
+        return finding;
+    }
+    let message = "not judged, since it rests on the sticks, and something is wrong with these".into();
+    Finding { verdict: Verdict::Undetermined, message, set: None, ..finding }
+}
+
 /// Where the accelerations come from.
 fn origin(flights: &[Flight]) -> Finding {
     let derived = flights.iter().filter(|flight| flight.targets == Targets::Derived).count();
@@ -123,6 +140,17 @@ fn origin(flights: &[Flight]) -> Finding {
         ),
     };
     finding("targets", Verdict::Ok, message, None)
+}
+
+/// So many flights are named.
+const NAMED: usize = 4;
+
+/// Names, of many the first few.
+fn named(names: &[&str]) -> String {
+    match names.len().checked_sub(NAMED) {
+        None | Some(0) => names.join(", "),
+        Some(more) => format!("{} and {more} more", names[..NAMED].join(", ")),
+    }
 }
 
 /// A column of all flights with their steps; each flight leaves the memory behind it.

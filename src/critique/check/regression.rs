@@ -47,6 +47,30 @@ impl<const K: usize> BlockRegression<K> {
         }
     }
 
+    /// The blocks of several as one.
+    pub fn merged<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
+        Self { blocks: parts.flat_map(|part| part.blocks.iter().cloned()).collect(), open: None }
+    }
+
+    /// Standard deviation of a column over rows, the 1 being column `constant`, in units of that one.
+    pub fn deviation(&self, column: usize, constant: usize) -> f64 {
+        let total = |i: usize, j: usize| self.blocks.iter().map(|sums| sums.gram[i][j]).sum::<f64>();
+        let weight = total(constant, constant);
+        let mean = total(column, constant) / weight;
+        (total(column, column) / weight - mean * mean).max(0.0).sqrt()
+    }
+
+    /// Share of the squares of what is regressed that the fit explains. `None` as in [`BlockRegression::estimates`].
+    pub fn explained(&self) -> Option<f64> {
+        let square: f64 = self.blocks.iter().map(|sums| sums.square).sum();
+        Some(1.0 - self.errors()?.iter().sum::<f64>() / square)
+    }
+
+    /// Root mean square of what is regressed.
+    pub fn response(&self) -> f64 {
+        (self.blocks.iter().map(|sums| sums.square).sum::<f64>() / self.rows()).sqrt()
+    }
+
     pub fn blocks(&self) -> usize {
         self.blocks.len()
     }

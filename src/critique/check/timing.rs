@@ -106,7 +106,7 @@ fn squared(change: impl Fn(usize) -> f64, predicted: [f64; 3]) -> f64 {
     (0..3).map(|axis| (change(axis) - predicted[axis]).powi(2)).sum()
 }
 
-const PAIRS: [Pair; 3] = [
+const PAIRS: [Pair; 4] = [
     Pair {
         name: "velocity_offset",
         late: "velocity and attitude come later than position",
@@ -145,6 +145,18 @@ const PAIRS: [Pair; 3] = [
             let at = |k: usize| &motion.instants[k];
             let gained = motion.integral(piece, |k| at(shifted(k, shift)).linear_target);
             squared(|axis| at(piece.end).velocity[axis] - at(piece.start).velocity[axis], gained)
+        },
+    },
+    Pair {
+        name: "angular_targets_offset",
+        late: "the angular targets come later than the rates",
+        early: "the angular targets come earlier than the rates",
+        columns: ["wx, wy and wz", "wx_dot, wy_dot and wz_dot"],
+        applies: |motion| motion.recorded,
+        error: |motion, piece, shift| {
+            let at = |k: usize| &motion.instants[k];
+            let gained = motion.integral(piece, |k| at(shifted(k, shift)).angular_target);
+            squared(|axis| at(piece.end).rates[axis] - at(piece.start).rates[axis], gained)
         },
     },
 ];

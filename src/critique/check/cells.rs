@@ -1,0 +1,104 @@
+//! Cells that cannot be: for moments, values far outside of what their column does in all flights. Nothing is mended here; the finding prints the
+//! rule for `dataset.toml` that does.
+
+use super::report::{Finding, Subject, Verdict};
+use crate::flight::{Column, Flight};
+
+/// Values of a column that its usual range is taken from, at most.
+const LOOKED_AT: usize = 20_000;
+/// Share of them at either end that does not belong to it.
+const TAIL: f64 = 5e-3;
+/// A cell is a spike if it lies outside by so many ranges, and is reached and left in single steps of that size …
+const OUTSIDE: f64 = 2.0;
+/// … and is over within this time, s.
+const LONGEST_S: f64 = 0.25;
+/// Controls are about [-1, 1]: a stick that is seldom moved is no spike below this, beside its usual range.
+const LARGEST_CONTROL: f64 = 1.5;
+
+/// A column's spikes: how many cells, in which flights, and the usual range.
+struct Spikes {
+    cells: usize,
+    flights: Vec<usize>,
+    longest_s: f64,
+    range: [f64; 2],
+}
+
+/// A finding for each column with spikes.
+pub(super) fn spikes(flights: &[Flight]) -> Vec<Finding> {
+    let present = |column: &Column| flights.iter().all(|flight| !flight.absent.contains(column));
+    Column::ALL
+        .into_iter()
+        .filter(present)
+        .filter_map(|column| Some(finding(column, &of_column(flights, column)?, flights)))
+        .collect()
+}
+
+fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
+    let [low, high] = usual(flights, column)?;
+    let jump = OUTSIDE * (high - low);
+    let is_control = [Column::U1, Column::U2, Column::U3, Column::U4].contains(&column);
+    let size = low.abs().max(high.abs()).max(1.0);
+    let far = |value: f64| (value < low - jump || value > high + jump) && (!is_control || value.abs() > LARGEST_CONTROL * size);
+    let mut spikes = Spikes { cells: 0, flights: Vec::new(), longest_s: 0.0, range: [low - jump, high + jump] };
+    for (index, flight) in flights.iter().enumerate() {
+        let values = flight.column(column);
+        let longest = (LONGEST_S / flight.step_s).round().max(1.0) as usize;
+        let mut start = 0;
+        while let Some(first) = (start..values.len()).find(|&sample| far(values[sample])) {
+            let end = (first..values.len()).find(|&sample| !far(values[sample])).unwrap_or(values.len());
+            start = end;
+            let leaps =
+                |inside: usize, outside: Option<&f64>| outside.is_none_or(|outside| (values[inside] - outside).abs() > jump);
+            let before = first.checked_sub(1).and_then(|sample| values.get(sample));
+            if end - first <= longest && leaps(first, before) && leaps(end - 1, values.get(end)) {
+                spikes.cells += end - first;
+                spikes.longest_s = spikes.longest_s.max((end - first) as f64 * flight.step_s);
+                if spikes.flights.last() != Some(&index) {
+                    spikes.flights.push(index);
+                }
+            }
+        }
+        flight.rest();
+    }
+    (spikes.cells > 0).then_some(spikes)
+}
+
+/// The range that a column keeps to, but for a two-hundredth of its samples at either end; `None` where it does not move.
+fn usual(flights: &[Flight], column: Column) -> Option<[f64; 2]> {
+    let samples: usize = flights.iter().map(Flight::len).sum();
+    let every = samples.div_ceil(LOOKED_AT).max(1);
+    let mut values: Vec<f64> = super::of_all(flights, column).step_by(every).map(|(value, _)| value).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let tail = (TAIL * values.len() as f64).ceil() as usize;
+    let [low, high] = [*values.get(tail)?, *values.get(values.len().checked_sub(tail + 1)?)?];
+    (high > low).then_some([low, high])
+}
+
+fn finding(column: Column, spikes: &Spikes, flights: &[Flight]) -> Finding {
+    let name = column.name();
+    let [low, high] = spikes.range;
+    let where_to: Vec<&str> = spikes.flights.iter().map(|&flight| flights[flight].name.as_str()).collect();
+    let message = format!(
+        "{} {} of {name}, {:.3} s at most in one piece, {} far outside of what it does otherwise, in {}",
+        spikes.cells,
+        if spikes.cells == 1 { "cell" } else { "cells" },
+        spikes.longest_s,
+        if spikes.cells == 1 { "is" } else { "are" },
+        super::named(&where_to)
+    );
+    let rule = format!(
+        "[[repair]] columns = [\"{name}\"], valid = [\"value > {low:.4}\", \"value < {high:.4}\"], max_gap_s = {:.3}, with the file's name and in its units",
+        1.5 * spikes.longest_s
+    );
+    Finding {
+        name: format!("spikes_{name}"),
+        subject: Subject::Conventions,
+        verdict: Verdict::Fault,
+        measured: Some(spikes.cells as f64),
+        interval: None,
+        expected: Some(0.0),
+        unit: "1".into(),
+        message,
+        set: Some(rule),
+    }
+}

@@ -1,0 +1,303 @@
+//! Which stick moves which axis, with what sign and gain, flight by flight: a stick that is exchanged with another, reversed, still or scaled in some
+//! flights is told from missing physics by the flights themselves. What signs and gains should be nobody knows before a calibration; that they
+//! are the same in all flights is what is asked.
+//!
+//! Each axis is a regression of its change over a piece on its own state, all four sticks and 1, all integrated over the piece. Nothing is differentiated, and the
+//! recorded accelerations are not looked at: a stream of theirs that is late says nothing about sticks.
+
+use super::increments::Motion;
+use super::regression::{BlockRegression, Estimate};
+use super::report::{Finding, Subject, Verdict};
+use crate::flight::Flight;
+use crate::flight::attitude::cross;
+
+/// The accelerations by which sticks are told, and the stick that moves each: the conventions of this program.
+const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
+const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
+
+/// Place of the first stick among the columns, and of the 1.
+const FIRST: usize = 1;
+const CONSTANT: usize = 5;
+const COLUMNS: usize = 6;
+
+/// Length of a block, s: ten pieces, so that a flight of half a minute still has an interval.
+const BLOCK_S: f64 = 2.0;
+
+/// An axis answers to another stick if that one moves it so many times as much as its own.
+const EXCHANGED: f64 = 3.0;
+/// A stick that moves by less than this share of what it does in other flights stands still …
+const STILL: f64 = 1e-3;
+/// … and is missed where its axis moves by this share of what it does there.
+const MOVING: f64 = 0.5;
+/// An axis tells of sticks where state and sticks explain this share of its changes: in a loop that is closed fast a stick answers to what moves the
+/// axis, and its gain is no gain.
+const EXPLAINED: f64 = 0.5;
+/// Gains of one aircraft differ by less than this factor from flight to flight: square of the rotor speed, weight, density.
+const LARGEST_RATIO: f64 = 3.0;
+
+type Regressions = [BlockRegression<COLUMNS>; 4];
+
+/// Accumulates flights, each by itself.
+pub(super) struct Sticks {
+    flights: Vec<(usize, Regressions)>,
+}
+
+/// What one flight, or all of them, say of the sticks.
+struct Answers {
+    /// `[axis][stick]`: change of the acceleration by a unit of the stick.
+    gains: [[Estimate; 4]; 4],
+    /// By stick, how far it moves.
+    moves: [f64; 4],
+    /// By axis, the share of its changes that is explained.
+    explained: [f64; 4],
+}
+
+fn empty() -> Regressions {
+    std::array::from_fn(|_| BlockRegression::new())
+}
+
+impl Answers {
+    fn of(regressions: &Regressions) -> [Option<[Estimate; 4]>; 4] {
+        std::array::from_fn(|axis| {
+            let estimates = regressions[axis].estimates()?;
+            Some(std::array::from_fn(|stick| estimates[FIRST + stick]))
+        })
+    }
+
+    /// `None` where an axis is not determined.
+    fn new(regressions: &Regressions) -> Option<Self> {
+        let [x, y, z, heave] = Self::of(regressions);
+        let moves = std::array::from_fn(|stick| regressions[0].deviation(FIRST + stick, CONSTANT));
+        let explained = std::array::from_fn(|axis| regressions[axis].explained().unwrap_or(0.0));
+        Some(Self { gains: [x?, y?, z?, heave?], moves, explained })
+    }
+
+    /// How far a stick moves an axis.
+    fn strength(&self, axis: usize, stick: usize) -> f64 {
+        self.gains[axis][stick].value.abs() * self.moves[stick]
+    }
+
+    fn is_certain(&self, axis: usize, stick: usize) -> bool {
+        let [low, high] = self.gains[axis][stick].interval;
+        self.explained[axis] > EXPLAINED && (low > 0.0 || high < 0.0)
+    }
+
+    /// Whether an axis answers to its own stick more than to any other.
+    fn is_own(&self, axis: usize) -> bool {
+        self.is_certain(axis, axis) && (0..4).all(|stick| self.strength(axis, stick) <= self.strength(axis, axis))
+    }
+
+    /// The stick to which each axis answers, if they are a permutation other than that of the conventions.
+    fn order(&self) -> Option<[usize; 4]> {
+        let order: [usize; 4] = std::array::from_fn(|axis| {
+            let strongest = (0..4).max_by(|left, right| self.strength(axis, *left).total_cmp(&self.strength(axis, *right)));
+            let other = strongest.filter(|&stick| {
+                self.is_certain(axis, stick) && self.strength(axis, stick) > EXCHANGED * self.strength(axis, axis)
+            });
+            other.unwrap_or(axis)
+        });
+        let mut seen = order;
+        seen.sort_unstable();
+        (seen == [0, 1, 2, 3] && order != seen).then_some(order)
+    }
+}
+
+impl Sticks {
+    pub fn new() -> Self {
+        Self { flights: Vec::new() }
+    }
+
+    /// Adds a flight.
+    pub fn add(&mut self, flight: usize, motion: &Motion) {
+        let samples = (BLOCK_S / motion.step_s).round().max(1.0) as usize;
+        let mut regressions = empty();
+        for (piece, _) in motion.pieces(0) {
+            let block = (flight, piece.start / samples);
+            let at = |sample: usize| &motion.instants[sample];
+            let integrals: [f64; 9] = motion.integral(&piece, |sample| {
+                let now = at(sample);
+                let [p, q, r] = now.rates;
+                let [one, two, three, four] = now.controls;
+                // What moves the heave beside the rotor.
+                let known = now.gravity[2] - cross(now.rates, now.velocity)[2];
+                [p, q, r, now.velocity[2], one, two, three, four, known]
+            });
+            let [rates, others] = [&integrals[..4], &integrals[4..]];
+            let length_s = super::increments::length_s(motion, &piece);
+            let change = |of: &dyn Fn(usize) -> f64| of(piece.end) - of(piece.start);
+            let changes = [
+                change(&|sample| at(sample).rates[0]),
+                change(&|sample| at(sample).rates[1]),
+                change(&|sample| at(sample).rates[2]),
+                change(&|sample| at(sample).velocity[2]) - others[4],
+            ];
+            for (axis, regression) in regressions.iter_mut().enumerate() {
+                let row = [rates[axis], others[0], others[1], others[2], others[3], length_s];
+                regression.add(block, &row, changes[axis]);
+            }
+        }
+        self.flights.push((flight, regressions));
+    }
+
+    /// What is wrong with sticks, worst first; one finding that nothing is, or that these flights do not tell.
+    pub fn findings(&self, flights: &[Flight]) -> Vec<Finding> {
+        let all: Regressions =
+            std::array::from_fn(|axis| BlockRegression::merged(self.flights.iter().map(|(_, regressions)| &regressions[axis])));
+        let names =
+            |indices: &[usize]| super::named(&indices.iter().map(|&index| flights[index].name.as_str()).collect::<Vec<_>>());
+        let each: Vec<(usize, Option<Answers>)> =
+            self.flights.iter().map(|(flight, regressions)| (*flight, Answers::new(regressions))).collect();
+        let known: Vec<(usize, &Answers)> =
+            each.iter().filter_map(|(flight, answers)| Some((*flight, answers.as_ref()?))).collect();
+        let mut findings = Vec::new();
+        let exchanged: Vec<(usize, [usize; 4])> =
+            known.iter().filter_map(|(flight, answers)| Some((*flight, answers.order()?))).collect();
+        let whole = Answers::new(&all);
+        match whole.as_ref().and_then(Answers::order) {
+            Some(order) => findings.push(of_order(&order, None)),
+            // An order that most flights have shows in all together.
+            None => {
+                let mut orders: Vec<[usize; 4]> = exchanged.iter().map(|entry| entry.1).collect();
+                orders.sort_unstable();
+                orders.dedup();
+                for order in orders {
+                    let such: Vec<usize> = exchanged.iter().filter(|entry| entry.1 == order).map(|entry| entry.0).collect();
+                    let which = format!("in {} of {} flights ({})", such.len(), flights.len(), names(&such));
+                    findings.push(of_order(&order, Some(&which)));
+                }
+            }
+        }
+        if findings.is_empty() {
+            findings.extend((0..4).filter_map(|stick| of_sign(stick, &known, flights.len(), &names)));
+            findings.extend((0..4).filter_map(|stick| of_size(stick, &known, flights.len(), &names)));
+            findings.extend((0..4).filter_map(|stick| self.of_rest(stick, flights.len(), &names)));
+        }
+        if findings.is_empty() {
+            let open: Vec<&str> =
+                (0..4).filter(|&axis| !whole.as_ref().is_some_and(|all| all.is_own(axis))).map(|axis| AXES[axis]).collect();
+            let (verdict, message) = match open.as_slice() {
+                [] => (Verdict::Ok, "each axis answers to its own stick, alike in all flights".into()),
+                open => (Verdict::Undetermined, format!("these flights do not tell which stick moves {}", joined(open))),
+            };
+            findings.push(finding("sticks", verdict, message, None));
+        }
+        findings
+    }
+
+    /// A stick that stands still in some flights while its axis moves as in the others.
+    fn of_rest(&self, stick: usize, count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
+        let moves: Vec<[f64; 2]> = self
+            .flights
+            .iter()
+            .map(|(_, regressions)| [regressions[stick].deviation(FIRST + stick, CONSTANT), regressions[stick].response()])
+            .collect();
+        let usual = |place: usize| {
+            let active = moves.iter().filter(|entry| entry[0] > 0.0).map(|entry| entry[place]);
+            median(active.collect())
+        };
+        let [stick_moves, axis_moves] = [usual(0)?, usual(1)?];
+        let still = |entry: &[f64; 2]| entry[0] < STILL * stick_moves && entry[1] > MOVING * axis_moves;
+        let such: Vec<usize> =
+            self.flights.iter().zip(&moves).filter(|(_, entry)| still(entry)).map(|((flight, _), _)| *flight).collect();
+        (!such.is_empty()).then(|| {
+            let (name, axis) = (STICKS[stick], AXES[stick]);
+            let message = format!(
+                "{name} stands still in {} of {count} flights ({}), while {axis} moves as in the others: it was not recorded there",
+                such.len(),
+                names(&such)
+            );
+            finding(&format!("still_{name}"), Verdict::Fault, message, Some("leave these flights out".into()))
+        })
+    }
+}
+
+/// A stick that acts with one sign in some flights and with the other in the rest.
+fn of_sign(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
+    let certain: Vec<(usize, f64)> = known
+        .iter()
+        .filter(|(_, answers)| answers.is_certain(stick, stick))
+        .map(|(flight, answers)| (*flight, answers.gains[stick][stick].value))
+        .collect();
+    let size = median(certain.iter().map(|entry| entry.1.abs()).collect())?;
+    // A gain near nothing has no sign.
+    let clear = |positive: bool| -> Vec<usize> {
+        let large = certain.iter().filter(|entry| entry.1.abs() * LARGEST_RATIO > size);
+        large.filter(|entry| (entry.1 > 0.0) == positive).map(|entry| entry.0).collect()
+    };
+    let [with, against] = [clear(true), clear(false)];
+    let fewer = if with.len() < against.len() { with } else { against };
+    (!fewer.is_empty()).then(|| {
+        let name = STICKS[stick];
+        let message = format!("{name} acts with the other sign in {} of {count} flights ({})", fewer.len(), names(&fewer));
+        let set = format!("[columns] {name} = \"-{name}\" for these flights, with the file's name, or leave them out");
+        finding(&format!("sign_{name}"), Verdict::Fault, message, Some(set))
+    })
+}
+
+/// A stick whose gain in some flights is a multiple of that in the others.
+fn of_size(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
+    let certain: Vec<(usize, Estimate)> = known
+        .iter()
+        .filter(|(_, answers)| answers.is_certain(stick, stick))
+        .map(|(flight, answers)| (*flight, answers.gains[stick][stick]))
+        .collect();
+    let size = median(certain.iter().map(|entry| entry.1.value.abs()).collect())?;
+    let beyond = |estimate: &Estimate| {
+        let [low, high] = estimate.interval.map(f64::abs);
+        low.min(high) > LARGEST_RATIO * size || low.max(high) * LARGEST_RATIO < size
+    };
+    let such: Vec<(usize, f64)> =
+        certain.iter().filter(|entry| beyond(&entry.1)).map(|entry| (entry.0, entry.1.value.abs() / size)).collect();
+    let ratio = median(such.iter().map(|entry| entry.1).collect())?;
+    let flights: Vec<usize> = such.iter().map(|entry| entry.0).collect();
+    let name = STICKS[stick];
+    let message = format!(
+        "{name} has {ratio:.2} times the gain of the other flights in {} of {count} ({}): in other units there, or scaled",
+        flights.len(),
+        names(&flights)
+    );
+    let set = format!("[columns] {name} = \"{ratio:.2} * {name}\" for these flights, with the file's name, or leave them out");
+    Some(finding(&format!("gain_{name}"), Verdict::Fault, message, Some(set)))
+}
+
+/// Sticks that stand in each other's columns.
+fn of_order(order: &[usize; 4], which: Option<&str>) -> Finding {
+    let moved: Vec<usize> = (0..4).filter(|&axis| order[axis] != axis).collect();
+    let answers: Vec<String> = moved.iter().map(|&axis| format!("{} answers to {}", AXES[axis], STICKS[order[axis]])).collect();
+    let set: Vec<String> = moved.iter().map(|&axis| format!("{} = \"{}\"", STICKS[axis], STICKS[order[axis]])).collect();
+    let sticks: Vec<&str> = moved.iter().map(|&axis| STICKS[axis]).collect();
+    let message = format!(
+        "{} are exchanged{}: {}",
+        joined(&sticks),
+        which.map_or_else(String::new, |which| format!(" {which}")),
+        answers.join(", ")
+    );
+    let for_these = if which.is_some() { " for these flights" } else { "" };
+    finding("stick_order", Verdict::Fault, message, Some(format!("[columns] {}{for_these}, with the file's names", set.join(", "))))
+}
+
+fn joined(names: &[&str]) -> String {
+    match names {
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        names => names.join(", "),
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+fn finding(name: &str, verdict: Verdict, message: String, set: Option<String>) -> Finding {
+    Finding {
+        name: name.into(),
+        subject: Subject::Conventions,
+        verdict,
+        measured: None,
+        interval: None,
+        expected: None,
+        unit: "1".into(),
+        message,
+        set,
+    }
+}
