@@ -2,7 +2,7 @@
 //!
 //! A wrong sign or frame looks like a missing effect, and a large one; so this comes first and blocks what follows. Kinematic
 //! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
-//! little (`forces`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
+//! little (`forces`); which stick moves which axis is asked of each flight (`sticks`), and cells that cannot be are counted (`cells`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
 mod cells;

@@ -5,9 +5,10 @@
 //! Each axis is a regression of its change over a piece on its own state, all four sticks and 1, all integrated over the piece. Nothing is differentiated, and the
 //! recorded accelerations are not looked at: a stream of theirs that is late says nothing about sticks.
 
+use super::finding;
 use super::increments::Motion;
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Subject, Verdict};
+use super::report::{Finding, Verdict};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
 
@@ -206,7 +207,7 @@ impl Sticks {
                 such.len(),
                 names(&such)
             );
-            finding(&format!("still_{name}"), Verdict::Fault, message, Some("leave these flights out".into()))
+            finding(&format!("still_{name}"), Verdict::Fault, message, Some("leave these flights out"))
         })
     }
 }
@@ -230,7 +231,7 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn 
         let name = STICKS[stick];
         let message = format!("{name} acts with the other sign in {} of {count} flights ({})", fewer.len(), names(&fewer));
         let set = format!("[columns] {name} = \"-{name}\" for these flights, with the file's name, or leave them out");
-        finding(&format!("sign_{name}"), Verdict::Fault, message, Some(set))
+        finding(&format!("sign_{name}"), Verdict::Fault, message, Some(&set))
     })
 }
 
@@ -257,7 +258,7 @@ fn of_size(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn 
         names(&flights)
     );
     let set = format!("[columns] {name} = \"{ratio:.2} * {name}\" for these flights, with the file's name, or leave them out");
-    Some(finding(&format!("gain_{name}"), Verdict::Fault, message, Some(set)))
+    Some(finding(&format!("gain_{name}"), Verdict::Fault, message, Some(&set)))
 }
 
 /// Sticks that stand in each other's columns.
@@ -273,7 +274,12 @@ fn of_order(order: &[usize; 4], which: Option<&str>) -> Finding {
         answers.join(", ")
     );
     let for_these = if which.is_some() { " for these flights" } else { "" };
-    finding("stick_order", Verdict::Fault, message, Some(format!("[columns] {}{for_these}, with the file's names", set.join(", "))))
+    finding(
+        "stick_order",
+        Verdict::Fault,
+        message,
+        Some(&format!("[columns] {}{for_these}, with the file's names", set.join(", "))),
+    )
 }
 
 fn joined(names: &[&str]) -> String {
@@ -286,18 +292,4 @@ fn joined(names: &[&str]) -> String {
 fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
-}
-
-fn finding(name: &str, verdict: Verdict, message: String, set: Option<String>) -> Finding {
-    Finding {
-        name: name.into(),
-        subject: Subject::Conventions,
-        verdict,
-        measured: None,
-        interval: None,
-        expected: None,
-        unit: "1".into(),
-        message,
-        set,
-    }
 }
