@@ -36,8 +36,8 @@ pub(super) struct Point {
     /// Effects that may be left out, by their index in the model.
     pub optional: Vec<usize>,
     layout: Layout,
-    /// What may move beside the numbers of each flight; all where it is empty.
-    movable: Vec<usize>,
+    /// What may move beside the numbers of each flight; all, where nothing is said.
+    movable: Option<Vec<usize>>,
     known: Vec<Known>,
     /// By channel, the squares of `[J | A | y - rest]` of each block; columns are numbered as in `layout.free`, then `optional`.
     reduced: Vec<Reduced>,
@@ -92,7 +92,7 @@ impl Point {
         let names = engine.flights.iter().map(|flight| flight.name.clone()).collect();
         let correlation = engine.correlation;
         let (mse, cost) = ([0.0; 6], 0.0);
-        let mut point = Self { model, optional, layout, movable: Vec::new(), known, reduced, names, correlation, mse, cost };
+        let mut point = Self { model, optional, layout, movable: None, known, reduced, names, correlation, mse, cost };
         point.weigh(engine);
         Ok(point)
     }
@@ -145,24 +145,24 @@ impl Point {
         absent.iter().any(|&place| self.optional[place] == self.layout.free[number].effect)
     }
 
-    fn movable(&self, moving: Moving<'_>) -> Vec<usize> {
+    fn movable(&self, moving: Moving<'_>) -> Option<Vec<usize>> {
         let is_of = |name: &str, number: usize| self.model.effects[self.layout.free[number].effect].name == name;
         let numbers = 0..self.known.len();
         match moving {
-            Moving::All => Vec::new(),
-            Moving::Own(name) => numbers.filter(|&number| is_of(name, number)).collect(),
+            Moving::All => None,
+            Moving::Own(name) => Some(numbers.filter(|&number| is_of(name, number)).collect()),
             Moving::Beside(name) => {
                 let of_channel = |channel: usize| self.layout.channels[channel].free.iter().map(|entry| entry.0);
                 let changed =
                     (0..6).filter(|&channel| of_channel(channel).any(|number| number < self.known.len() && is_of(name, number)));
                 let beside: BTreeSet<usize> = changed.flat_map(of_channel).collect();
-                numbers.filter(|number| beside.contains(number)).collect()
+                Some(numbers.filter(|number| beside.contains(number)).collect())
             }
         }
     }
 
     fn may_move(&self, number: usize, absent: &[usize]) -> bool {
-        !self.is_absent(number, absent) && (self.movable.is_empty() || self.movable.contains(&number))
+        !self.is_absent(number, absent) && self.movable.as_ref().is_none_or(|movable| movable.contains(&number))
     }
 
     /// Values of the numbers common to all flights, the others 0; `values` holds those that are not `open`, and the absences.
