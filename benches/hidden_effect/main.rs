@@ -2,7 +2,7 @@
 //!
 //!     cargo bench --bench hidden_effect                                  a few cases of each kind, some two minutes
 //!     cargo bench --bench hidden_effect -- run OUT.jsonl [PART…]         everything, resumable; PART is singles, pairs, nulls, aliens,
-//!                                                                        confusables or textbook
+//!                                                                        confusables or textbook; names of effects choose among singles
 //!     cargo bench --bench hidden_effect -- development OUT.jsonl [PART…] the same on development seeds
 //!     cargo bench --bench hidden_effect -- table OUT.jsonl               the tables
 //!     cargo bench --bench hidden_effect -- implants DATA FIXTURES        known effects in recorded flights, described by the files in FIXTURES

@@ -14,7 +14,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// First seed of the runs that are reported.
-pub const REPORTED: u64 = 60_000;
+pub const REPORTED: u64 = 70_000;
 /// First seed of development.
 pub const DEVELOPMENT: u64 = 40;
 /// Data sets without a hidden effect.
@@ -256,6 +256,8 @@ fn wanted(id: &str, share: f64) -> (&str, f64) {
 pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
     let done = read(out)?.iter().map(Line::key).collect();
     let mut bench = Bench { out, done, floors: BTreeMap::new(), minutes: 30.0 };
+    // Names of effects beside the parts choose among the single ones.
+    let (effects, parts): (Vec<&str>, Vec<&str>) = parts.iter().partition(|part| single(part).is_some());
     let asked = |part: &str| parts.is_empty() || parts.contains(&part);
     let level = |seed: u64| if seed.is_multiple_of(2) { 1 } else { 2 };
     if asked("nulls") {
@@ -264,7 +266,7 @@ pub fn all(out: &Path, parts: &[&str], first: u64) -> Result<()> {
         }
     }
     for seed in first..first + 3 {
-        for single in SINGLES.iter().filter(|_| asked("singles")) {
+        for single in SINGLES.iter().filter(|single| asked("singles") && (effects.is_empty() || effects.contains(&single.id))) {
             for (size, share) in SIZES {
                 let hidden = Hidden { mechanisms: vec![(single.id, single.scale(share))], alien: None };
                 bench.case("single", size, &hidden, level(seed), seed, Some(single))?;

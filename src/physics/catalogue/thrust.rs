@@ -210,7 +210,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .within(0.005, 0.6),
             parameter("overshoot", "1", "excess at once over the steady change, in hover")
                 .starting(0.4)
-                .tried(&[0.15, 0.4, 1.0])
+                .tried(&[0.02, 0.05, 0.12, 0.3, 0.8])
                 .within(0.0, 2.0),
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
