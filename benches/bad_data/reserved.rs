@@ -107,7 +107,14 @@ pub const RESERVED: &[Corruption] = &[
         says: "the gyros show 5 % too much",
         parts: HALF_OR_ONE,
         change: Change::Columns(|log, _| log.scale(&RATES, 1.05)),
-        right: &[&["rates", "1.05"], &["rates", "0.95"], &["rates", "scale"], &["rates", "gain"], &["wx", "scale"], &["wx", "gain"]],
+        right: &[
+            &["rates", "1.05"],
+            &["rates", "0.95"],
+            &["rates", "scale"],
+            &["rates", "gain"],
+            &["wx", "scale"],
+            &["wx", "gain"],
+        ],
     },
     Corruption {
         id: "yaw_degrees",
@@ -124,7 +131,7 @@ pub const RESERVED: &[Corruption] = &[
         says: "the linear accelerations come 50 ms late",
         parts: ALL_OR_HALF,
         change: Change::Columns(|log, _| log.late(&LINEAR, 0.05)),
-        right: &[&["targets", "late", "!angular"], &["vx_dot", "late"]],
+        right: &[&["targets", " late", "!angular"], &["vx_dot", " late"]],
     },
     Corruption {
         id: "velocity_late",
@@ -132,7 +139,7 @@ pub const RESERVED: &[Corruption] = &[
         says: "the velocity comes 80 ms late",
         parts: ALL_OR_HALF,
         change: Change::Columns(|log, _| log.late(&VELOCITY, 0.08)),
-        right: &[&["velocity", "late"], &["targets come earlier than the velocity", "!angular"]],
+        right: &[&["velocity", " late"], &["targets come earlier than the velocity", "!angular"]],
     },
     Corruption {
         id: "rates_early",
@@ -156,7 +163,14 @@ pub const RESERVED: &[Corruption] = &[
         says: "the controls are a stream of 10 Hz, each value repeated to 100 Hz",
         parts: ALL_OR_HALF,
         change: Change::Columns(|log, _| log.held(&CONTROLS, 0.1)),
-        right: &[&["u1", "hz"], &["controls", "hz"], &["u1", "held"], &["controls", "held"], &["u1", "repeat"], &["controls", "repeat"]],
+        right: &[
+            &["u1", "hz"],
+            &["controls", "hz"],
+            &["u1", "held"],
+            &["controls", "held"],
+            &["u1", "repeat"],
+            &["controls", "repeat"],
+        ],
     },
     Corruption {
         id: "time_reversed",
@@ -238,7 +252,7 @@ pub const RESERVED: &[Corruption] = &[
             let order: Vec<usize> = (0..2 * samples / 5).chain(3 * samples / 5..samples).collect();
             log.rows(&order);
         }),
-        right: &[&["step in all"], &["piece", "missing"], &["rows", "missing"], &["jump"], &["joined"], &["gap"]],
+        right: &[&["step in all"], &["piece", "missing"], &["rows", "missing"], &["jump"], &["joined"], &["a gap"]],
     },
     Corruption {
         id: "copies_rounded",
@@ -266,7 +280,13 @@ pub const RESERVED: &[Corruption] = &[
             log.lag(&LINEAR, 0.1);
             log.lag(&ANGULAR, 0.1);
         }),
-        right: &[&["targets", "filter"], &["accelerations", "filter"], &["targets", "late"], &["vx_dot", "filter"], &["wx_dot", "filter"]],
+        right: &[
+            &["targets", "filter"],
+            &["accelerations", "filter"],
+            &["targets", " late"],
+            &["vx_dot", "filter"],
+            &["wx_dot", "filter"],
+        ],
     },
     Corruption {
         id: "velocity_noisy",

@@ -1,0 +1,172 @@
+//! From lines of cases to the tables that are reported.
+
+use crate::run::{CLEAN_HALF, CONVENTION_FAULT, Line, NULL, UNCORRUPTED, read};
+use phyture::Result;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// An error that is larger or smaller by this factor, where no effect says so, is another verdict.
+const OTHER_ERROR: f64 = 1.5;
+
+/// What a case came to, beside the same flights with nothing wrong.
+struct Judged<'a> {
+    line: &'a Line,
+    clean: &'a Line,
+}
+
+impl Judged<'_> {
+    fn is_fault(&self) -> bool {
+        self.line.verdict == CONVENTION_FAULT
+    }
+
+    /// Whether the corruption has an effect: a fault, other words, other effects, or another error.
+    fn changes(&self) -> bool {
+        let sorted = |line: &Line| {
+            let mut names = line.accepted.clone();
+            names.sort_unstable();
+            names
+        };
+        let other_error = self.line.rmse.iter().zip(&self.clean.rmse).any(|pair| match pair {
+            (Some(with), Some(without)) => (with / without).ln().abs() > OTHER_ERROR.ln(),
+            _ => false,
+        });
+        self.line.verdict != self.clean.verdict || sorted(self.line) != sorted(self.clean) || other_error
+    }
+
+    /// Effects that are neither hidden nor named without the corruption.
+    fn is_false(&self) -> bool {
+        self.line.accepted.iter().any(|name| *name != self.line.hidden && !self.clean.accepted.contains(name))
+    }
+
+    fn hides(&self) -> bool {
+        self.line.hidden != NULL && self.clean.accepted.contains(&self.line.hidden)
+    }
+
+    /// Whether the hidden effect is named, at once or once the fault is mended.
+    fn finds(&self) -> bool {
+        let mended = self.line.mended.iter().flat_map(|mended| &mended.accepted);
+        self.line.accepted.iter().chain(mended).any(|name| *name == self.line.hidden)
+    }
+}
+
+/// Prints the tables of a file of cases.
+pub fn print(path: &Path) -> Result<()> {
+    let lines = read(path)?;
+    let clean: BTreeMap<(u64, &str), &Line> =
+        lines.iter().filter(|line| line.half == UNCORRUPTED).map(|line| ((line.seed, line.hidden.as_str()), line)).collect();
+    let of = |half: &str| -> Vec<Judged<'_>> {
+        let cases = lines.iter().filter(|line| line.half == half);
+        cases.filter_map(|line| Some(Judged { line, clean: clean.get(&(line.seed, line.hidden.as_str()))? })).collect()
+    };
+    for half in ["development", "reserved"] {
+        let cases = of(half);
+        if !cases.is_empty() {
+            println!("\n{half} half: {} cases\n", cases.len());
+            by_corruption(&cases);
+            totals(&cases);
+        }
+    }
+    uncorrupted(&lines);
+    Ok(())
+}
+
+fn by_corruption<'a>(cases: &[Judged<'a>]) {
+    println!(
+        "| corruption | flights | runs | right cause | as fault | its flights | verdict changed | changed, no fault | false effect | effect found | mended |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let mut order: Vec<(&str, &str)> = Vec::new();
+    for case in cases {
+        let key = (case.line.corruption.as_str(), case.line.part.as_str());
+        if !order.contains(&key) {
+            order.push(key);
+        }
+    }
+    for (corruption, part) in order {
+        let own: Vec<&Judged<'a>> =
+            cases.iter().filter(|case| case.line.corruption == corruption && case.line.part == part).collect();
+        let count = |wanted: &dyn Fn(&Judged<'a>) -> bool| own.iter().filter(|case| wanted(case)).count();
+        println!(
+            "| {corruption} | {part} | {} | {} | {} | {} | {} | {} | {} | {}/{} | {}/{} |",
+            own.len(),
+            count(&|case| !case.line.right.is_empty()),
+            count(&|case| case.line.right == "fault"),
+            count(&|case| case.line.flights_named),
+            count(&Judged::changes),
+            count(&|case| case.changes() && !case.is_fault()),
+            count(&Judged::is_false),
+            count(&|case| case.hides() && case.finds()),
+            count(&Judged::hides),
+            count(&|case| case.line.mended.as_ref().is_some_and(|mended| mended.is_free)),
+            count(&Judged::is_fault),
+        );
+    }
+}
+
+fn totals<'a>(cases: &[Judged<'a>]) {
+    let count = |of: &dyn Fn(&Judged<'a>) -> bool, wanted: &dyn Fn(&Judged<'a>) -> bool| {
+        let own: Vec<&Judged<'a>> = cases.iter().filter(|case| of(case)).collect();
+        (own.iter().filter(|case| wanted(case)).count(), own.len())
+    };
+    println!("\n| metric | target | measured | 95 % |\n| --- | --- | --- | --- |");
+    let named = |case: &Judged<'a>| !case.line.right.is_empty();
+    let all = |_: &Judged<'a>| true;
+    let is_hit = |part: &'static str| move |case: &Judged<'a>| case.line.part == part && case.changes();
+    row("right cause named where the verdict changes", "≥ 90 %", count(&Judged::changes, &named));
+    for part in ["all", "half", "one"] {
+        row(&format!("same, flights hit: {part}"), "-", count(&is_hit(part), &named));
+    }
+    row("same, of faults", "-", count(&Judged::is_fault, &named));
+    row("verdict changed, no fault", "-", count(&all, &|case| case.changes() && !case.is_fault()));
+    row("no false effect", "≥ 98 %", count(&all, &|case| !case.is_false()));
+    row("hidden effect found, mended where that can be", "≥ 90 %", count(&Judged::hides, &Judged::finds));
+    let can_be = |case: &Judged<'a>| case.line.mended.is_some();
+    row("faults that can be mended as printed", "-", count(&Judged::is_fault, &can_be));
+    row(
+        "of these without a fault then",
+        "-",
+        count(&can_be, &|case| case.line.mended.as_ref().is_some_and(|mended| mended.is_free)),
+    );
+    row("of these the hidden effect found", "-", count(&|case| can_be(case) && case.hides(), &Judged::finds));
+}
+
+fn row(metric: &str, target: &str, (hits, of): (usize, usize)) {
+    let [low, high] = wilson(hits, of).map(|share| 100.0 * share);
+    let share = if of == 0 { String::new() } else { format!(" ({:.1} %)", 100.0 * hits as f64 / of as f64) };
+    println!("| {metric} | {target} | {hits}/{of}{share} | {low:.1} to {high:.1} % |");
+}
+
+/// 95 % interval of a share (Wilson 1927).
+fn wilson(hits: usize, of: usize) -> [f64; 2] {
+    let (count, z2) = (of as f64, 1.96_f64.powi(2));
+    if of == 0 {
+        return [0.0, 1.0];
+    }
+    let share = hits as f64 / count;
+    let middle = (share + z2 / (2.0 * count)) / (1.0 + z2 / count);
+    let half = (z2 * (share * (1.0 - share) / count + z2 / (4.0 * count * count))).sqrt() / (1.0 + z2 / count);
+    [middle - half, middle + half]
+}
+
+/// Faults claimed where nothing is wrong.
+fn uncorrupted(lines: &[Line]) {
+    let of = |half: &str| lines.iter().filter(|line| line.half == half).collect::<Vec<_>>();
+    println!("\n| nothing wrong | target | measured | 95 % |\n| --- | --- | --- | --- |");
+    for (half, metric) in
+        [(CLEAN_HALF, "no fault claimed, clean sets"), (UNCORRUPTED, "no fault claimed, flights before corruption")]
+    {
+        let own = of(half);
+        row(metric, "≥ 98 %", (own.iter().filter(|line| line.faults.is_empty()).count(), own.len()));
+    }
+    let before = of(UNCORRUPTED);
+    let hidden: Vec<_> = before.iter().filter(|line| line.hidden != NULL).collect();
+    row(
+        "hidden effect found before corruption",
+        "-",
+        (hidden.iter().filter(|line| line.accepted.contains(&line.hidden)).count(), hidden.len()),
+    );
+    for line in of(CLEAN_HALF).into_iter().filter(|line| !line.faults.is_empty()) {
+        let names: Vec<&str> = line.faults.iter().map(|said| said.name.as_str()).collect();
+        println!("\nfault claimed on a clean set: {} (seed {}): {}", line.corruption, line.seed, names.join(", "));
+    }
+}
