@@ -79,6 +79,8 @@ pub struct Mended {
     /// What `diagnose` then says.
     pub verdict: String,
     pub accepted: Vec<String>,
+    /// As of [`Line::rmse`].
+    pub rmse: Vec<Option<f64>>,
 }
 
 /// One case.
@@ -245,7 +247,7 @@ fn mended(line: &Line, report: &CheckReport, set: &DataSet) -> Option<Mended> {
         Err(error) => after.verdict = format!("error: {error}"),
     }
     let is_free = after.faults.is_empty() && !after.verdict.starts_with("error");
-    Some(Mended { description, is_free, verdict: after.verdict, accepted: after.accepted })
+    Some(Mended { description, is_free, verdict: after.verdict, accepted: after.accepted, rmse: after.rmse })
 }
 
 /// Cases that are there, and the file for those that are made.

@@ -2,7 +2,7 @@
 
 use crate::run::{CLEAN_HALF, CONVENTION_FAULT, Line, NULL, UNCORRUPTED, read};
 use phyture::Result;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// An error that is larger or smaller by this factor, where no effect says so, is another verdict.
@@ -21,16 +21,22 @@ impl Judged<'_> {
 
     /// Whether the corruption has an effect: a fault, other words, other effects, or another error.
     fn changes(&self) -> bool {
-        let sorted = |line: &Line| {
-            let mut names = line.accepted.clone();
-            names.sort_unstable();
-            names
-        };
-        let other_error = self.line.rmse.iter().zip(&self.clean.rmse).any(|pair| match pair {
+        self.differs(&self.line.verdict, &self.line.accepted, &self.line.rmse)
+    }
+
+    fn differs(&self, verdict: &str, accepted: &[String], rmse: &[Option<f64>]) -> bool {
+        let sorted = |names: &[String]| names.iter().cloned().collect::<BTreeSet<_>>();
+        let other_error = rmse.iter().zip(&self.clean.rmse).any(|pair| match pair {
             (Some(with), Some(without)) => (with / without).ln().abs() > OTHER_ERROR.ln(),
             _ => false,
         });
-        self.line.verdict != self.clean.verdict || sorted(self.line) != sorted(self.clean) || other_error
+        verdict != self.clean.verdict || sorted(accepted) != sorted(&self.clean.accepted) || other_error
+    }
+
+    /// Whether all is as without the corruption once what is printed is set.
+    fn is_mended(&self) -> bool {
+        let mended = self.line.mended.as_ref();
+        mended.is_some_and(|mended| mended.is_free && !self.differs(&mended.verdict, &mended.accepted, &mended.rmse))
     }
 
     /// Effects that are neither hidden nor named without the corruption.
@@ -97,7 +103,7 @@ fn by_corruption<'a>(cases: &[Judged<'a>]) {
             count(&Judged::is_false),
             count(&|case| case.hides() && case.finds()),
             count(&Judged::hides),
-            count(&|case| case.line.mended.as_ref().is_some_and(|mended| mended.is_free)),
+            count(&Judged::is_mended),
             count(&Judged::is_fault),
         );
     }
@@ -127,6 +133,7 @@ fn totals<'a>(cases: &[Judged<'a>]) {
         "-",
         count(&can_be, &|case| case.line.mended.as_ref().is_some_and(|mended| mended.is_free)),
     );
+    row("of these as without the corruption", "-", count(&can_be, &Judged::is_mended));
     row("of these the hidden effect found", "-", count(&|case| can_be(case) && case.hides(), &Judged::finds));
 }
 
