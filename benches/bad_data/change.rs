@@ -30,6 +30,16 @@ pub struct Corruption {
     pub right: &'static [&'static [&'static str]],
 }
 
+impl Corruption {
+    /// Whether a text names the right cause.
+    pub fn is_named_by(&self, text: &str) -> bool {
+        // A word of another meaning that begins as `late` does.
+        let text = text.to_lowercase().replace("lateral", "sideways");
+        let holds = |word: &&str| word.strip_prefix('!').map_or_else(|| text.contains(*word), |not| !text.contains(not));
+        self.right.iter().any(|words| words.iter().all(holds))
+    }
+}
+
 /// What a corruption is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {

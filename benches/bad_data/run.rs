@@ -69,6 +69,13 @@ pub struct Said {
     pub set: Option<String>,
 }
 
+impl Said {
+    /// All of it.
+    pub fn text(&self) -> String {
+        format!("{} {} {}", self.name, self.message, self.set.as_deref().unwrap_or_default())
+    }
+}
+
 /// What became of a case once the lines that `check` prints were set.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Mended {
@@ -217,18 +224,10 @@ fn search(line: &mut Line, set: &DataSet) {
     }
 }
 
-/// Whether a text holds all words, and none of those behind a `!`.
-fn says(text: &str, words: &[&str]) -> bool {
-    // A word of another meaning that begins as `late` does.
-    let text = text.to_lowercase().replace("lateral", "sideways");
-    words.iter().all(|word| word.strip_prefix('!').map_or_else(|| text.contains(word), |not| !text.contains(not)))
-}
-
 /// Where the right cause is named, the most serious first, and with the right flights.
 fn recognise(line: &mut Line, corruption: &Corruption, set: &DataSet, hit: &[String]) {
-    let right = |text: &str| corruption.right.iter().any(|words| says(text, words));
-    let flat = |said: &Said| format!("{} {} {}", said.name, said.message, said.set.as_deref().unwrap_or_default());
-    let of = |said: &[Said]| said.iter().map(flat).find(|text| right(text));
+    let right = |text: &str| corruption.is_named_by(text);
+    let of = |said: &[Said]| said.iter().map(Said::text).find(|text| right(text));
     let named = [("fault", of(&line.faults)), ("warning", of(&line.warnings))];
     let note = ("note", line.notes.iter().find(|note| right(note)).cloned());
     let Some((how, text)) = named.into_iter().chain([note]).find_map(|(how, text)| Some((how, text?))) else { return };

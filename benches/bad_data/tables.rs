@@ -1,5 +1,8 @@
 //! From lines of cases to the tables that are reported.
 
+use crate::change::{Corruption, Part};
+use crate::corruptions::DEVELOPMENT;
+use crate::reserved::RESERVED;
 use crate::run::{CLEAN_HALF, CONVENTION_FAULT, Line, NULL, UNCORRUPTED, read};
 use phyture::Result;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,6 +13,7 @@ const OTHER_ERROR: f64 = 1.5;
 
 /// What a case came to, beside the same flights with nothing wrong.
 struct Judged<'a> {
+    corruption: &'a Corruption,
     line: &'a Line,
     clean: &'a Line,
 }
@@ -39,6 +43,12 @@ impl Judged<'_> {
         mended.is_some_and(|mended| mended.is_free && !self.differs(&mended.verdict, &mended.accepted, &mended.rmse))
     }
 
+    /// Whether the right cause stands first of all that is said.
+    fn leads(&self) -> bool {
+        let first = self.line.faults.first().or(self.line.warnings.first());
+        first.is_some_and(|said| self.corruption.is_named_by(&said.text()))
+    }
+
     /// Effects that are neither hidden nor named without the corruption.
     fn is_false(&self) -> bool {
         self.line.accepted.iter().any(|name| *name != self.line.hidden && !self.clean.accepted.contains(name))
@@ -60,12 +70,15 @@ pub fn print(path: &Path) -> Result<()> {
     let lines = read(path)?;
     let clean: BTreeMap<(u64, &str), &Line> =
         lines.iter().filter(|line| line.half == UNCORRUPTED).map(|line| ((line.seed, line.hidden.as_str()), line)).collect();
-    let of = |half: &str| -> Vec<Judged<'_>> {
-        let cases = lines.iter().filter(|line| line.half == half);
-        cases.filter_map(|line| Some(Judged { line, clean: clean.get(&(line.seed, line.hidden.as_str()))? })).collect()
-    };
-    for half in ["development", "reserved"] {
-        let cases = of(half);
+    for (half, corruptions) in [("development", DEVELOPMENT), ("reserved", RESERVED)] {
+        // In the order of the list.
+        let own = |corruption: &'static Corruption| {
+            lines.iter().filter(move |line| line.half == half && line.corruption == corruption.id).filter_map(|line| {
+                let clean = clean.get(&(line.seed, line.hidden.as_str())).copied()?;
+                Some(Judged { corruption, line, clean })
+            })
+        };
+        let cases: Vec<Judged<'_>> = corruptions.iter().flat_map(own).collect();
         if !cases.is_empty() {
             println!("\n{half} half: {} cases\n", cases.len());
             by_corruption(&cases);
@@ -78,24 +91,25 @@ pub fn print(path: &Path) -> Result<()> {
 
 fn by_corruption<'a>(cases: &[Judged<'a>]) {
     println!(
-        "| corruption | flights | runs | right cause | as fault | its flights | verdict changed | changed, no fault | false effect | effect found | mended |"
+        "| corruption | flights | runs | right cause | said first | as fault | its flights | verdict changed | changed, no fault | false effect | effect found | mended |"
     );
-    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
-    let mut order: Vec<(&str, &str)> = Vec::new();
+    println!("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |");
+    let mut rows: Vec<(&Corruption, Part)> = Vec::new();
     for case in cases {
-        let key = (case.line.corruption.as_str(), case.line.part.as_str());
-        if !order.contains(&key) {
-            order.push(key);
+        if !rows.iter().any(|(corruption, _)| corruption.id == case.corruption.id) {
+            rows.extend(case.corruption.parts.map(|part| (case.corruption, part)));
         }
     }
-    for (corruption, part) in order {
-        let own: Vec<&Judged<'a>> =
-            cases.iter().filter(|case| case.line.corruption == corruption && case.line.part == part).collect();
+    for (Corruption { id, .. }, part) in rows {
+        let is_own = |case: &&Judged<'a>| case.corruption.id == *id && case.line.part == part.name();
+        let own: Vec<&Judged<'a>> = cases.iter().filter(is_own).collect();
         let count = |wanted: &dyn Fn(&Judged<'a>) -> bool| own.iter().filter(|case| wanted(case)).count();
         println!(
-            "| {corruption} | {part} | {} | {} | {} | {} | {} | {} | {} | {}/{} | {}/{} |",
+            "| {id} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {}/{} | {}/{} |",
+            part.name(),
             own.len(),
             count(&|case| !case.line.right.is_empty()),
+            count(&Judged::leads),
             count(&|case| case.line.right == "fault"),
             count(&|case| case.line.flights_named),
             count(&Judged::changes),
@@ -122,6 +136,7 @@ fn totals<'a>(cases: &[Judged<'a>]) {
     for part in ["all", "half", "one"] {
         row(&format!("same, flights hit: {part}"), "-", count(&is_hit(part), &named));
     }
+    row("same, and first of all that is said", "-", count(&Judged::changes, &Judged::leads));
     row("same, of faults", "-", count(&Judged::is_fault, &named));
     row("verdict changed, no fault", "-", count(&all, &|case| case.changes() && !case.is_fault()));
     row("no false effect", "≥ 98 %", count(&all, &|case| !case.is_false()));
