@@ -229,7 +229,7 @@ fn recognise(line: &mut Line, corruption: &Corruption, set: &DataSet, hit: &[Str
     let right = |text: &str| corruption.is_named_by(text);
     let of = |said: &[Said]| said.iter().map(Said::text).find(|text| right(text));
     let named = [("fault", of(&line.faults)), ("warning", of(&line.warnings))];
-    let note = ("note", line.notes.iter().find(|note| right(note)).cloned());
+    let note = ("note", set.notes.iter().find(|note| right(note)).cloned());
     let Some((how, text)) = named.into_iter().chain([note]).find_map(|(how, text)| Some((how, text?))) else { return };
     line.right = how.into();
     let holds = |name: &String| text.contains(name.as_str());
