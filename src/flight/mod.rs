@@ -300,6 +300,33 @@ impl DataSet {
     pub fn duration_s(&self) -> f64 {
         self.flights.iter().map(Flight::duration_s).sum()
     }
+
+    /// Leaves flights out, with a note that says why; names that no flight has are told too.
+    ///
+    /// # Examples
+    /// ```
+    /// # use phyture::sim::{Simulation, simulate};
+    /// # fn main() -> phyture::Result<()> {
+    /// let mut set = simulate(&Simulation { minutes: 2.0, ..Simulation::baseline() })?;
+    /// let name = set.flights[0].name.clone();
+    /// set.leave_out(&[name.clone()], "as asked");
+    /// assert!(set.flights.iter().all(|flight| flight.name != name));
+    /// assert_eq!(set.notes, [format!("left out, as asked: {name}")]);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn leave_out(&mut self, names: &[String], why: &str) {
+        let (known, unknown): (Vec<&String>, Vec<&String>) =
+            names.iter().partition(|name| self.flights.iter().any(|flight| flight.name == **name));
+        let list = |names: &[&String]| names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
+        self.flights.retain(|flight| !known.contains(&&flight.name));
+        if !known.is_empty() {
+            self.notes.push(format!("left out, {why}: {}", list(&known)));
+        }
+        if !unknown.is_empty() {
+            self.notes.push(format!("to be left out, {why}, but no flight has this name: {}", list(&unknown)));
+        }
+    }
 }
 
 #[cfg(test)]

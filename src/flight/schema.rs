@@ -18,6 +18,7 @@
 //! | `cutoff_hz` | −3 dB frequency of the differentiator where accelerations are derived |
 //! | `manoeuvre` | `"folder"` (default), or `{ separator = "_", part = 1 }` of the file's name |
 //! | `exclude` | sub-folders or files that are not flights of this set |
+//! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
 //! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `max_gap_s`: bad cells to interpolate linearly |
 //! | `notes` | sentences to carry to every reader of the data |
@@ -89,6 +90,7 @@ pub(super) struct Schema {
     pub cutoff_hz: Option<f64>,
     pub manoeuvre: Manoeuvre,
     pub exclude: Vec<String>,
+    pub leave_out: Vec<String>,
     pub ignore: Vec<String>,
     pub extra: Option<Vec<String>>,
     pub repairs: Vec<Repair>,
@@ -115,6 +117,7 @@ impl Default for Schema {
             cutoff_hz: None,
             manoeuvre: Manoeuvre::Folder,
             exclude: Vec::new(),
+            leave_out: Vec::new(),
             ignore: Vec::new(),
             extra: None,
             repairs: Vec::new(),
@@ -159,6 +162,7 @@ impl Schema {
             quaternion: keys.choice("quaternion", &QuaternionOrder::NAMES)?.unwrap_or_default(),
             stated,
             exclude: keys.texts("exclude")?.unwrap_or_default(),
+            leave_out: keys.texts("leave_out")?.unwrap_or_default(),
             ignore: keys.texts("ignore")?.unwrap_or_default(),
             extra: keys.texts("extra")?,
             notes: keys.texts("notes")?.unwrap_or_default(),

@@ -95,6 +95,9 @@ pub struct Data {
     /// Turn a flight with gaps in its time into several flights
     #[arg(long)]
     pub split_at_gaps: bool,
+    /// Flight to leave out, by its name, or `suspects`: all of which `check` says that they are read otherwise than the rest; repeatable
+    #[arg(long, value_name = "FLIGHT")]
+    pub leave_out: Vec<String>,
 }
 
 /// What trains and what tests.

@@ -81,6 +81,7 @@ mod tests {
             unit: "1".into(),
             message: "m".into(),
             set: Some(set.into()),
+            flights: Vec::new(),
         };
         let stated = stated.iter().map(|(key, value)| ((*key).to_owned(), (*value).to_owned())).collect();
         heed(&mut finding, &Source { stated, ..Source::default() });

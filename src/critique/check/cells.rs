@@ -100,5 +100,6 @@ fn finding(column: Column, spikes: &Spikes, flights: &[Flight]) -> Finding {
         unit: "1".into(),
         message,
         set: Some(rule),
+        flights: Vec::new(),
     }
 }

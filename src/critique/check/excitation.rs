@@ -155,6 +155,7 @@ pub(super) fn findings(movements: &[Excitation], collinearity: &[Collinearity]) 
         unit: "1".into(),
         message,
         set: None,
+        flights: Vec::new(),
     };
     let mut findings = Vec::new();
     for movement in movements {

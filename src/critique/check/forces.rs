@@ -99,6 +99,14 @@ impl Forces {
         }
     }
 
+    /// Adds the blocks of others, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        for (reading, others) in self.readings.iter_mut().zip(&other.readings) {
+            reading.lateral.iter_mut().zip(&others.lateral).for_each(|(one, other)| one.absorb(other, together));
+        }
+        self.free.iter_mut().zip(&other.free).for_each(|(one, other)| one.absorb(other, together));
+    }
+
     /// Which reading leaves the least lateral force.
     pub fn lateral(&self) -> Option<Finding> {
         let errors: Vec<Vec<f64>> = self
@@ -131,6 +139,7 @@ impl Forces {
                 rms(best)
             ),
             set: None,
+            flights: Vec::new(),
         };
         if blocks < FEW_BLOCKS {
             finding.verdict = Verdict::Undetermined;
@@ -176,6 +185,7 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
         unit: "1".into(),
         message: "not determined by these flights".into(),
         set: None,
+        flights: Vec::new(),
     };
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let what = if term == "gravity" { "gravity in body axes" } else { "the Coriolis term -w x v" };

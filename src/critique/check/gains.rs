@@ -69,10 +69,20 @@ impl Gains {
         }
     }
 
-    /// Findings of the relation of this name, see [`super::relations`].
-    pub fn findings(&self, relation: &str) -> Vec<Finding> {
+    /// Adds the blocks of others, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        for axis in 0..3 {
+            self.position[axis].absorb(&other.position[axis], together);
+            self.linear[axis].absorb(&other.linear[axis], together);
+            self.angular[axis].absorb(&other.angular[axis], together);
+        }
+        self.attitude.absorb(&other.attitude, together);
+    }
+
+    /// Findings of the relation of this name, see [`super::relations`]; of no axis of which less is explained.
+    pub fn findings(&self, relation: &str, least_explained: f64) -> Vec<Finding> {
         let three = |regressions: &[BlockRegression<1>; 3]| {
-            let estimates = regressions.each_ref().map(|regression| enough(regression).map(|[estimate]| estimate));
+            let estimates = regressions.each_ref().map(|regression| enough(regression, least_explained).map(|[estimate]| estimate));
             (regressions[0].blocks() > 0).then_some(estimates)
         };
         let (estimates, columns, units) = match relation {
@@ -80,7 +90,7 @@ impl Gains {
             "velocity_targets" => (three(&self.linear), ["vx_dot", "vy_dot", "vz_dot"], "acceleration or velocity"),
             "rate_targets" => (three(&self.angular), ["wx_dot", "wy_dot", "wz_dot"], "angular_acceleration or rates"),
             _ => {
-                let estimates = enough(&self.attitude);
+                let estimates = enough(&self.attitude, least_explained);
                 let of = |axis: usize| estimates.map(|estimates| estimates[axis]);
                 ((self.attitude.blocks() > 0).then(|| [of(0), of(1), of(2)]), ["wx", "wy", "wz"], "rates or angles")
             }
@@ -90,8 +100,10 @@ impl Gains {
     }
 }
 
-fn enough<const K: usize>(regression: &BlockRegression<K>) -> Option<[Estimate; K]> {
-    if regression.blocks() < FEW_BLOCKS { None } else { regression.estimates() }
+fn enough<const K: usize>(regression: &BlockRegression<K>, least_explained: f64) -> Option<[Estimate; K]> {
+    let is_enough = regression.blocks() >= FEW_BLOCKS;
+    let explains = || least_explained == 0.0 || regression.explained().is_some_and(|share| share >= least_explained);
+    if is_enough && explains() { regression.estimates() } else { None }
 }
 
 fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<Estimate>) -> Finding {
@@ -105,6 +117,7 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
         unit: "1".into(),
         message: "not determined by these flights".into(),
         set: None,
+        flights: Vec::new(),
     };
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;

@@ -3,7 +3,6 @@
 //! Every relation ṡ = f is checked in its integral form, s(t₁) − s(t₀) = ∫ f dt over a piece (trapezoidal rule). That needs no
 //! differentiator, and noise enters at the two ends only. No verdicts here.
 
-use crate::blocks::BLOCK_S;
 use crate::flight::attitude::{
     Axes, Matrix3, QuaternionOrder, euler_to_quaternion, gravity_body, quaternion_to_euler, rotation_body_to_inertial,
 };
@@ -12,6 +11,11 @@ use std::ops::Range;
 
 /// Three components.
 pub(super) type Vector = [f64; 3];
+
+/// Length of a block of one flight, s: ten pieces, so that a flight of half a minute still has an interval.
+pub(super) const SHORT_BLOCK_S: f64 = 2.0;
+/// So many of them are a block where many flights are judged together ([`crate::blocks::BLOCK_S`]).
+pub(super) const TOGETHER: usize = 5;
 
 /// Length of a piece, s: short against manoeuvres, long against the noise of one sample.
 const PIECE_S: f64 = 0.2;
@@ -82,12 +86,12 @@ impl Motion {
         }
     }
 
-    /// Samples of a block.
+    /// Samples of a short block.
     pub fn block_samples(&self) -> usize {
-        (BLOCK_S / self.step_s).round().max(1.0) as usize
+        (SHORT_BLOCK_S / self.step_s).round().max(1.0) as usize
     }
 
-    /// First and last sample of each piece, `margin` samples away from the ends of the flight, with its block in this flight.
+    /// First and last sample of each piece, `margin` samples away from the ends of the flight, with its short block in this flight.
     pub fn pieces(&self, margin: usize) -> impl Iterator<Item = (Range<usize>, usize)> + '_ {
         let length = ((PIECE_S / self.step_s).round() as usize).max(1);
         let last = self.instants.len().saturating_sub(margin + 1);

@@ -6,14 +6,17 @@
 
 mod advice;
 mod cells;
+mod evidence;
 mod excitation;
 mod forces;
 mod gains;
 mod increments;
+mod odd;
 mod regression;
 mod relations;
 mod report;
 mod sticks;
+mod streams;
 mod timing;
 
 pub use excitation::{Collinearity, Excitation};
@@ -23,6 +26,11 @@ pub use timing::DelayProfile;
 use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Targets};
 use crate::physics::Model;
+use evidence::Evidence;
+
+use odd::{Odd, Own};
+use std::collections::BTreeSet;
+use sticks::Sticks;
 
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
@@ -37,44 +45,32 @@ const RARE_SHARE: f64 = 0.01;
 /// does not make one.
 pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let quaternion = data.source.quaternion.map(other_order);
-    let mut relations = [
-        relations::Relation::position(quaternion),
-        relations::Relation::attitude(true, quaternion),
-        relations::Relation::attitude(false, quaternion),
-        relations::Relation::linear_targets(),
-        relations::Relation::angular_targets(),
-    ];
-    let (mut gains, mut forces, mut timing) = (gains::Gains::new(), forces::Forces::new(quaternion), timing::Timing::new());
-    let mut sticks = sticks::Sticks::new();
-    for (index, flight) in data.flights.iter().enumerate() {
-        let motion = increments::Motion::new(flight, &data.source);
-        relations.iter_mut().for_each(|relation| relation.add(index, &motion));
-        gains.add(index, &motion);
-        forces.add(index, &motion);
-        timing.add(index, &motion);
-        sticks.add(index, &motion);
-        flight.rest();
-    }
+    let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
+    let (each, sticks) = read(data, quaternion, step_s);
+    let of = |except: &BTreeSet<usize>| {
+        let mut evidence = Evidence::new(quaternion, step_s);
+        each.iter().filter(|own| !except.contains(&own.flight)).for_each(|own| evidence.absorb(&own.evidence, 1));
+        evidence
+    };
+    let odd = Odd::new(&each, &of(&BTreeSet::new()), &data.flights);
+    let together = of(&odd.flights);
 
     let mut findings = vec![origin(&data.flights)];
+    findings.extend(streams::findings(&data.flights));
     findings.extend(cells::spikes(&data.flights));
-    findings.extend(sticks.findings(&data.flights));
+    findings.extend(odd.findings);
+    findings.extend(sticks.findings(&data.flights, &odd.flights));
     // What thrust does along z is known from the collective alone.
     let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
-    for relation in &relations {
-        let Some(finding) = relation.finding() else { continue };
-        // Gains of a relation that is known to be read wrongly say nothing more.
-        let fault = finding.verdict == Verdict::Fault;
-        findings.push(finding);
-        if !fault {
-            findings.extend(gains.findings(relation.name));
-        }
-    }
-    findings.extend(forces.lateral());
-    findings.extend(forces.coefficients().into_iter().map(|finding| if unsure { not_judged(finding) } else { finding }));
+    findings.extend(together.kinematics(0.0));
+    findings.extend(together.forces.lateral());
+    findings.extend(places(together.forces.coefficients(), unsure));
     findings.extend(plausibility(&data.flights));
-    findings.extend(timing.offsets());
-    let (delay, control_delay) = timing.control_delay(model.map(|model| model.data.control_delay_s));
+    let offsets = together.timing.offsets(0.0).into_iter();
+    // A stream that is held is late by half of its rest: that is said already.
+    let is_held = findings.iter().any(|finding| finding.name.starts_with(streams::HELD));
+    findings.extend(offsets.map(|finding| if is_held { finding } else { odd::heeded(finding) }));
+    let (delay, control_delay) = together.timing.control_delay(model.map(|model| model.data.control_delay_s));
     findings.push(delay);
     let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
     findings.extend(excitation::findings(&excitation, &collinearity));
@@ -98,6 +94,42 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     }
 }
 
+/// Flights that are read side by side, and then leave the memory.
+#[cfg(feature = "rayon")]
+const BESIDE: usize = 8;
+
+/// What each flight says by itself.
+fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> (Vec<Own>, Sticks) {
+    let mut sticks = Sticks::new();
+    let one = |flight: usize| {
+        let motion = increments::Motion::new(&data.flights[flight], &data.source);
+        data.flights[flight].rest();
+        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion))
+    };
+    let indices: Vec<usize> = (0..data.flights.len()).collect();
+    #[cfg(feature = "rayon")]
+    let found: Vec<(Own, sticks::Regressions)> = {
+        use rayon::prelude::*;
+        indices.chunks(BESIDE).flat_map(|some| some.par_iter().map(|&flight| one(flight)).collect::<Vec<_>>()).collect()
+    };
+    #[cfg(not(feature = "rayon"))]
+    let found: Vec<(Own, sticks::Regressions)> = indices.into_iter().map(one).collect();
+    let each = found.into_iter().enumerate().map(|(flight, (own, regressions))| {
+        sticks.push(flight, regressions);
+        own
+    });
+    (each.collect(), sticks)
+}
+
+/// Coefficients of gravity and of the Coriolis term; where a unit of length explains their size, that unit in their place.
+fn places(coefficients: Vec<Finding>, unsure: bool) -> Vec<Finding> {
+    if let Some(lengths) = odd::lengths(&coefficients).filter(|lengths| lengths.verdict == Verdict::Fault) {
+        let others = coefficients.into_iter().filter(|finding| finding.verdict != Verdict::Fault);
+        return others.chain([lengths]).collect();
+    }
+    coefficients.into_iter().map(|finding| if unsure { not_judged(finding) } else { finding }).collect()
+}
+
 /// How the description says the order that a quaternion is not read in.
 const fn other_order(order: QuaternionOrder) -> &'static str {
     match order {
@@ -117,6 +149,7 @@ fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> 
         unit: "1".into(),
         message,
         set: set.map(Into::into),
+        flights: Vec::new(),
     }
 }
 
@@ -151,6 +184,11 @@ fn named(names: &[&str]) -> String {
         None | Some(0) => names.join(", "),
         Some(more) => format!("{} and {more} more", names[..NAMED].join(", ")),
     }
+}
+
+/// The rule of `dataset.toml` that leaves flights out.
+fn left_out(names: &[&str]) -> String {
+    format!("leave_out = [{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
 }
 
 /// A column of all flights with their steps; each flight leaves the memory behind it.

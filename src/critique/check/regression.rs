@@ -12,6 +12,19 @@ struct Sums<const K: usize> {
     rows: f64,
 }
 
+impl<const K: usize> Sums<K> {
+    fn total(several: &[Self]) -> Self {
+        let empty = Self { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 };
+        several.iter().fold(empty, |mut sum, one| {
+            sum.gram.as_flattened_mut().iter_mut().zip(one.gram.as_flattened()).for_each(|(sum, one)| *sum += one);
+            sum.moment.iter_mut().zip(one.moment).for_each(|(sum, one)| *sum += one);
+            sum.square += one.square;
+            sum.rows += one.rows;
+            sum
+        })
+    }
+}
+
 /// A regression y = Xβ + e on K columns, kept as sums by block.
 #[derive(Clone)]
 pub(super) struct BlockRegression<const K: usize> {
@@ -45,6 +58,12 @@ impl<const K: usize> BlockRegression<K> {
             sums.moment[i] += left * value;
             row.iter().enumerate().for_each(|(j, right)| sums.gram[i][j] += left * right);
         }
+    }
+
+    /// Adds the blocks of another, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        self.blocks.extend(other.blocks.chunks(together).map(Sums::total));
+        self.open = None;
     }
 
     /// The blocks of several as one.

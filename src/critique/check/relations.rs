@@ -212,18 +212,42 @@ impl Relation {
         }
     }
 
+    /// Squared error of a reading over that of the measured changes.
+    fn share(&self, index: usize) -> f64 {
+        let (error, size) = self.misfit[index].iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+        if size > 0.0 { error / size } else { f64::NAN }
+    }
+
+    /// The reading of which the nominal one is certainly worse.
+    pub fn other_reading(&self) -> Option<usize> {
+        let nominal = self.share(0);
+        let best = (1..self.hypotheses.len()).min_by(|a, b| self.share(*a).total_cmp(&self.share(*b)))?;
+        // One that explains little itself only leaves out what is wrong.
+        let bar = POOR_SHARE.min(CONVINCING_SHARE * nominal);
+        (nominal > MATERIAL_SHARE && self.share(best) < bar && self.consistent(best)).then_some(best)
+    }
+
+    /// Whether a reading leaves less than the nominal one, be it by little.
+    pub fn prefers(&self, index: usize) -> bool {
+        self.share(index) < self.share(0)
+    }
+
+    /// Adds the blocks of the same relation elsewhere, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        let total = |blocks: &[(f64, f64)]| blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+        for (blocks, others) in self.misfit.iter_mut().zip(&other.misfit) {
+            blocks.extend(others.chunks(together).map(total));
+        }
+        self.open = None;
+    }
+
     /// Verdict over all flights; `None` where the relation never applied.
     pub fn finding(&self) -> Option<Finding> {
         let blocks = self.misfit.first()?.len();
         if blocks == 0 {
             return None;
         }
-        let share = |index: usize| {
-            let (error, size) = self.misfit[index].iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
-            if size > 0.0 { error / size } else { f64::NAN }
-        };
-        let nominal = share(0);
-        let best = (1..self.hypotheses.len()).min_by(|a, b| share(*a).total_cmp(&share(*b)));
+        let nominal = self.share(0);
         let mut finding = Finding {
             name: self.name.into(),
             subject: Subject::Conventions,
@@ -234,19 +258,18 @@ impl Relation {
             unit: "% unexplained".into(),
             message: format!("{} holds", self.formula),
             set: None,
+            flights: Vec::new(),
         };
-        let convincing =
-            best.filter(|&index| nominal > MATERIAL_SHARE && share(index) < CONVINCING_SHARE * nominal && self.consistent(index));
         if !nominal.is_finite() || blocks < FEW_BLOCKS {
             finding.verdict = Verdict::Undetermined;
             finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);
-        } else if let Some(index) = convincing {
+        } else if let Some(index) = self.other_reading() {
             finding.verdict = Verdict::Fault;
             finding.message = format!(
                 "{} does not hold; {} ({:.1} % unexplained that way)",
                 self.formula,
                 self.hypotheses[index].says,
-                100.0 * share(index)
+                100.0 * self.share(index)
             );
             finding.set = Some(self.hypotheses[index].set.into());
         } else if nominal > POOR_SHARE {

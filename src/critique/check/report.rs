@@ -54,6 +54,9 @@ pub struct Finding {
     pub message: String,
     /// What to set in `dataset.toml` (or the model file, if it says so).
     pub set: Option<String>,
+    /// The flights that it is about, where it is not about all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub flights: Vec<String>,
 }
 
 /// Result of `check`.
@@ -79,6 +82,17 @@ pub struct CheckReport {
     pub collinearity: Vec<Collinearity>,
     /// What the reader did on the way.
     pub notes: Vec<String>,
+}
+
+impl CheckReport {
+    /// Flights that some finding of a fault names: they are read otherwise than the rest.
+    pub fn suspects(&self) -> Vec<String> {
+        let faults = self.findings.iter().filter(|finding| finding.verdict == Verdict::Fault);
+        let mut names: Vec<String> = faults.flat_map(|finding| finding.flights.iter().cloned()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
 }
 
 impl Verdict {

@@ -7,10 +7,12 @@
 
 use super::finding;
 use super::increments::Motion;
+use super::odd::{MOST, in_flights};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Verdict};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
+use std::collections::BTreeSet;
 
 /// The accelerations by which sticks are told, and the stick that moves each: the conventions of this program.
 const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
@@ -20,9 +22,6 @@ const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 const FIRST: usize = 1;
 const CONSTANT: usize = 5;
 const COLUMNS: usize = 6;
-
-/// Length of a block, s: ten pieces, so that a flight of half a minute still has an interval.
-const BLOCK_S: f64 = 2.0;
 
 /// An axis answers to another stick if that one moves it so many times as much as its own.
 const EXCHANGED: f64 = 3.0;
@@ -36,7 +35,7 @@ const EXPLAINED: f64 = 0.5;
 /// Gains of one aircraft differ by less than this factor from flight to flight: square of the rotor speed, weight, density.
 const LARGEST_RATIO: f64 = 3.0;
 
-type Regressions = [BlockRegression<COLUMNS>; 4];
+pub(super) type Regressions = [BlockRegression<COLUMNS>; 4];
 
 /// Accumulates flights, each by itself.
 pub(super) struct Sticks {
@@ -108,12 +107,11 @@ impl Sticks {
         Self { flights: Vec::new() }
     }
 
-    /// Adds a flight.
-    pub fn add(&mut self, flight: usize, motion: &Motion) {
-        let samples = (BLOCK_S / motion.step_s).round().max(1.0) as usize;
+    /// What one flight says.
+    pub fn of(motion: &Motion) -> Regressions {
         let mut regressions = empty();
-        for (piece, _) in motion.pieces(0) {
-            let block = (flight, piece.start / samples);
+        for (piece, number) in motion.pieces(0) {
+            let block = (0, number);
             let at = |sample: usize| &motion.instants[sample];
             let integrals: [f64; 9] = motion.integral(&piece, |sample| {
                 let now = at(sample);
@@ -137,41 +135,50 @@ impl Sticks {
                 regression.add(block, &row, changes[axis]);
             }
         }
+        regressions
+    }
+
+    /// Adds what a flight says.
+    pub fn push(&mut self, flight: usize, regressions: Regressions) {
         self.flights.push((flight, regressions));
     }
 
-    /// What is wrong with sticks, worst first; one finding that nothing is, or that these flights do not tell.
-    pub fn findings(&self, flights: &[Flight]) -> Vec<Finding> {
+    /// What is wrong with sticks, worst first; one finding that nothing is, or that these flights do not tell. Flights of which something else is
+    /// known to be wrong are left out.
+    pub fn findings(&self, flights: &[Flight], except: &BTreeSet<usize>) -> Vec<Finding> {
+        let judged = || self.flights.iter().filter(|(flight, _)| !except.contains(flight));
         let all: Regressions =
-            std::array::from_fn(|axis| BlockRegression::merged(self.flights.iter().map(|(_, regressions)| &regressions[axis])));
-        let names =
-            |indices: &[usize]| super::named(&indices.iter().map(|&index| flights[index].name.as_str()).collect::<Vec<_>>());
+            std::array::from_fn(|axis| BlockRegression::merged(judged().map(|(_, regressions)| &regressions[axis])));
         let each: Vec<(usize, Option<Answers>)> =
-            self.flights.iter().map(|(flight, regressions)| (*flight, Answers::new(regressions))).collect();
+            judged().map(|(flight, regressions)| (*flight, Answers::new(regressions))).collect();
         let known: Vec<(usize, &Answers)> =
             each.iter().filter_map(|(flight, answers)| Some((*flight, answers.as_ref()?))).collect();
         let mut findings = Vec::new();
         let exchanged: Vec<(usize, [usize; 4])> =
             known.iter().filter_map(|(flight, answers)| Some((*flight, answers.order()?))).collect();
         let whole = Answers::new(&all);
-        match whole.as_ref().and_then(Answers::order) {
-            Some(order) => findings.push(of_order(&order, None)),
-            // An order that most flights have shows in all together.
+        // An order that most flights have shows in all together.
+        let common = whole.as_ref().and_then(Answers::order).filter(|order| {
+            let alike = exchanged.iter().filter(|entry| entry.1 == *order).count();
+            alike as f64 > MOST * known.len() as f64 || exchanged.is_empty()
+        });
+        match common {
+            Some(order) => findings.push(finding("stick_order", Verdict::Fault, exchange(&order), Some(&swap(&order)))),
             None => {
                 let mut orders: Vec<[usize; 4]> = exchanged.iter().map(|entry| entry.1).collect();
                 orders.sort_unstable();
                 orders.dedup();
                 for order in orders {
                     let such: Vec<usize> = exchanged.iter().filter(|entry| entry.1 == order).map(|entry| entry.0).collect();
-                    let which = format!("in {} of {} flights ({})", such.len(), flights.len(), names(&such));
-                    findings.push(of_order(&order, Some(&which)));
+                    findings.push(in_flights("stick_order", &such, &exchange(&order), flights));
                 }
             }
         }
         if findings.is_empty() {
-            findings.extend((0..4).filter_map(|stick| of_sign(stick, &known, flights.len(), &names)));
-            findings.extend((0..4).filter_map(|stick| of_size(stick, &known, flights.len(), &names)));
-            findings.extend((0..4).filter_map(|stick| self.of_rest(stick, flights.len(), &names)));
+            findings.extend((0..4).filter_map(|stick| of_sign(stick, &known, flights)));
+            findings.extend((0..4).filter_map(|stick| of_size(stick, &known, flights)));
+            let moves: Vec<&(usize, Regressions)> = judged().collect();
+            findings.extend((0..4).filter_map(|stick| of_rest(stick, &moves, flights)));
         }
         if findings.is_empty() {
             let open: Vec<&str> =
@@ -184,36 +191,28 @@ impl Sticks {
         }
         findings
     }
+}
 
-    /// A stick that stands still in some flights while its axis moves as in the others.
-    fn of_rest(&self, stick: usize, count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
-        let moves: Vec<[f64; 2]> = self
-            .flights
-            .iter()
-            .map(|(_, regressions)| [regressions[stick].deviation(FIRST + stick, CONSTANT), regressions[stick].response()])
-            .collect();
-        let usual = |place: usize| {
-            let active = moves.iter().filter(|entry| entry[0] > 0.0).map(|entry| entry[place]);
-            median(active.collect())
-        };
-        let [stick_moves, axis_moves] = [usual(0)?, usual(1)?];
-        let still = |entry: &[f64; 2]| entry[0] < STILL * stick_moves && entry[1] > MOVING * axis_moves;
-        let such: Vec<usize> =
-            self.flights.iter().zip(&moves).filter(|(_, entry)| still(entry)).map(|((flight, _), _)| *flight).collect();
-        (!such.is_empty()).then(|| {
-            let (name, axis) = (STICKS[stick], AXES[stick]);
-            let message = format!(
-                "{name} stands still in {} of {count} flights ({}), while {axis} moves as in the others: it was not recorded there",
-                such.len(),
-                names(&such)
-            );
-            finding(&format!("still_{name}"), Verdict::Fault, message, Some("leave these flights out"))
-        })
-    }
+/// A stick that stands still in some flights while its axis moves as in the others.
+fn of_rest(stick: usize, each: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
+    let moves: Vec<[f64; 2]> = each
+        .iter()
+        .map(|(_, regressions)| [regressions[stick].deviation(FIRST + stick, CONSTANT), regressions[stick].response()])
+        .collect();
+    let usual = |place: usize| {
+        let active = moves.iter().filter(|entry| entry[0] > 0.0).map(|entry| entry[place]);
+        median(active.collect())
+    };
+    let [stick_moves, axis_moves] = [usual(0)?, usual(1)?];
+    let still = |entry: &[f64; 2]| entry[0] < STILL * stick_moves && entry[1] > MOVING * axis_moves;
+    let such: Vec<usize> = each.iter().zip(&moves).filter(|(_, entry)| still(entry)).map(|((flight, _), _)| *flight).collect();
+    let (name, axis) = (STICKS[stick], AXES[stick]);
+    let message = format!("{name} stands still while {axis} moves as in the others: it was not recorded there");
+    (!such.is_empty()).then(|| in_flights(&format!("still_{name}"), &such, &message, flights))
 }
 
 /// A stick that acts with one sign in some flights and with the other in the rest.
-fn of_sign(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
+fn of_sign(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Option<Finding> {
     let certain: Vec<(usize, f64)> = known
         .iter()
         .filter(|(_, answers)| answers.is_certain(stick, stick))
@@ -227,16 +226,13 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn 
     };
     let [with, against] = [clear(true), clear(false)];
     let fewer = if with.len() < against.len() { with } else { against };
-    (!fewer.is_empty()).then(|| {
-        let name = STICKS[stick];
-        let message = format!("{name} acts with the other sign in {} of {count} flights ({})", fewer.len(), names(&fewer));
-        let set = format!("[columns] {name} = \"-{name}\" for these flights, with the file's name, or leave them out");
-        finding(&format!("sign_{name}"), Verdict::Fault, message, Some(&set))
-    })
+    let name = STICKS[stick];
+    let message = format!("{name} acts with the other sign than in the rest");
+    (!fewer.is_empty()).then(|| in_flights(&format!("sign_{name}"), &fewer, &message, flights))
 }
 
 /// A stick whose gain in some flights is a multiple of that in the others.
-fn of_size(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn Fn(&[usize]) -> String) -> Option<Finding> {
+fn of_size(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Option<Finding> {
     let certain: Vec<(usize, Estimate)> = known
         .iter()
         .filter(|(_, answers)| answers.is_certain(stick, stick))
@@ -250,36 +246,25 @@ fn of_size(stick: usize, known: &[(usize, &Answers)], count: usize, names: &dyn 
     let such: Vec<(usize, f64)> =
         certain.iter().filter(|entry| beyond(&entry.1)).map(|entry| (entry.0, entry.1.value.abs() / size)).collect();
     let ratio = median(such.iter().map(|entry| entry.1).collect())?;
-    let flights: Vec<usize> = such.iter().map(|entry| entry.0).collect();
+    let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
     let name = STICKS[stick];
-    let message = format!(
-        "{name} has {ratio:.2} times the gain of the other flights in {} of {count} ({}): in other units there, or scaled",
-        flights.len(),
-        names(&flights)
-    );
-    let set = format!("[columns] {name} = \"{ratio:.2} * {name}\" for these flights, with the file's name, or leave them out");
-    Some(finding(&format!("gain_{name}"), Verdict::Fault, message, Some(&set)))
+    let message = format!("{name} has {ratio:.2} times the gain of the other flights: in other units there, or scaled");
+    Some(in_flights(&format!("gain_{name}"), &indices, &message, flights))
 }
 
-/// Sticks that stand in each other's columns.
-fn of_order(order: &[usize; 4], which: Option<&str>) -> Finding {
-    let moved: Vec<usize> = (0..4).filter(|&axis| order[axis] != axis).collect();
-    let answers: Vec<String> = moved.iter().map(|&axis| format!("{} answers to {}", AXES[axis], STICKS[order[axis]])).collect();
-    let set: Vec<String> = moved.iter().map(|&axis| format!("{} = \"{}\"", STICKS[axis], STICKS[order[axis]])).collect();
-    let sticks: Vec<&str> = moved.iter().map(|&axis| STICKS[axis]).collect();
-    let message = format!(
-        "{} are exchanged{}: {}",
-        joined(&sticks),
-        which.map_or_else(String::new, |which| format!(" {which}")),
-        answers.join(", ")
-    );
-    let for_these = if which.is_some() { " for these flights" } else { "" };
-    finding(
-        "stick_order",
-        Verdict::Fault,
-        message,
-        Some(&format!("[columns] {}{for_these}, with the file's names", set.join(", "))),
-    )
+/// Which axes answer to which sticks, where these stand in each other's columns.
+fn exchange(order: &[usize; 4]) -> String {
+    let moved = || (0..4).filter(|&axis| order[axis] != axis);
+    let answers: Vec<String> = moved().map(|axis| format!("{} answers to {}", AXES[axis], STICKS[order[axis]])).collect();
+    let sticks: Vec<&str> = moved().map(|axis| STICKS[axis]).collect();
+    format!("{} are exchanged: {}", joined(&sticks), answers.join(", "))
+}
+
+/// What mends it.
+fn swap(order: &[usize; 4]) -> String {
+    let moved = (0..4).filter(|&axis| order[axis] != axis);
+    let set: Vec<String> = moved.map(|axis| format!("{} = \"{}\"", STICKS[axis], STICKS[order[axis]])).collect();
+    format!("[columns] {}, with the file's names", set.join(", "))
 }
 
 fn joined(names: &[&str]) -> String {

@@ -17,7 +17,9 @@ const LARGEST_SHIFT_S: f64 = 0.1;
 /// Shifts are no closer than this, s, unless the samples are further apart.
 const CLOSEST_SHIFTS_S: f64 = 0.005;
 /// Delays of the controls that are tried, s.
-const CONTROL_DELAYS_S: [f64; 2] = [-0.02, 0.1];
+const CONTROL_DELAYS_S: [f64; 2] = [-0.12, 0.12];
+/// The controls are looked at no more often than this, s: they move slowly against it.
+const CLOSEST_LOOKS_S: f64 = 0.02;
 /// Fall of the summed log error over the profile below which its minimum means nothing.
 const LEAST_DEPTH: f64 = 0.02;
 
@@ -44,6 +46,8 @@ struct Minimum {
     at: f64,
     interval: [f64; 2],
     depth: f64,
+    /// Fall of the objective from no shift to here.
+    fall: f64,
 }
 
 impl Profile {
@@ -80,9 +84,11 @@ impl Profile {
         let (count, mean) = (blocks as f64, left_out.iter().sum::<f64>() / blocks as f64);
         let variance = (count - 1.0) / count * left_out.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
         let half = quantile_975((blocks - 1) as f64) * variance.sqrt();
-        let curve = (0..self.shifts.len()).map(|shift| self.objective(shift, None, &totals));
+        let curve: Vec<f64> = (0..self.shifts.len()).map(|shift| self.objective(shift, None, &totals)).collect();
+        let unshifted = self.shifts.iter().position(|shift| *shift == 0).map_or(f64::INFINITY, |shift| curve[shift]);
+        let curve = curve.into_iter();
         let (low, high) = curve.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)));
-        Some(Minimum { at, interval: [at - half, at + half], depth: high - low })
+        Some(Minimum { at, interval: [at - half, at + half], depth: high - low, fall: unshifted - low })
     }
 }
 
@@ -163,52 +169,38 @@ const PAIRS: [Pair; 4] = [
 
 /// Accumulates all profiles over flights.
 pub(super) struct Timing {
-    step_s: Option<f64>,
+    step_s: f64,
     /// Samples from one shift to the next.
     grid: usize,
     pairs: Vec<(Pair, Profile)>,
     delays: Vec<isize>,
     /// `[channel][delay]`: ω̇x, ω̇y, ω̇z, v̇z on their own state, their control and 1.
     controls: Vec<Vec<BlockRegression<3>>>,
-    blocks: usize,
 }
 
 impl Timing {
-    pub fn new() -> Self {
-        Self { step_s: None, grid: 1, pairs: Vec::new(), delays: Vec::new(), controls: Vec::new(), blocks: 0 }
-    }
-
-    fn start(&mut self, step_s: f64) {
+    /// For flights of this step.
+    pub fn new(step_s: f64) -> Self {
         // Rounding of the quotient must not make the grid a sample finer.
-        self.grid = ((CLOSEST_SHIFTS_S / step_s * (1.0 + 1e-9)) as usize).max(1);
-        let grid = self.grid as isize;
-        let steps = |time_s: f64| (time_s / (step_s * self.grid as f64)).round() as isize;
+        let grid = ((CLOSEST_SHIFTS_S / step_s * (1.0 + 1e-9)) as usize).max(1);
+        let spacing = grid as isize;
+        let steps = |time_s: f64| (time_s / (step_s * grid as f64)).round() as isize;
         let largest = steps(LARGEST_SHIFT_S).max(2);
-        let shifts: Vec<isize> = (-largest..=largest).map(|shift| shift * grid).collect();
+        let shifts: Vec<isize> = (-largest..=largest).map(|shift| shift * spacing).collect();
         let delays = steps(CONTROL_DELAYS_S[0]).min(-1)..=steps(CONTROL_DELAYS_S[1]).max(2);
-        self.delays = delays.map(|delay| delay * grid).collect();
-        self.step_s = Some(step_s);
-        self.pairs = PAIRS
-            .into_iter()
-            .map(|pair| {
-                let errors = vec![vec![Vec::new(); shifts.len()]];
-                (pair, Profile { errors, shifts: shifts.clone(), grid: self.grid as f64 })
-            })
-            .collect();
-        self.controls = vec![vec![BlockRegression::new(); self.delays.len()]; 4];
+        let delays: Vec<isize> = delays.map(|delay| delay * spacing).collect();
+        let profile = || Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone(), grid: grid as f64 };
+        let pairs = PAIRS.into_iter().map(|pair| (pair, profile())).collect();
+        let controls = vec![vec![BlockRegression::new(); delays.len()]; 4];
+        Self { step_s, grid, pairs, delays, controls }
     }
 
     /// Adds a flight.
     pub fn add(&mut self, flight: usize, motion: &Motion) {
-        let step_s = *self.step_s.get_or_insert(motion.step_s);
-        if self.delays.is_empty() {
-            self.start(step_s);
-        }
         // One per cent is the tolerance to which a step is called constant.
-        if (motion.step_s / step_s - 1.0).abs() > 0.01 {
+        if (motion.step_s / self.step_s - 1.0).abs() > 0.01 {
             return;
         }
-        self.blocks += motion.instants.len() / motion.block_samples();
         let margin = self.pairs.first().map_or(0, |(_, profile)| profile.shifts.len() / 2 * self.grid);
         for (pair, profile) in self.pairs.iter_mut().filter(|(pair, _)| (pair.applies)(motion)) {
             for (index, shift) in profile.shifts.iter().enumerate() {
@@ -227,10 +219,21 @@ impl Timing {
         self.add_controls(flight, motion);
     }
 
+    /// Adds the blocks of others of the same step, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        for ((_, profile), (_, others)) in self.pairs.iter_mut().zip(&other.pairs) {
+            let shifts = profile.errors.iter_mut().flatten().zip(others.errors.iter().flatten());
+            shifts.for_each(|(blocks, others)| blocks.extend(others.chunks(together).map(|part| part.iter().sum::<f64>())));
+        }
+        let controls = self.controls.iter_mut().flatten().zip(other.controls.iter().flatten());
+        controls.for_each(|(one, other)| one.absorb(other, together));
+    }
+
     fn add_controls(&mut self, flight: usize, motion: &Motion) {
         let margin = self.delays.iter().map(|delay| delay.unsigned_abs()).max().unwrap_or(0);
         let end = motion.instants.len().saturating_sub(margin);
-        for (sample, now) in motion.instants.iter().enumerate().take(end).skip(margin) {
+        let every = ((CLOSEST_LOOKS_S / motion.step_s).round() as usize).max(1);
+        for (sample, now) in motion.instants.iter().enumerate().take(end).skip(margin).step_by(every) {
             let block = (flight, sample / motion.block_samples());
             let heave = now.linear_target[2] + cross(now.rates, now.velocity)[2] - now.gravity[2];
             let [wx, wy, wz] = now.angular_target;
@@ -244,19 +247,19 @@ impl Timing {
         }
     }
 
-    /// Offsets between streams.
-    pub fn offsets(&self) -> Vec<Finding> {
-        let step_s = self.step_s.unwrap_or(1.0);
+    /// Offsets between streams that lower the squared error by this in its logarithm.
+    pub fn offsets(&self, least_fall: f64) -> Vec<Finding> {
+        let step_s = self.step_s;
         self.pairs
             .iter()
             .filter(|(_, profile)| !profile.errors[0][0].is_empty())
-            .map(|(pair, profile)| offset(pair, profile, step_s))
+            .map(|(pair, profile)| offset(pair, profile, step_s, least_fall))
             .collect()
     }
 
     /// The delay of the controls, common to all, and its profile.
     pub fn control_delay(&self, of_model_s: Option<f64>) -> (Finding, Option<DelayProfile>) {
-        let step_s = self.step_s.unwrap_or(1.0);
+        let step_s = self.step_s;
         let mut finding = Finding {
             name: "control_delay".into(),
             subject: Subject::Timing,
@@ -267,6 +270,7 @@ impl Timing {
             unit: "s".into(),
             message: "these flights do not tell: the controls explain too little, or stand still".into(),
             set: None,
+            flights: Vec::new(),
         };
         // A channel whose control stands still says nothing about its delay.
         let errors: Vec<Vec<Vec<f64>>> =
@@ -309,7 +313,7 @@ impl Timing {
     }
 }
 
-fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
+fn offset(pair: &Pair, profile: &Profile, step_s: f64, least_fall: f64) -> Finding {
     let mut finding = Finding {
         name: pair.name.into(),
         subject: Subject::Timing,
@@ -320,13 +324,14 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64) -> Finding {
         unit: "s".into(),
         message: "these flights do not tell".into(),
         set: None,
+        flights: Vec::new(),
     };
     let Some(minimum) = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH) else { return finding };
     finding.measured = Some(minimum.at * step_s);
     finding.interval = Some(minimum.interval.map(|samples| samples * step_s));
     let [low, high] = minimum.interval;
     // Half a sample (half a shift, where these are further apart) is what sampling itself leaves open.
-    if minimum.at.abs() > profile.grid && (low > 0.5 * profile.grid || high < -0.5 * profile.grid) {
+    if minimum.at.abs() > profile.grid && minimum.fall >= least_fall && (low > 0.5 * profile.grid || high < -0.5 * profile.grid) {
         finding.verdict = Verdict::Warning;
         let late = minimum.at > 0.0;
         finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());

@@ -22,6 +22,7 @@ pub use formula::grammar;
 
 use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
 use crate::{notes, output};
+use phyture::critique::check::check;
 use phyture::critique::wrap::wrapped;
 use phyture::disk::{Existing, Target};
 use phyture::flight::read::{ReadOptions, data_set};
@@ -227,7 +228,7 @@ impl<'a> Context<'a> {
     /// Reads the flights, and says what the reader has to say.
     pub fn flights(&self, data: &Data, history: usize) -> Result<DataSet> {
         let options = ReadOptions { minimum_rows: history, split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone() };
-        let set = data_set(&data.data, &options)?;
+        let set = without(data_set(&data.data, &options)?, data)?;
         self.say(format!(
             "{}: {} flights, {} manoeuvre classes, {:.0} s at {:.0} Hz",
             data.data.display(),
@@ -336,4 +337,33 @@ pub fn interruption() -> Result<Arc<AtomicBool>> {
     ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))
         .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
     Ok(flag)
+}
+/// The word for all flights of which `check` says that they are read otherwise than the rest.
+const SUSPECTS: &str = "suspects";
+/// Times that what is left is checked again: beside the worst the next may not have shown.
+const MOST_CHECKS: usize = 3;
+
+/// The flights without those that were asked to be left out.
+fn without(mut set: DataSet, data: &Data) -> Result<DataSet> {
+    let names: Vec<String> = data.leave_out.iter().filter(|name| *name != SUSPECTS).cloned().collect();
+    set.leave_out(&names, "as --leave-out says");
+    if data.leave_out.iter().any(|name| name == SUSPECTS) {
+        for _ in 0..MOST_CHECKS {
+            let suspects = check(&set, None).suspects();
+            if suspects.is_empty() {
+                break;
+            }
+            set.leave_out(&suspects, "as suspects");
+        }
+    }
+    if set.flights.is_empty() {
+        let expected = "at least one flight that is left".to_owned();
+        return Err(Error::Config {
+            place: "command line".into(),
+            field: "--leave-out".into(),
+            found: data.leave_out.join(" "),
+            expected,
+        });
+    }
+    Ok(set)
 }

@@ -1,0 +1,197 @@
+//! Flights that are read otherwise than the others: one in feet, one whose attitude comes late, one with a sign reversed. Each flight has been judged
+//! by itself; what most of them keep and some break is a fault of those, and they are left out of what all together are judged by.
+
+use super::evidence::Evidence;
+use super::increments::{Motion, TOGETHER};
+use super::relations::Relation;
+use super::report::{Finding, Subject, Verdict};
+use super::{left_out, named};
+use crate::flight::Flight;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A flight by itself is believed where twice its interval says so: there are many flights and many relations.
+const WIDER: f64 = 2.0;
+/// A gain that certainly differs from 1 by this much is that of another reading.
+const OFF: f64 = 0.2;
+/// Streams this much apart change verdicts: lags of rotor and servo are as long. s
+pub(super) const LATE_S: f64 = 0.03;
+/// Controls of a flight are late or early against those of the others from here on, s; estimates of a single flight scatter.
+const LATER_S: f64 = 0.05;
+/// A gain of a single flight's axis is one where with it so much of the change is explained.
+const EXPLAINED: f64 = 0.5;
+/// Fall of the logarithm of the squared error that a shift of a stream has to bring in a single flight.
+const CONVINCING_FALL: f64 = 0.3;
+/// Where more than this share of the flights breaks a relation, it is the set that does.
+pub(super) const MOST: f64 = 0.8;
+/// Coefficients of gravity agree with a unit of length to this factor.
+const NEAR_UNIT: f64 = 1.25;
+
+/// Units of length in metres, where accelerations are in the same.
+const LENGTHS: [(f64, &str, &str); 3] = [(0.3048, "feet", "ft"), (0.01, "centimetres", "cm"), (0.001, "millimetres", "mm")];
+
+/// What one flight says by itself.
+pub(super) struct Own {
+    pub flight: usize,
+    pub evidence: Evidence,
+    findings: Vec<Finding>,
+}
+
+impl Own {
+    pub fn new(flight: usize, motion: &Motion, quaternion: Option<&'static str>, step_s: f64) -> Self {
+        let mut short = Evidence::new(quaternion, step_s);
+        short.add(flight, motion);
+        let mut findings = short.kinematics(EXPLAINED);
+        findings.extend(short.timing.offsets(CONVINCING_FALL));
+        findings.push(short.timing.control_delay(None).0);
+        findings.extend(lengths(&short.forces.coefficients()));
+        let mut evidence = Evidence::new(quaternion, step_s);
+        // A block of usual length is longer than most manoeuvres.
+        evidence.absorb(&short, TOGETHER);
+        Self { flight, evidence, findings }
+    }
+}
+
+/// A shift between streams of all flights: where it is as long as the lags of an aircraft, these cannot be told from it.
+pub(super) fn heeded(finding: Finding) -> Finding {
+    if finding.verdict != Verdict::Warning || !contradicts(&finding) {
+        return finding;
+    }
+    let message = format!("{}; a lag or delay that a search named could be this", finding.message);
+    Finding { verdict: Verdict::Fault, message, ..finding }
+}
+
+/// What breaks with the others, and in which flights.
+pub(super) struct Odd {
+    pub findings: Vec<Finding>,
+    pub flights: BTreeSet<usize>,
+}
+
+impl Odd {
+    /// `all` is what all flights say together.
+    pub fn new(each: &[Own], all: &Evidence, flights: &[Flight]) -> Self {
+        let mut odd = Self { findings: Vec::new(), flights: BTreeSet::new() };
+        let common = misread(each, all);
+        let of_common = |name: &str| common.iter().any(|relation| name.starts_with(relation));
+        let mut by_name: BTreeMap<&str, Vec<(usize, &Finding)>> = BTreeMap::new();
+        for own in each {
+            let told = |finding: &&Finding| finding.verdict != Verdict::Undetermined && !of_common(&finding.name);
+            for finding in own.findings.iter().filter(told) {
+                by_name.entry(&finding.name).or_default().push((own.flight, finding));
+            }
+        }
+        for (name, of_flights) in by_name {
+            let such = if name == CONTROLS { shifted(&of_flights) } else { broken(&of_flights) };
+            odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
+            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
+        }
+        odd
+    }
+}
+
+/// Relations that nearly all flights read in the same other way: these are faults of the set.
+fn misread(each: &[Own], all: &Evidence) -> Vec<&'static str> {
+    let is_common = |(place, relation): &(usize, &Relation)| {
+        relation.other_reading().is_some_and(|reading| {
+            let agreeing = each.iter().filter(|own| own.evidence.relations[*place].prefers(reading)).count();
+            agreeing as f64 > MOST * each.len() as f64
+        })
+    };
+    all.relations.iter().enumerate().filter(is_common).map(|(_, relation)| relation.name).collect()
+}
+
+const CONTROLS: &str = "control_delay";
+
+/// A fault of some flights.
+pub(super) fn in_flights(name: &str, indices: &[usize], message: &str, flights: &[Flight]) -> Finding {
+    let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
+    let message = format!("in {} of {} flights ({}): {message}", indices.len(), flights.len(), named(&names));
+    Finding {
+        set: Some(left_out(&names)),
+        flights: names.into_iter().map(str::to_owned).collect(),
+        ..super::finding(name, Verdict::Fault, message, None)
+    }
+}
+
+/// Flights by what is wrong in them, where others keep the relation.
+fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
+    let (faulty, sound): (Vec<_>, Vec<_>) = of_flights.iter().partition(|(_, finding)| contradicts(finding));
+    let sound = sound.iter().filter(|(_, finding)| finding.verdict != Verdict::Fault).count();
+    if faulty.len() as f64 > MOST * (faulty.len() + sound) as f64 {
+        return Vec::new();
+    }
+    let mut kinds: BTreeMap<String, Vec<(usize, &Finding)>> = BTreeMap::new();
+    for (flight, finding) in faulty {
+        let kind = match finding.subject {
+            Subject::Timing => finding.measured.map_or("", |late| if late > 0.0 { "late" } else { "early" }),
+            Subject::Conventions | Subject::Excitation => finding.set.as_deref().unwrap_or(&finding.message),
+        };
+        kinds.entry(kind.to_owned()).or_default().push((flight, finding));
+    }
+    let told = |alike: Vec<(usize, &Finding)>| (alike.iter().map(|entry| entry.0).collect(), alike[0].1.message.clone());
+    kinds.into_values().map(told).collect()
+}
+
+/// Whether a flight by itself contradicts what is expected beyond doubt.
+fn contradicts(finding: &Finding) -> bool {
+    let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Verdict::Fault };
+    let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
+    match finding.subject {
+        Subject::Timing => finding.verdict == Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
+        Subject::Conventions | Subject::Excitation => finding.verdict == Verdict::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
+    }
+}
+
+/// Flights whose controls are recorded later or earlier than those of the others. When they act nobody knows beforehand, but not before they are
+/// given.
+fn shifted(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
+    let known: Vec<(usize, f64, [f64; 2])> =
+        of_flights.iter().filter_map(|(flight, finding)| Some((*flight, finding.measured?, finding.interval?))).collect();
+    let middle = |causal: bool| {
+        let such = known.iter().map(|entry| entry.1).filter(|delay_s| !causal || *delay_s > -0.5 * LATE_S);
+        let mut delays: Vec<f64> = such.collect();
+        delays.sort_unstable_by(f64::total_cmp);
+        delays.get(delays.len() / 2).copied()
+    };
+    let Some(usual) = middle(true).or_else(|| middle(false)) else { return Vec::new() };
+    let of = |sign: f64| -> Option<(Vec<usize>, String)> {
+        let is_such = |(_, value, [low, high]): &&(usize, f64, [f64; 2])| {
+            let near = if sign > 0.0 { value - WIDER * (value - low) } else { value + WIDER * (high - value) };
+            sign * (value - usual) > LATER_S && sign * (near - usual) > 0.5 * LATER_S
+        };
+        let such: Vec<(usize, f64)> = known.iter().filter(is_such).map(|entry| (entry.0, sign * (entry.1 - usual))).collect();
+        if such.is_empty() || such.len() as f64 > MOST * known.len() as f64 {
+            return None;
+        }
+        let by_ms = 1e3 * such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
+        let how = if sign > 0.0 { "earlier" } else { "later" };
+        let message = format!("the controls are recorded about {by_ms:.0} ms {how}, against what they do, than in the others");
+        Some((such.into_iter().map(|entry| entry.0).collect(), message))
+    };
+    [-1.0, 1.0].into_iter().filter_map(of).collect()
+}
+
+/// Whether gravity says that all lengths of the flight are in another unit: then every stream agrees with every other, and only it has another size.
+pub(super) fn lengths(coefficients: &[Finding]) -> Option<Finding> {
+    let of = |name: &str| {
+        let finding = coefficients.iter().find(|finding| finding.name == name)?;
+        finding.measured.zip(finding.interval)
+    };
+    let both = [of("gravity_x")?, of("gravity_y")?];
+    let is_near = |unit: f64| {
+        both.iter().all(|(value, [low, high])| {
+            let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
+            (value * unit).ln().abs() < NEAR_UNIT.ln() && (low > 1.0 + OFF || high < 1.0 - OFF)
+        })
+    };
+    let value = 0.5 * (both[0].0 + both[1].0);
+    let found = LENGTHS.into_iter().find(|(unit, ..)| is_near(*unit));
+    let mut finding = super::finding("lengths", Verdict::Ok, "gravity has the size that it has in metres".into(), None);
+    finding.measured = Some(value);
+    finding.expected = Some(1.0);
+    if let Some((_, name, unit)) = found {
+        finding.verdict = Verdict::Fault;
+        finding.message = format!("gravity has the size that it has where all lengths are in {name}");
+        finding.set = Some(format!("[units] position = \"{unit}\", velocity = \"{unit}/s\", acceleration = \"{unit}/s^2\""));
+    }
+    Some(finding)
+}
