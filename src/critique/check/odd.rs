@@ -10,7 +10,7 @@ use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A flight by itself is believed where twice its interval says so: there are many flights and many relations.
-const WIDER: f64 = 2.0;
+pub(super) const WIDER: f64 = 2.0;
 /// A gain that certainly differs from 1 by this much is that of another reading.
 const OFF: f64 = 0.2;
 /// Streams this much apart change verdicts: lags of rotor and servo are as long. s

@@ -7,7 +7,7 @@
 
 use super::finding;
 use super::increments::Motion;
-use super::odd::{MOST, in_flights};
+use super::odd::{MOST, WIDER, in_flights};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Verdict};
 use crate::flight::Flight;
@@ -78,7 +78,8 @@ impl Answers {
     }
 
     fn is_certain(&self, axis: usize, stick: usize) -> bool {
-        let [low, high] = self.gains[axis][stick].interval;
+        let Estimate { value, interval: [low, high] } = self.gains[axis][stick];
+        let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
         self.explained[axis] > EXPLAINED && (low > 0.0 || high < 0.0)
     }
 
@@ -231,20 +232,22 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Opt
     (!fewer.is_empty()).then(|| in_flights(&format!("sign_{name}"), &fewer, &message, flights))
 }
 
-/// A stick whose gain in some flights is a multiple of that in the others.
+/// A stick whose gain in some flights is a multiple of that in the others, and whose travel is that much smaller: what takes the gain away from a
+/// rotor, a vortex ring or stall, leaves the stick its travel.
 fn of_size(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Option<Finding> {
-    let certain: Vec<(usize, Estimate)> = known
+    let certain: Vec<(usize, Estimate, f64)> = known
         .iter()
         .filter(|(_, answers)| answers.is_certain(stick, stick))
-        .map(|(flight, answers)| (*flight, answers.gains[stick][stick]))
+        .map(|(flight, answers)| (*flight, answers.gains[stick][stick], answers.strength(stick, stick)))
         .collect();
     let size = median(certain.iter().map(|entry| entry.1.value.abs()).collect())?;
-    let beyond = |estimate: &Estimate| {
+    let strength = median(certain.iter().map(|entry| entry.2).collect())?;
+    let beyond = |(_, estimate, own): &&(usize, Estimate, f64)| {
         let [low, high] = estimate.interval.map(f64::abs);
-        low.min(high) > LARGEST_RATIO * size || low.max(high) * LARGEST_RATIO < size
+        let is_other = low.min(high) > LARGEST_RATIO * size || low.max(high) * LARGEST_RATIO < size;
+        is_other && (own / strength).ln().abs() < 0.5 * (estimate.value.abs() / size).ln().abs()
     };
-    let such: Vec<(usize, f64)> =
-        certain.iter().filter(|entry| beyond(&entry.1)).map(|entry| (entry.0, entry.1.value.abs() / size)).collect();
+    let such: Vec<(usize, f64)> = certain.iter().filter(beyond).map(|entry| (entry.0, entry.1.value.abs() / size)).collect();
     let ratio = median(such.iter().map(|entry| entry.1).collect())?;
     let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
     let name = STICKS[stick];
