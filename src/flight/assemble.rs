@@ -5,6 +5,7 @@
 use super::convert::{Columns, check_finite, convert, source};
 use super::derived::{Derived, derived};
 use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
+use super::late::in_step;
 use super::resample::Resampler;
 use super::schema::Schema;
 use super::source::Read;
@@ -128,11 +129,18 @@ fn of_part(
         Some(times) => time_s.partition_point(|&time| time < times[sample]).min(time_s.len().saturating_sub(1)),
         None => sample,
     };
+    let recorded = columns.get(Column::Vx).map_or(0, <[f64]>::len);
+    let whole = in_step(&mut columns, &schema.late, step_s, recorded);
+    if !schema.late.is_empty() {
+        let moved: Vec<String> = schema.late.iter().map(|(column, late_s)| format!("{} {late_s:.3} s", column.name())).collect();
+        done.common_notes.insert(format!("moved back in time, as dataset.toml says: {}", moved.join(", ")));
+    }
     let absent = fill_absent(&mut columns, schema, step_s, done);
     let targets = derive(&table, &mut columns, schema, step_s, done)?;
     let samples = columns.get(Column::Vx).map_or(0, <[f64]>::len);
 
-    let used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s))?;
+    let mut used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s))?;
+    used.iter_mut().enumerate().for_each(|(sample, used)| *used &= whole.contains(&sample));
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();

@@ -16,6 +16,7 @@ pub mod differentiate;
 pub mod guard;
 #[cfg(feature = "files")]
 mod hypotheses;
+mod late;
 #[cfg(feature = "files")]
 mod listing;
 mod local_polynomial;
@@ -301,7 +302,8 @@ impl DataSet {
         self.flights.iter().map(Flight::duration_s).sum()
     }
 
-    /// Leaves flights out, with a note that says why; names that no flight has are told too.
+    /// Leaves flights out, by their names with or without the manoeuvre before them, with a note that says why; names that no flight has are told
+    /// too.
     ///
     /// # Examples
     /// ```
@@ -316,10 +318,11 @@ impl DataSet {
     /// # }
     /// ```
     pub fn leave_out(&mut self, names: &[String], why: &str) {
+        let is_of = |flight: &Flight, name: &str| flight.name == name || flight.name.rsplit('/').next() == Some(name);
         let (known, unknown): (Vec<&String>, Vec<&String>) =
-            names.iter().partition(|name| self.flights.iter().any(|flight| flight.name == **name));
+            names.iter().partition(|name| self.flights.iter().any(|flight| is_of(flight, name)));
         let list = |names: &[&String]| names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
-        self.flights.retain(|flight| !known.contains(&&flight.name));
+        self.flights.retain(|flight| !known.iter().any(|name| is_of(flight, name)));
         if !known.is_empty() {
             self.notes.push(format!("left out, {why}: {}", list(&known)));
         }

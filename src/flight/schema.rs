@@ -11,6 +11,7 @@
 //! | `target_origin` | `"recorded"` (default) or `"derived"`: accelerations in the file that were computed from `v` and `w` |
 //! | `[columns]` | `vx = "v_nose"`, a column of the file, or a formula of its columns, or a list of which the first that the file can give is taken |
 //! | `[units]` | unit by column or group: `angles = "deg"`, `rates = "deg/s"`, `acceleration = "g"`, `vx = "ft/s"` |
+//! | `[late]` | seconds by which a group of `[units]`, or a column, comes later than the rest (negative: earlier): `angles = 0.04` |
 //! | `missing` | columns the logs lack: position, `yaw`, accelerations |
 //! | `use` | rows to use: a formula with a comparison, or a list that must all hold, in canonical and further columns and `height airspeed alpha beta g_x g_y g_z` |
 //! | `minimum_length_s` | pieces that `use` or gaps leave shorter than this are left out, with a note |
@@ -25,6 +26,7 @@
 
 use super::attitude::{Axes, QuaternionOrder};
 use super::bounds::RATES_HZ;
+use super::late::LARGEST_S;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
@@ -82,6 +84,8 @@ pub(super) struct Schema {
     pub columns: BTreeMap<String, Vec<String>>,
     /// Factor to SI by canonical name; 1 if absent.
     pub factors: BTreeMap<&'static str, f64>,
+    /// By how much a column comes later than the rest, s.
+    pub late: BTreeMap<Column, f64>,
     pub missing: Vec<Column>,
     pub rows: Vec<Formula>,
     pub minimum_length_s: f64,
@@ -110,6 +114,7 @@ impl Default for Schema {
             target_origin: Targets::Recorded,
             columns: BTreeMap::new(),
             factors: BTreeMap::new(),
+            late: BTreeMap::new(),
             missing: Vec::new(),
             rows: Vec::new(),
             minimum_length_s: 0.0,
@@ -194,6 +199,9 @@ impl Schema {
         }
         if let Some(units) = keys.section("units")? {
             schema.factors = factors(units)?;
+        }
+        if let Some(late) = keys.section("late")? {
+            schema.late = times(late)?;
         }
         for mut rule in keys.sections("repair")? {
             let columns = rule.texts("columns")?.unwrap_or_default();
@@ -280,6 +288,28 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
+}
+
+/// `[late]`: a group's word first, a single column's time over it.
+fn times(mut keys: Keys) -> Result<BTreeMap<Column, f64>> {
+    let mut late = BTreeMap::new();
+    for single in [false, true] {
+        for group in units::GROUPS {
+            let words: &[&'static str] = if single { group.columns } else { &[group.name] };
+            for &word in words {
+                let columns: &[&'static str] = if single { &[word] } else { group.columns };
+                let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
+                // Time and quaternions are no canonical columns; `finish` refuses them.
+                let Some(late_s) = (if columns.is_empty() { None } else { keys.number(word, -LARGEST_S)? }) else { continue };
+                if late_s > LARGEST_S {
+                    return Err(keys.fault(word, late_s.to_string(), format!("a time from -{LARGEST_S} to {LARGEST_S} s")));
+                }
+                late.extend(columns.into_iter().map(|column| (column, late_s)));
+            }
+        }
+    }
+    keys.finish()?;
+    Ok(late)
 }
 
 /// `[units]`: a group's word first, a single column's unit over it.

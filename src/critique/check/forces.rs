@@ -52,8 +52,8 @@ impl Forces {
             read("the velocity is written in inertial axes", "velocity = \"inertial\"", |i| rotate_back(&i.rotation, i.velocity), G),
             read("roll has the other sign", "[columns] roll = \"-roll\", with the file's name", V, |i| gravity_body(-i.angles[0], i.angles[1])),
             read("pitch has the other sign", "[columns] pitch = \"-pitch\", with the file's name", V, |i| gravity_body(i.angles[0], -i.angles[1])),
-            read("roll and pitch have the other sign, as when z points up or the attitude is that of the inertial frame seen from the body",
-                "axes = \"NWU/FLU\" if z points up; [columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" if the quaternion goes from inertial to body axes",
+            read("roll and pitch have the other sign: z points up (axes ENU/FLU, or NWU/FLU, which differ by the zero of the heading), or, if the rates do not fit either, the attitude is that of the inertial frame seen from the body",
+                "axes = \"ENU/FLU\"",
                 V, |i| gravity_body(-i.angles[0], -i.angles[1])),
             read("the angles are in degrees", "[units] angles = \"deg\"", V, |i| gravity_body(i.angles[0] * DEGREE, i.angles[1] * DEGREE)),
         ];

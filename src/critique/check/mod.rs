@@ -34,6 +34,8 @@ use sticks::Sticks;
 
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
+/// Relations whose readings say how a log is written.
+const RELATIONS: [&str; 4] = ["position_rate", "attitude_rate", "velocity_targets", "rate_targets"];
 /// Share of the samples that may exceed it: glitches and full deflections are no other scale.
 const RARE_SHARE: f64 = 0.01;
 
@@ -47,29 +49,46 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let quaternion = data.source.quaternion.map(other_order);
     let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
     let (each, sticks) = read(data, quaternion, step_s);
+    let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(cells::spikes(&data.flights)).collect();
+    let names: Vec<&String> =
+        poor.iter().filter(|finding| finding.verdict == Verdict::Fault).flat_map(|finding| &finding.flights).collect();
+    let unfit = |flight: usize| names.contains(&&data.flights[flight].name);
+    let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(|&flight| unfit(flight)).collect();
     let of = |except: &BTreeSet<usize>| {
         let mut evidence = Evidence::new(quaternion, step_s);
         each.iter().filter(|own| !except.contains(&own.flight)).for_each(|own| evidence.absorb(&own.evidence, 1));
         evidence
     };
-    let odd = Odd::new(&each, &of(&BTreeSet::new()), &data.flights);
-    let together = of(&odd.flights);
+    let all = of(&except);
+    let judged: Vec<&Own> = each.iter().filter(|own| !except.contains(&own.flight)).collect();
+    let misread = odd::is_misread(&judged, &all);
+    let odd = Odd::new(&judged, &all, &data.flights);
+    except.extend(&odd.flights);
+    let together = of(&except);
 
     let mut findings = vec![origin(&data.flights)];
-    findings.extend(streams::findings(&data.flights));
-    findings.extend(cells::spikes(&data.flights));
+    // A stream that is held is late by half of its rest: that is said already.
+    let is_held = poor.iter().any(|finding| finding.name.starts_with(streams::HELD));
+    findings.extend(poor);
     findings.extend(odd.findings);
-    findings.extend(sticks.findings(&data.flights, &odd.flights));
-    // What thrust does along z is known from the collective alone.
-    let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
     findings.extend(together.kinematics(0.0));
     findings.extend(together.forces.lateral());
+    if !misread {
+        findings.extend(sticks.findings(&data.flights, &except));
+    }
+    // What thrust does along z is known from the collective alone.
+    let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
     findings.extend(places(together.forces.coefficients(), unsure));
     findings.extend(plausibility(&data.flights));
-    let offsets = together.timing.offsets(0.0).into_iter();
-    // A stream that is held is late by half of its rest: that is said already.
-    let is_held = findings.iter().any(|finding| finding.name.starts_with(streams::HELD));
-    findings.extend(offsets.map(|finding| if is_held { finding } else { odd::heeded(finding) }));
+    if is_held {
+        findings.extend(together.timing.offsets(0.0));
+    } else {
+        findings.extend(odd::late_streams(&together.timing));
+        findings.extend(odd::late_controls(&together.timing));
+    }
+    if misread {
+        findings = findings.into_iter().map(symptom).collect();
+    }
     let (delay, control_delay) = together.timing.control_delay(model.map(|model| model.data.control_delay_s));
     findings.push(delay);
     let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
@@ -160,6 +179,17 @@ fn not_judged(finding: Finding) -> Finding {
     }
     let message = "not judged, since it rests on the sticks, and something is wrong with these".into();
     Finding { verdict: Verdict::Undetermined, message, set: None, ..finding }
+}
+
+/// What rests on a reading that is known to be wrong is not judged.
+fn symptom(finding: Finding) -> Finding {
+    let is_reading = RELATIONS.contains(&finding.name.as_str()) || finding.name == odd::LATERAL;
+    let is_known = ["frozen_", streams::HELD, "spikes_", "rounding_", "noise_"].iter().any(|start| finding.name.starts_with(start));
+    if is_reading || is_known || finding.verdict < Verdict::Warning {
+        return finding;
+    }
+    let message = "not judged before what is wrong above is mended".into();
+    Finding { verdict: Verdict::Undetermined, message, set: None, flights: Vec::new(), ..finding }
 }
 
 /// Where the accelerations come from.

@@ -5,6 +5,7 @@ use super::evidence::Evidence;
 use super::increments::{Motion, TOGETHER};
 use super::relations::Relation;
 use super::report::{Finding, Subject, Verdict};
+use super::timing::Timing;
 use super::{left_out, named};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
@@ -17,10 +18,12 @@ const OFF: f64 = 0.2;
 pub(super) const LATE_S: f64 = 0.03;
 /// Controls of a flight are late or early against those of the others from here on, s; estimates of a single flight scatter.
 const LATER_S: f64 = 0.05;
+/// A gain of a flight differs from that of the others from here on.
+const SCALED: f64 = 0.07;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
 const EXPLAINED: f64 = 0.5;
 /// Fall of the logarithm of the squared error that a shift of a stream has to bring in a single flight.
-const CONVINCING_FALL: f64 = 0.3;
+const CONVINCING_FALL: f64 = 1.0;
 /// Where more than this share of the flights breaks a relation, it is the set that does.
 pub(super) const MOST: f64 = 0.8;
 /// Coefficients of gravity agree with a unit of length to this factor.
@@ -43,6 +46,8 @@ impl Own {
         let mut findings = short.kinematics(EXPLAINED);
         findings.extend(short.timing.offsets(CONVINCING_FALL));
         findings.push(short.timing.control_delay(None).0);
+        findings.extend(short.timing.sticks());
+        findings.extend(short.forces.lateral());
         findings.extend(lengths(&short.forces.coefficients()));
         let mut evidence = Evidence::new(quaternion, step_s);
         // A block of usual length is longer than most manoeuvres.
@@ -51,13 +56,58 @@ impl Own {
     }
 }
 
-/// A shift between streams of all flights: where it is as long as the lags of an aircraft, these cannot be told from it.
-pub(super) fn heeded(finding: Finding) -> Finding {
-    if finding.verdict != Verdict::Warning || !contradicts(&finding) {
-        return finding;
+/// Shifts between streams of all flights: where one is as long as the lags of an aircraft, these cannot be told from it, and it is a fault. Of the two
+/// streams of each pair that one is late that explains most: the attitude where the rates are in step with their accelerations.
+pub(super) fn late_streams(timing: &Timing) -> Vec<Finding> {
+    let certain = timing.offsets(CONVINCING_FALL);
+    let is_late = |name: &str| certain.iter().find(|finding| finding.name == name).filter(|finding| contradicts(finding));
+    let late_s = |name: &str| is_late(name).and_then(|finding| finding.measured).unwrap_or(0.0);
+    let [rates, angular, linear, velocity] =
+        ["rates_offset", "angular_targets_offset", "targets_offset", "velocity_offset"].map(late_s);
+    let opposite = |one: f64, other: f64| one * other < 0.0 && (one + other).abs() < LATE_S;
+    let cause = |name: &str| match name {
+        "rates_offset" if opposite(rates, angular) => Some(("rates", rates)),
+        "rates_offset" => Some(("angles", -rates)),
+        "angular_targets_offset" if opposite(rates, angular) => None,
+        "angular_targets_offset" => Some(("angular_acceleration", angular)),
+        "targets_offset" if opposite(velocity, linear) => None,
+        "targets_offset" => Some(("acceleration", linear)),
+        // Of a turned velocity the attitude is a part.
+        _ if rates != 0.0 => None,
+        _ if opposite(velocity, linear) => Some(("velocity", velocity)),
+        _ => Some(("position", -velocity)),
+    };
+    let told = |finding: Finding| {
+        if is_late(&finding.name).is_none() {
+            return finding;
+        }
+        match cause(&finding.name) {
+            Some((stream, late_s)) => {
+                let how = if late_s > 0.0 { "late" } else { "early" };
+                let message = format!(
+                    "{}: {stream} {how} by {:.0} ms; a lag or delay that a search named could be this",
+                    finding.message,
+                    1e3 * late_s.abs()
+                );
+                Finding { verdict: Verdict::Fault, message, set: Some(format!("[late] {stream} = {late_s:.3}")), ..finding }
+            }
+            None => finding,
+        }
+    };
+    timing.offsets(0.0).into_iter().map(told).collect()
+}
+
+/// Controls of all flights that are recorded after they act, where the axes are explained by them: a loop that is closed fast does not explain them.
+pub(super) fn late_controls(timing: &Timing) -> Vec<Finding> {
+    let sticks = timing.sticks();
+    let late: Vec<&Finding> =
+        sticks.iter().filter(|finding| finding.measured.is_some_and(|at_s| at_s < 0.0) && contradicts(finding)).collect();
+    if late.len() < 2 || late.len() < sticks.len() {
+        return late.into_iter().map(|finding| Finding { verdict: Verdict::Fault, ..finding.clone() }).collect();
     }
-    let message = format!("{}; a lag or delay that a search named could be this", finding.message);
-    Finding { verdict: Verdict::Fault, message, ..finding }
+    let mean_s = -late.iter().filter_map(|finding| finding.measured).sum::<f64>() / late.len() as f64;
+    let message = format!("the controls come late: they are recorded {:.0} ms after they act", 1e3 * mean_s);
+    vec![super::finding("controls_late", Verdict::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
 }
 
 /// What breaks with the others, and in which flights.
@@ -67,20 +117,29 @@ pub(super) struct Odd {
 }
 
 impl Odd {
-    /// `all` is what all flights say together.
-    pub fn new(each: &[Own], all: &Evidence, flights: &[Flight]) -> Self {
+    /// `all` is what all flights say together. What they misread alike comes first: before that is mended single flights are not judged.
+    pub fn new(each: &[&Own], all: &Evidence, flights: &[Flight]) -> Self {
         let mut odd = Self { findings: Vec::new(), flights: BTreeSet::new() };
-        let common = misread(each, all);
-        let of_common = |name: &str| common.iter().any(|relation| name.starts_with(relation));
+        if is_misread(each, all) {
+            return odd;
+        }
         let mut by_name: BTreeMap<&str, Vec<(usize, &Finding)>> = BTreeMap::new();
         for own in each {
-            let told = |finding: &&Finding| finding.verdict != Verdict::Undetermined && !of_common(&finding.name);
-            for finding in own.findings.iter().filter(told) {
+            for finding in own.findings.iter().filter(|finding| finding.verdict != Verdict::Undetermined) {
                 by_name.entry(&finding.name).or_default().push((own.flight, finding));
             }
         }
-        for (name, of_flights) in by_name {
-            let such = if name == CONTROLS { shifted(&of_flights) } else { broken(&of_flights) };
+        for (name, mut of_flights) in by_name {
+            // A flight all of whose controls are late says nothing more of each.
+            of_flights.retain(|(flight, _)| !name.starts_with(STICK) || !odd.flights.contains(flight));
+            let such = match name {
+                CONTROLS => shifted(&of_flights, "the controls"),
+                name if name.starts_with(STICK) => shifted(&of_flights, &name[STICK.len()..]),
+                name if RELATIONS.iter().any(|relation| name.starts_with(relation)) => {
+                    [broken(&of_flights), scaled(&of_flights)].concat()
+                }
+                _ => broken(&of_flights),
+            };
             odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
             odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
         }
@@ -88,18 +147,24 @@ impl Odd {
     }
 }
 
-/// Relations that nearly all flights read in the same other way: these are faults of the set.
-fn misread(each: &[Own], all: &Evidence) -> Vec<&'static str> {
-    let is_common = |(place, relation): &(usize, &Relation)| {
-        relation.other_reading().is_some_and(|reading| {
-            let agreeing = each.iter().filter(|own| own.evidence.relations[*place].prefers(reading)).count();
-            agreeing as f64 > MOST * each.len() as f64
-        })
+/// Whether nearly all flights read a relation, or the place of gravity, in the same other way: that is a fault of the set.
+pub(super) fn is_misread(each: &[&Own], all: &Evidence) -> bool {
+    let most = |count: usize| count as f64 > MOST * each.len() as f64;
+    let mut relations = all.relations.iter().enumerate();
+    let is_common = |(place, relation): (usize, &Relation)| {
+        let agree = |reading| each.iter().filter(|own| own.evidence.relations[place].prefers(reading)).count();
+        relation.other_reading().is_some_and(|reading| most(agree(reading)))
     };
-    all.relations.iter().enumerate().filter(is_common).map(|(_, relation)| relation.name).collect()
+    let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Verdict::Fault;
+    let is_turned = all.forces.lateral().is_some_and(|finding| turned(&finding));
+    relations.any(is_common) || is_turned && most(each.iter().filter(|own| own.findings.iter().any(turned)).count())
 }
 
 const CONTROLS: &str = "control_delay";
+/// How findings of single sticks begin, and those of gains.
+const STICK: &str = "delay_";
+const RELATIONS: [&str; 4] = ["position_rate_", "attitude_rate_", "velocity_targets_", "rate_targets_"];
+pub(super) const LATERAL: &str = "lateral_force";
 
 /// A fault of some flights.
 pub(super) fn in_flights(name: &str, indices: &[usize], message: &str, flights: &[Flight]) -> Finding {
@@ -131,6 +196,32 @@ fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
     kinds.into_values().map(told).collect()
 }
 
+/// Flights in which the gain of an axis is another than in the most, though it may be near 1.
+fn scaled(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
+    let known: Vec<(usize, f64, [f64; 2])> = of_flights
+        .iter()
+        .filter(|(_, finding)| !contradicts(finding))
+        .filter_map(|(flight, finding)| Some((*flight, finding.measured?, finding.interval?)))
+        .collect();
+    let mut gains: Vec<f64> = known.iter().map(|entry| entry.1).collect();
+    gains.sort_unstable_by(f64::total_cmp);
+    // Mechanics asks for 1: of two halves that one is right that is nearer to it.
+    let quartiles = [gains.len() / 4, gains.len() / 2, 3 * gains.len() / 4].map(|place| gains.get(place).copied());
+    let usual = quartiles.into_iter().flatten().min_by(|one, other| (one - 1.0).abs().total_cmp(&(other - 1.0).abs()));
+    let Some(usual) = usual else { return Vec::new() };
+    let is_such = |(_, value, [low, high]): &&(usize, f64, [f64; 2])| {
+        let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
+        (value - usual).abs() > SCALED && (low > usual + 0.5 * SCALED || high < usual - 0.5 * SCALED)
+    };
+    let such: Vec<(usize, f64)> = known.iter().filter(is_such).map(|entry| (entry.0, entry.1)).collect();
+    if such.is_empty() || such.len() as f64 > MOST * known.len() as f64 {
+        return Vec::new();
+    }
+    let mean = such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
+    let message = format!("the gain of this axis is {mean:.2}, and {usual:.2} in the others: one of its streams is scaled there");
+    vec![(such.into_iter().map(|entry| entry.0).collect(), message)]
+}
+
 /// Whether a flight by itself contradicts what is expected beyond doubt.
 fn contradicts(finding: &Finding) -> bool {
     let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Verdict::Fault };
@@ -143,7 +234,7 @@ fn contradicts(finding: &Finding) -> bool {
 
 /// Flights whose controls are recorded later or earlier than those of the others. When they act nobody knows beforehand, but not before they are
 /// given.
-fn shifted(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
+fn shifted(of_flights: &[(usize, &Finding)], what: &str) -> Vec<(Vec<usize>, String)> {
     let known: Vec<(usize, f64, [f64; 2])> =
         of_flights.iter().filter_map(|(flight, finding)| Some((*flight, finding.measured?, finding.interval?))).collect();
     let middle = |causal: bool| {
@@ -163,8 +254,9 @@ fn shifted(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
             return None;
         }
         let by_ms = 1e3 * such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
-        let how = if sign > 0.0 { "earlier" } else { "later" };
-        let message = format!("the controls are recorded about {by_ms:.0} ms {how}, against what they do, than in the others");
+        let how = if sign > 0.0 { "early" } else { "late" };
+        let message =
+            format!("{what} come{} {how} by about {by_ms:.0} ms against the others", if what.contains(' ') { "" } else { "s" });
         Some((such.into_iter().map(|entry| entry.0).collect(), message))
     };
     [-1.0, 1.0].into_iter().filter_map(of).collect()

@@ -41,6 +41,8 @@ pub(super) struct Relation {
 const CONVINCING_SHARE: f64 = 0.5;
 /// Share of the change that the nominal reading has to leave unexplained before another is considered at all.
 const MATERIAL_SHARE: f64 = 0.02;
+/// A reading that leaves more than this of the changes unexplained is none.
+const LARGEST_SHARE: f64 = 0.25;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
@@ -50,6 +52,13 @@ const REORDERED: &str = "the quaternion's scalar stands at its other end";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
+
+const EXCHANGED: &str = "roll and pitch are exchanged";
+const ROLL_PITCH: &str = "[columns] roll = \"pitch\", pitch = \"roll\", with the file's names";
+
+const fn exchanged([roll, pitch, yaw]: Vector) -> Vector {
+    [pitch, roll, yaw]
+}
 
 fn stack(first: Vector) -> Stack {
     let mut stack = [0.0; 9];
@@ -114,6 +123,7 @@ impl Relation {
             read("pitch has the other sign", PITCH_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.velocity))),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.velocity))),
             read("the angles are in degrees", ANGLES_DEGREES, at, |i| stack(rotate(&turned(i.angles.map(|angle| angle * DEGREE)), i.velocity))),
+            read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(exchanged(i.angles)), i.velocity))),
         ], order.into_iter().collect()].concat())
     }
 
@@ -135,6 +145,7 @@ impl Relation {
                 read("roll has the other sign", ROLL_SIGN, |i| stack(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2], i.rates))),
                 read("pitch has the other sign", PITCH_SIGN, |i| stack(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2], i.rates))),
                 read("the rates are in degrees a second", "[units] rates = \"deg/s\"", DOWN, |i| stack(cross(i.rotation[2], i.rates.map(|rate| rate * DEGREE)))),
+                read(EXCHANGED, ROLL_PITCH, |i| stack(turned(exchanged(i.angles))[2]), |i| stack(cross(turned(exchanged(i.angles))[2], i.rates))),
                 read("the angles are in degrees", ANGLES_DEGREES, |i| stack(turned(i.angles.map(|angle| angle * DEGREE))[2]), |i| stack(cross(turned(i.angles.map(|angle| angle * DEGREE))[2], i.rates))),
             ]);
         }
@@ -153,6 +164,7 @@ impl Relation {
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
             read("the rates are in degrees a second", "[units] rates = \"deg/s\"", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates.map(|rate| rate * DEGREE))),
             read("the angles are in degrees", ANGLES_DEGREES, |i| axes(&turned(i.angles.map(|angle| angle * DEGREE))), |i| turning(&turned(i.angles.map(|angle| angle * DEGREE)), i.rates)),
+            read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(exchanged(i.angles))), |i| turning(&turned(exchanged(i.angles)), i.rates)),
         ], order.into_iter().collect()].concat())
     }
 
@@ -175,6 +187,7 @@ impl Relation {
             read("the targets are in units of g", "[units] acceleration = \"g\"", |i| stack(i.linear_target.map(|value| GRAVITY_M_S2 * value))),
             read("the targets are specific force in units of g", "targets = \"specific_force\" and [units] acceleration = \"g\"", |i| without_turning(add(i.linear_target.map(|value| GRAVITY_M_S2 * value), i.gravity), i)),
             read("the targets are nose-port-up while the velocity is not", "[columns] vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(scaled(i.linear_target, FLIP))),
+            Hypothesis { says: "the velocity is written in inertial axes", set: "velocity = \"inertial\"", state: |i| stack(rotate_back(&i.rotation, i.velocity)), rate: |i| stack(i.linear_target) },
             read("the targets have the other sign", "[columns] vx_dot = \"-vx_dot\", vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(i.linear_target.map(|value| -value))),
         ])
     }
@@ -223,7 +236,7 @@ impl Relation {
         let nominal = self.share(0);
         let best = (1..self.hypotheses.len()).min_by(|a, b| self.share(*a).total_cmp(&self.share(*b)))?;
         // One that explains little itself only leaves out what is wrong.
-        let bar = POOR_SHARE.min(CONVINCING_SHARE * nominal);
+        let bar = LARGEST_SHARE.min(CONVINCING_SHARE * nominal);
         (nominal > MATERIAL_SHARE && self.share(best) < bar && self.consistent(best)).then_some(best)
     }
 

@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 
 /// The accelerations by which sticks are told, and the stick that moves each: the conventions of this program.
 const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
-const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
+pub(super) const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 
 /// Place of the first stick among the columns, and of the 1.
 const FIRST: usize = 1;
@@ -31,7 +31,7 @@ const STILL: f64 = 1e-3;
 const MOVING: f64 = 0.5;
 /// An axis tells of sticks where state and sticks explain this share of its changes: in a loop that is closed fast a stick answers to what moves the
 /// axis, and its gain is no gain.
-const EXPLAINED: f64 = 0.5;
+pub(super) const EXPLAINED: f64 = 0.5;
 /// Gains of one aircraft differ by less than this factor from flight to flight: square of the rotor speed, weight, density.
 const LARGEST_RATIO: f64 = 3.0;
 
@@ -277,7 +277,13 @@ fn joined(names: &[&str]) -> String {
     }
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied()
+}
+
+/// The lower quartile: what is usual where half of the flights may be faulty upwards.
+pub(super) fn lower_quartile(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values.get(values.len() / 4).copied()
 }

@@ -1,10 +1,11 @@
 //! Streams that hold less than the log they stand in: a value frozen for seconds, one held from each sample of a slower stream to the next, one
-//! rounded coarsely. All are seen in a column by itself, without physics.
+//! rounded coarsely, one with more noise in some flights than in the others. All are seen in a column by itself, without physics.
 
-use super::odd::in_flights;
+use super::odd::{MOST, in_flights};
 use super::report::{Finding, Verdict};
 use super::{finding, of_all};
 use crate::flight::{Column, Flight};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 /// A column that rests this long, s …
@@ -15,16 +16,18 @@ const UNUSUAL: usize = 20;
 const REGULAR: f64 = 0.9;
 /// Held this long, s, a stream that the physics reads is late by as much as the lags of an aircraft.
 const LONG_S: f64 = 0.05;
-/// Rests longer than this many samples are counted as one kind.
-const LONGEST: usize = 4096;
-/// Values that the grain of a column is taken from, at most.
-const LOOKED_AT: usize = 20_000;
+/// Values that the grain of a flight's column is taken from, at most.
+const LOOKED_AT: usize = 4_000;
 /// So many samples to each value that occurs, where a column is rounded.
 const PER_VALUE: usize = 10;
 /// Rounding by this share of the variance of a column is worth a word …
-const NOTICED: f64 = 1e-3;
+const NOTICED: f64 = 3e-4;
 /// … and by this share makes effects of its own.
-const COARSE: f64 = 1e-2;
+const COARSE: f64 = 3e-3;
+/// Noise is another in some flights if it is so many times that of the others …
+const NOISIER: f64 = 5.0;
+/// … and this share of what the column does.
+const LEAST_NOISE: f64 = 0.03;
 
 /// How findings of held streams begin.
 pub(super) const HELD: &str = "held_";
@@ -69,88 +72,118 @@ const DRIVING: [Column; 13] = [
     Column::U4,
 ];
 
-/// Frozen, held and rounded columns.
+/// So many of them are measured: what a stick does need not be smooth.
+const STATES: usize = 9;
+
+/// Frozen, held, rounded and noisy columns.
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let present = |column: &Column| flights.iter().all(|flight| !flight.absent.contains(column));
-    let grains: Vec<(Column, Option<f64>)> =
-        DRIVING.into_iter().filter(present).map(|column| (column, grain(flights, column))).collect();
-    let is_rounded = |column: Column| grains.iter().any(|entry| entry.0 == column && entry.1.is_some());
+    let grains: Vec<(Column, Grains)> =
+        DRIVING.into_iter().filter(present).map(|column| (column, Grains::of(flights, column))).collect();
+    let is_rounded = |column: Column| grains.iter().any(|entry| entry.0 == column && entry.1.steps.iter().any(Option::is_some));
     let mut findings = Vec::new();
-    let mut held: Vec<(f64, Vec<Column>)> = Vec::new();
+    let mut held: Vec<(Hold, Vec<Column>)> = Vec::new();
     for column in MEASURED.into_iter().filter(present) {
         let rests = Rests::of(flights, column);
         findings.extend(rests.frozen(flights, column));
-        let Some(hold_s) = rests.held(flights).filter(|_| !is_rounded(column)) else { continue };
-        match held.iter_mut().find(|(other, _)| *other == hold_s) {
+        let Some(hold) = rests.held(flights).filter(|_| !is_rounded(column)) else { continue };
+        match held.iter_mut().find(|(other, _)| *other == hold) {
             Some((_, columns)) => columns.push(column),
-            None => held.push((hold_s, vec![column])),
+            None => held.push((hold, vec![column])),
         }
     }
-    findings.extend(held.into_iter().map(|(hold_s, columns)| of_hold(hold_s, &columns)));
-    findings.extend(grains.into_iter().filter_map(|(column, grain)| of_grain(flights, column, grain?)));
+    findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
+    findings.extend(grains.into_iter().filter_map(|(column, grains)| grains.finding(flights, column)));
+    findings.extend(DRIVING.into_iter().take(STATES).filter(present).filter_map(|column| noise(flights, column)));
     findings
 }
 
-/// How long a column keeps a value: how often for each number of samples, and the longest time in each flight.
+/// How long a column keeps a value in each flight: how often for each number of samples, and the longest time.
 struct Rests {
-    counts: Vec<usize>,
+    counts: Vec<BTreeMap<usize, usize>>,
     longest: Vec<Range<usize>>,
+}
+
+/// A stream that is held for so long in these flights; in all of them if there are none.
+#[derive(PartialEq)]
+struct Hold {
+    seconds: f64,
+    flights: Vec<usize>,
 }
 
 impl Rests {
     fn of(flights: &[Flight], column: Column) -> Self {
-        let mut counts = vec![0; LONGEST + 1];
-        let longest = flights.iter().map(|flight| {
-            let mut longest = 0..0;
-            let mut start = 0;
+        let of_flight = |flight: &Flight| {
+            let mut counts = BTreeMap::new();
+            let (mut longest, mut start) = (0..0, 0);
             for rest in flight.column(column).chunk_by(|one, next| one == next) {
-                counts[rest.len().min(LONGEST)] += 1;
+                *counts.entry(rest.len()).or_insert(0) += 1;
                 if rest.len() > longest.len() {
                     longest = start..start + rest.len();
                 }
                 start += rest.len();
             }
             flight.rest();
-            longest
-        });
-        let longest = longest.collect();
+            (counts, longest)
+        };
+        let (counts, longest) = flights.iter().map(of_flight).unzip();
         Self { counts, longest }
     }
 
     /// The rest to which half of all samples belong at most.
     fn usual(&self) -> usize {
-        let samples: usize = self.counts.iter().enumerate().map(|(length, count)| length * count).sum();
+        let mut all: BTreeMap<usize, usize> = BTreeMap::new();
+        self.counts.iter().flatten().for_each(|(length, count)| *all.entry(*length).or_default() += length * count);
+        let samples: usize = all.values().sum();
         let mut sum = 0;
-        let below = self.counts.iter().enumerate().take_while(|(length, count)| {
-            sum += length * *count;
-            2 * sum < samples
+        let reached = all.iter().find(|(_, samples_of)| {
+            sum += **samples_of;
+            2 * sum >= samples
         });
-        below.count()
+        reached.map_or(1, |(length, _)| *length)
     }
 
     fn frozen(&self, flights: &[Flight], column: Column) -> Option<Finding> {
         let usual = self.usual();
         let is_frozen = |(index, rest): &(usize, &Range<usize>)| {
             let flight = &flights[*index];
-            let lasts = rest.len() as f64 * flight.step_s >= FROZEN_S && rest.len() >= UNUSUAL * usual;
-            let frozen = lasts && others_move(flight, column, rest);
+            let is_unusual = rest.len() >= UNUSUAL * usual || rest.len() == flight.len();
+            let frozen = rest.len() as f64 * flight.step_s >= FROZEN_S && is_unusual && others_move(flight, column, rest);
             flight.rest();
             frozen
         };
         let such: Vec<usize> = self.longest.iter().enumerate().filter(is_frozen).map(|entry| entry.0).collect();
         let longest = such.iter().map(|&index| self.longest[index].len() as f64 * flights[index].step_s).fold(0.0, f64::max);
         let name = column.name();
-        let message = format!("{name} keeps one value for up to {longest:.1} s while the rest moves: it was not recorded there");
-        (!such.is_empty()).then(|| in_flights(&format!("frozen_{name}"), &such, &message, flights))
+        let message = format!(
+            "{name} is frozen: it keeps one value for up to {longest:.1} s while the rest moves, as where it was not recorded"
+        );
+        let is_set = such.len() as f64 > MOST * flights.len() as f64;
+        let missing = format!("missing = [{name:?}]");
+        let set = (POSITION.contains(&column) || column == Column::Yaw).then_some(missing.as_str());
+        match such.as_slice() {
+            [] => None,
+            _ if is_set => Some(finding(&format!("frozen_{name}"), Verdict::Fault, message, set)),
+            some => Some(in_flights(&format!("frozen_{name}"), some, &message, flights)),
+        }
     }
 
-    /// Time for which each value is held, s, if the column comes from a slower stream.
-    fn held(&self, flights: &[Flight]) -> Option<f64> {
-        let (hold, _) = self.counts.iter().enumerate().max_by_key(|(_, count)| **count)?;
-        let rests: usize = self.counts.iter().sum();
-        let regular: usize = self.counts.iter().step_by(hold.max(1)).sum();
-        let step_s = flights.first()?.step_s;
-        (hold >= 2 && hold < LONGEST && regular as f64 >= REGULAR * rests as f64).then_some(hold as f64 * step_s)
+    /// Time for which each value is held, if the column comes from a slower stream.
+    fn held(&self, flights: &[Flight]) -> Option<Hold> {
+        let of_flight = |counts: &BTreeMap<usize, usize>| {
+            let (&hold, _) = counts.iter().max_by_key(|(_, count)| **count)?;
+            let rests: usize = counts.values().sum();
+            let regular: usize = counts.iter().filter(|(length, _)| **length % hold == 0).map(|entry| entry.1).sum();
+            // One that never changes is frozen, or not there.
+            (hold >= 2 && rests > 2 && regular as f64 >= REGULAR * rests as f64).then_some(hold)
+        };
+        let each: Vec<(usize, usize)> =
+            self.counts.iter().enumerate().filter_map(|(index, counts)| Some((index, of_flight(counts)?))).collect();
+        let hold = super::sticks::median(each.iter().map(|entry| entry.1 as f64).collect())?;
+        let such: Vec<usize> = each.iter().filter(|entry| entry.1 as f64 == hold).map(|entry| entry.0).collect();
+        let seconds = hold * flights[*such.first()?].step_s;
+        let is_set = such.len() as f64 > MOST * flights.len() as f64;
+        Some(Hold { seconds, flights: if is_set { Vec::new() } else { such } })
     }
 }
 
@@ -165,24 +198,65 @@ fn others_move(flight: &Flight, column: Column, samples: &Range<usize>) -> bool 
     moving.len() > resting.len()
 }
 
-fn of_hold(hold_s: f64, columns: &[Column]) -> Finding {
+fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Finding> {
     let names: Vec<&str> = columns.iter().map(|column| column.name()).collect();
-    let matters = columns.iter().any(|column| !POSITION.contains(column));
-    let verdict = if matters && hold_s > LONG_S { Verdict::Fault } else { Verdict::Warning };
+    let matters = columns.iter().any(|column| !POSITION.contains(column)) && hold.seconds > LONG_S;
+    let (name, rate_hz) = (format!("{HELD}{}", names[0]), 1.0 / hold.seconds);
     let message = format!(
-        "{} come at {:.3} Hz and are held in between: half of {:.0} ms late on the average",
+        "{} come at {rate_hz:.3} Hz and are held in between: half of {:.0} ms late on the average",
         names.join(", "),
-        1.0 / hold_s,
-        1e3 * hold_s
+        1e3 * hold.seconds
     );
-    finding(&format!("{HELD}{}", names[0]), verdict, message, Some(&format!("resample_hz = {:.3}", 1.0 / hold_s)))
+    match hold.flights.as_slice() {
+        [] => {
+            let verdict = if matters { Verdict::Fault } else { Verdict::Warning };
+            Some(finding(&name, verdict, message, Some(&format!("resample_hz = {rate_hz:.3}"))))
+        }
+        some => matters.then(|| in_flights(&name, some, &message, flights)),
+    }
 }
 
-/// The step to which a column is rounded.
-fn grain(flights: &[Flight], column: Column) -> Option<f64> {
-    let samples: usize = flights.iter().map(Flight::len).sum();
-    let every = samples.div_ceil(LOOKED_AT).max(1);
-    let mut values: Vec<f64> = of_all(flights, column).step_by(every).map(|(value, _)| value).collect();
+/// The step to which a column is rounded, in each flight where it is.
+struct Grains {
+    steps: Vec<Option<f64>>,
+}
+
+impl Grains {
+    fn of(flights: &[Flight], column: Column) -> Self {
+        let of_flight = |flight: &Flight| {
+            let every = flight.len().div_ceil(LOOKED_AT).max(1);
+            let values = flight.column(column).iter().copied().step_by(every).collect();
+            flight.rest();
+            grain(values)
+        };
+        Self { steps: flights.iter().map(of_flight).collect() }
+    }
+
+    fn finding(&self, flights: &[Flight], column: Column) -> Option<Finding> {
+        let variance = variance(flights, column);
+        // An error that is as likely anywhere within a step has a twelfth of its square as variance.
+        let share = |step: f64| step * step / 12.0 / variance;
+        let noticed = |(index, step): (usize, &Option<f64>)| step.filter(|step| share(*step) > NOTICED).map(|step| (index, step));
+        let such: Vec<(usize, f64)> = self.steps.iter().enumerate().filter_map(noticed).collect();
+        let step = super::sticks::median(such.iter().map(|entry| entry.1).collect())?;
+        let name = column.name();
+        let message = format!(
+            "{name} is rounded to {step:.3}, {:.1} % of its variance: what it moves comes out too small by about that, and the rounding can look \
+             like an effect of that size",
+            100.0 * share(step)
+        );
+        let is_coarse = share(step) > COARSE && share(step).is_finite();
+        if such.len() as f64 > MOST * flights.len() as f64 {
+            let verdict = if is_coarse { Verdict::Fault } else { Verdict::Warning };
+            return Some(finding(&format!("rounding_{name}"), verdict, message, None));
+        }
+        let indices: Vec<usize> = such.into_iter().map(|entry| entry.0).collect();
+        is_coarse.then(|| in_flights(&format!("rounding_{name}"), &indices, &message, flights))
+    }
+}
+
+/// The step that all values are whole multiples apart by, if they are.
+fn grain(mut values: Vec<f64>) -> Option<f64> {
     let looked_at = values.len();
     values.sort_unstable_by(f64::total_cmp);
     let range = values.last()? - values.first()?;
@@ -193,25 +267,45 @@ fn grain(flights: &[Flight], column: Column) -> Option<f64> {
     }
     let gaps = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let grain = gaps().fold(f64::INFINITY, f64::min);
-    let is_whole = |gap: f64| (gap / grain - (gap / grain).round()).abs() < 0.02 * (gap / grain).round();
+    let is_whole = |gap: f64| (gap / grain - (gap / grain).round()).abs() < 0.02;
     gaps().all(is_whole).then_some(grain)
 }
 
-fn of_grain(flights: &[Flight], column: Column, grain: f64) -> Option<Finding> {
+fn variance(flights: &[Flight], column: Column) -> f64 {
     let (count, sum, square) = of_all(flights, column)
         .fold((0.0, 0.0, 0.0), |(count, sum, square), (value, _)| (count + 1.0, sum + value, square + value * value));
-    let variance: f64 = square / count - (sum / count) * (sum / count);
-    // An error that is as likely anywhere within a step has a twelfth of its square as variance.
-    let share = grain * grain / 12.0 / variance;
-    if !(share > NOTICED && share.is_finite()) {
-        return None;
-    }
+    square / count - (sum / count) * (sum / count)
+}
+
+/// Flights in which a column has much more white noise than in the others.
+fn noise(flights: &[Flight], column: Column) -> Option<Finding> {
+    let each: Vec<f64> = flights.iter().map(|flight| noise_of(flight, column)).collect();
+    let usual = super::sticks::lower_quartile(each.clone())?;
+    let least = (NOISIER * usual).max(LEAST_NOISE * variance(flights, column).sqrt());
+    // In other units the noise is another, too, but no other share.
+    let share = |index: usize| each[index] / variance(&flights[index..=index], column).sqrt();
+    let usual_share = super::sticks::lower_quartile((0..each.len()).map(share).collect())?;
+    let such: Vec<usize> =
+        (0..each.len()).filter(|&index| each[index] > least && share(index) > 0.5 * NOISIER * usual_share).collect();
+    let size = super::sticks::median(such.iter().map(|&index| each[index]).collect())?;
     let name = column.name();
     let message = format!(
-        "{name} is rounded to {grain:.3}, {:.1} % of its variance: what it moves comes out too small by about that, and the rounding can look \
-         like an effect of that size",
-        100.0 * share
+        "{name} has noise of {size:.3} {} (rms), where the others have {usual:.3}: what it moves comes out too small",
+        column.unit()
     );
-    let verdict = if share > COARSE { Verdict::Fault } else { Verdict::Warning };
-    Some(finding(&format!("rounding_{name}"), verdict, message, None))
+    (such.len() as f64 <= MOST * flights.len() as f64).then(|| in_flights(&format!("noise_{name}"), &such, &message, flights))
+}
+
+/// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there.
+fn noise_of(flight: &Flight, column: Column) -> f64 {
+    let second = (1.0 / flight.step_s).round().max(8.0) as usize;
+    let of_second = |values: &[f64]| {
+        let third = values.windows(4).map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]);
+        // Coefficients 1, 3, 3, 1: their squares add up to 20.
+        (third.map(|difference| difference * difference).sum::<f64>() / (values.len() - 3) as f64 / 20.0).sqrt()
+    };
+    let mut sizes: Vec<f64> = flight.column(column).chunks_exact(second).map(of_second).collect();
+    flight.rest();
+    sizes.sort_unstable_by(f64::total_cmp);
+    sizes.get(sizes.len() / 10).copied().unwrap_or(0.0)
 }

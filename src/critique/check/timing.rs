@@ -7,6 +7,7 @@
 use super::increments::Motion;
 use super::regression::BlockRegression;
 use super::report::{Finding, Subject, Verdict};
+use super::sticks::{EXPLAINED, STICKS};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
 use crate::student::quantile_975;
@@ -97,8 +98,8 @@ struct Pair {
     name: &'static str,
     late: &'static str,
     early: &'static str,
-    /// Columns of the state, and of its rate.
-    columns: [&'static str; 2],
+    /// The second stream, as `[late]` of the description calls it.
+    second: &'static str,
     applies: fn(&Motion) -> bool,
     /// Change of the state less its predicted change, given the piece and the shift of the other stream.
     error: fn(&Motion, &std::ops::Range<usize>, isize) -> f64,
@@ -117,7 +118,7 @@ const PAIRS: [Pair; 4] = [
         name: "velocity_offset",
         late: "velocity and attitude come later than position",
         early: "velocity and attitude come earlier than position",
-        columns: ["x, y and z", "roll, pitch, yaw, vx, vy and vz"],
+        second: "velocity",
         applies: |motion| motion.position && motion.heading,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -129,7 +130,7 @@ const PAIRS: [Pair; 4] = [
         name: "rates_offset",
         late: "the rates come later than the attitude",
         early: "the rates come earlier than the attitude",
-        columns: ["roll, pitch and yaw (or q1 to q4)", "wx, wy and wz"],
+        second: "rates",
         applies: |_| true,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -145,7 +146,7 @@ const PAIRS: [Pair; 4] = [
         name: "targets_offset",
         late: "the targets come later than the velocity",
         early: "the targets come earlier than the velocity",
-        columns: ["vx, vy and vz", "vx_dot, vy_dot and vz_dot"],
+        second: "acceleration",
         applies: |motion| motion.recorded,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -157,7 +158,7 @@ const PAIRS: [Pair; 4] = [
         name: "angular_targets_offset",
         late: "the angular targets come later than the rates",
         early: "the angular targets come earlier than the rates",
-        columns: ["wx, wy and wz", "wx_dot, wy_dot and wz_dot"],
+        second: "angular_acceleration",
         applies: |motion| motion.recorded,
         error: |motion, piece, shift| {
             let at = |k: usize| &motion.instants[k];
@@ -257,6 +258,32 @@ impl Timing {
             .collect()
     }
 
+    /// How late each stick acts by itself, where its axis is explained by it.
+    pub fn sticks(&self) -> Vec<Finding> {
+        let of = |(stick, delays): (usize, &Vec<BlockRegression<3>>)| {
+            let errors: Vec<Vec<f64>> = delays.iter().map(BlockRegression::errors).collect::<Option<_>>()?;
+            let profile = Profile { shifts: self.delays.clone(), errors: vec![errors], grid: self.grid as f64 };
+            let minimum = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH)?;
+            let nearest = self.delays.iter().position(|delay| *delay as f64 >= minimum.at.round())?;
+            delays[nearest].explained().filter(|share| *share > EXPLAINED)?;
+            let name = STICKS[stick];
+            let at_s = minimum.at * self.step_s;
+            Some(Finding {
+                name: format!("delay_{name}"),
+                subject: Subject::Timing,
+                verdict: if minimum.interval[1] < -profile.grid { Verdict::Warning } else { Verdict::Ok },
+                measured: Some(at_s),
+                interval: Some(minimum.interval.map(|samples| samples * self.step_s)),
+                expected: None,
+                unit: "s".into(),
+                message: format!("{name} comes late: it is recorded {:.0} ms after it acts", -1e3 * at_s),
+                set: Some(format!("[late] {name} = {:.3}", -at_s)),
+                flights: Vec::new(),
+            })
+        };
+        self.controls.iter().enumerate().filter_map(of).collect()
+    }
+
     /// The delay of the controls, common to all, and its profile.
     pub fn control_delay(&self, of_model_s: Option<f64>) -> (Finding, Option<DelayProfile>) {
         let step_s = self.step_s;
@@ -335,8 +362,8 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64, least_fall: f64) -> Findi
         finding.verdict = Verdict::Warning;
         let late = minimum.at > 0.0;
         finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());
-        let (columns, delay_s) = (pair.columns[usize::from(!late)], (minimum.at * step_s).abs());
-        finding.set = Some(format!("[columns] {columns} as `delay(NAME, {delay_s:.3})`, with the file's names"));
+        // Of two streams either may be the wrong one.
+        finding.set = Some(format!("[late] {} = {:.3}", pair.second, minimum.at * step_s));
     } else {
         finding.verdict = Verdict::Ok;
         finding.message = "in step".into();
