@@ -34,8 +34,14 @@ fn parsed(line: &str) -> Option<(&str, Table)> {
 
 fn add(description: &mut Table, section: &str, items: Table) {
     match section {
-        "" => items.into_iter().for_each(|(key, value)| {
-            description.entry(key).or_insert(value);
+        "" => items.into_iter().for_each(|(key, value)| match (description.get_mut(&key), value) {
+            // Flights that are left out and columns that are missing add up.
+            (Some(Value::Array(known)), Value::Array(more)) => {
+                let new: Vec<Value> = more.into_iter().filter(|item| !known.contains(item)).collect();
+                known.extend(new);
+            }
+            (Some(_), _) => {}
+            (None, value) => drop(description.insert(key, value)),
         }),
         "repair" => {
             let rules = description.entry("repair").or_insert_with(|| Value::Array(Vec::new()));

@@ -79,7 +79,9 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     // What thrust does along z is known from the collective alone.
     let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
     findings.extend(places(together.forces.coefficients(), unsure));
-    findings.extend(plausibility(&data.flights));
+    findings.extend(plausibility(
+        &data.flights.iter().enumerate().filter(|(flight, _)| !except.contains(flight)).map(|entry| entry.1).collect::<Vec<_>>(),
+    ));
     if is_held {
         findings.extend(together.timing.offsets(0.0));
     } else {
@@ -222,8 +224,8 @@ fn left_out(names: &[&str]) -> String {
 }
 
 /// A column of all flights with their steps; each flight leaves the memory behind it.
-fn of_all(flights: &[Flight], column: Column) -> impl Iterator<Item = (f64, f64)> {
-    flights.iter().flat_map(move |flight| {
+fn of_all<'f>(flights: impl IntoIterator<Item = &'f Flight>, column: Column) -> impl Iterator<Item = (f64, f64)> {
+    flights.into_iter().flat_map(move |flight| {
         let left = std::iter::from_fn(move || {
             flight.rest();
             None
@@ -233,9 +235,9 @@ fn of_all(flights: &[Flight], column: Column) -> impl Iterator<Item = (f64, f64)
 }
 
 /// Ranges that no aircraft of this kind leaves.
-fn plausibility(flights: &[Flight]) -> Vec<Finding> {
+fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
     let largest = |columns: &[Column]| {
-        let values = columns.iter().flat_map(|column| of_all(flights, *column));
+        let values = columns.iter().flat_map(|column| of_all(flights.iter().copied(), *column));
         values.fold(0.0_f64, |largest, (value, _)| largest.max(value.abs()))
     };
     let mut findings = Vec::new();
@@ -248,15 +250,16 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
     }
     let controls = [Column::U1, Column::U2, Column::U3, Column::U4];
     let beyond = |column: Column| {
-        let samples: usize = flights.iter().map(Flight::len).sum();
-        of_all(flights, column).filter(|(value, _)| value.abs() > LARGEST_CONTROL).count() as f64 > RARE_SHARE * samples as f64
+        let samples: usize = flights.iter().map(|flight| flight.len()).sum();
+        of_all(flights.iter().copied(), column).filter(|(value, _)| value.abs() > LARGEST_CONTROL).count() as f64
+            > RARE_SHARE * samples as f64
     };
     if controls.into_iter().any(beyond) {
         let message = format!(
             "controls reach {:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]",
             largest(&controls)
         );
-        let least = of_all(flights, Column::U4).fold(f64::INFINITY, |least, (value, _)| least.min(value));
+        let least = of_all(flights.iter().copied(), Column::U4).fold(f64::INFINITY, |least, (value, _)| least.min(value));
         let set = match largest(&controls) {
             percent if percent <= 150.0 && percent > 15.0 => "[units] controls = \"%\"",
             pulses if pulses <= 2300.0 && least >= 700.0 => {
@@ -266,7 +269,7 @@ fn plausibility(flights: &[Flight]) -> Vec<Finding> {
         };
         findings.push(finding("control_range", Verdict::Warning, message, Some(set)));
     }
-    let with_height: Vec<&Flight> = flights.iter().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
+    let with_height: Vec<&Flight> = flights.iter().copied().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
         let own = flight.column(Column::Z).iter().filter(|z| **z > 0.0).count();
         flight.rest();

@@ -18,6 +18,8 @@ const OFF: f64 = 0.2;
 pub(super) const LATE_S: f64 = 0.03;
 /// Controls of a flight are late or early against those of the others from here on, s; estimates of a single flight scatter.
 const LATER_S: f64 = 0.05;
+/// Flights at least in which a single stick is late: there are many flights and many sticks.
+const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
 const SCALED: f64 = 0.07;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
@@ -129,14 +131,24 @@ impl Odd {
                 by_name.entry(&finding.name).or_default().push((own.flight, finding));
             }
         }
+        for relation in RELATIONS {
+            let such = scaled(relation, &by_name);
+            odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
+            let name = relation.trim_end_matches('_');
+            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
+        }
         for (name, mut of_flights) in by_name {
             // A flight all of whose controls are late says nothing more of each.
             of_flights.retain(|(flight, _)| !name.starts_with(STICK) || !odd.flights.contains(flight));
             let such = match name {
                 CONTROLS => shifted(&of_flights, "the controls"),
-                name if name.starts_with(STICK) => shifted(&of_flights, &name[STICK.len()..]),
-                name if RELATIONS.iter().any(|relation| name.starts_with(relation)) => {
-                    [broken(&of_flights), scaled(&of_flights)].concat()
+                // One stick alone may well be slower than the rest in a flight; it cannot act before it is given.
+                name if name.starts_with(STICK) => {
+                    let mut late = shifted(&of_flights, &name[STICK.len()..]);
+                    late.retain(|(indices, message)| {
+                        message.contains(" late ") && indices.len() >= FEWEST && 10 * indices.len() >= of_flights.len()
+                    });
+                    late
                 }
                 _ => broken(&of_flights),
             };
@@ -196,8 +208,30 @@ fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
     kinds.into_values().map(told).collect()
 }
 
-/// Flights in which the gain of an axis is another than in the most, though it may be near 1.
-fn scaled(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
+/// Flights in which the gains of a relation's axes are others than in the most, though near 1, and alike: a wrong scale is one of all three axes, where a
+/// bias is another in each.
+fn scaled(relation: &str, by_name: &BTreeMap<&str, Vec<(usize, &Finding)>>) -> Vec<(Vec<usize>, String)> {
+    let mut of_flight: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
+    let mut count = 0;
+    for (_, axis) in by_name.iter().filter(|(name, _)| name.starts_with(relation)) {
+        count = count.max(axis.len());
+        for (flight, ratio) in ratios(axis) {
+            of_flight.entry(flight).or_default().push(ratio);
+        }
+    }
+    let is_alike = |ratios: &Vec<f64>| ratios.len() > 1 && ratios.iter().all(|ratio| (ratio - ratios[0]).abs() < 0.5 * SCALED);
+    let such: Vec<(usize, f64)> =
+        of_flight.into_iter().filter(|entry| is_alike(&entry.1)).map(|(flight, ratios)| (flight, ratios[0])).collect();
+    if such.is_empty() || such.len() as f64 > MOST * count as f64 {
+        return Vec::new();
+    }
+    let mean = such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
+    let message = format!("the gains of the axes are {mean:.2} times those of the others: one of the two streams is scaled there");
+    vec![(such.into_iter().map(|entry| entry.0).collect(), message)]
+}
+
+/// Flights of which the gain of an axis certainly differs from that of the most, and how many times that it is.
+fn ratios(of_flights: &[(usize, &Finding)]) -> Vec<(usize, f64)> {
     let known: Vec<(usize, f64, [f64; 2])> = of_flights
         .iter()
         .filter(|(_, finding)| !contradicts(finding))
@@ -213,13 +247,7 @@ fn scaled(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
         let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
         (value - usual).abs() > SCALED && (low > usual + 0.5 * SCALED || high < usual - 0.5 * SCALED)
     };
-    let such: Vec<(usize, f64)> = known.iter().filter(is_such).map(|entry| (entry.0, entry.1)).collect();
-    if such.is_empty() || such.len() as f64 > MOST * known.len() as f64 {
-        return Vec::new();
-    }
-    let mean = such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
-    let message = format!("the gain of this axis is {mean:.2}, and {usual:.2} in the others: one of its streams is scaled there");
-    vec![(such.into_iter().map(|entry| entry.0).collect(), message)]
+    known.iter().filter(is_such).map(|entry| (entry.0, entry.1 / usual)).collect()
 }
 
 /// Whether a flight by itself contradicts what is expected beyond doubt.

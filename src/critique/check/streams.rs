@@ -72,8 +72,8 @@ const DRIVING: [Column; 13] = [
     Column::U4,
 ];
 
-/// So many of them are measured: what a stick does need not be smooth.
-const STATES: usize = 9;
+/// Where noise is looked for: what a stick does need not be smooth, and the heading jumps by a turn.
+const NOISY: [Column; 8] = [Column::Roll, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
 
 /// Frozen, held, rounded and noisy columns.
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
@@ -94,7 +94,7 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
     findings.extend(grains.into_iter().filter_map(|(column, grains)| grains.finding(flights, column)));
-    findings.extend(DRIVING.into_iter().take(STATES).filter(present).filter_map(|column| noise(flights, column)));
+    findings.extend(NOISY.into_iter().filter(present).filter_map(|column| noise(flights, column)));
     findings
 }
 
@@ -216,9 +216,10 @@ fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Findin
     }
 }
 
-/// The step to which a column is rounded, in each flight where it is.
+/// The step to which a column is rounded, in each flight where it is, and the flights that tell.
 struct Grains {
     steps: Vec<Option<f64>>,
+    telling: usize,
 }
 
 impl Grains {
@@ -229,11 +230,14 @@ impl Grains {
             flight.rest();
             grain(values)
         };
-        Self { steps: flights.iter().map(of_flight).collect() }
+        let found: Vec<(bool, Option<f64>)> = flights.iter().map(of_flight).collect();
+        Self { telling: found.iter().filter(|entry| entry.0).count(), steps: found.into_iter().map(|entry| entry.1).collect() }
     }
 
     fn finding(&self, flights: &[Flight], column: Column) -> Option<Finding> {
-        let variance = variance(flights, column);
+        // In the quieter flights it matters first.
+        let each = (0..flights.len()).map(|index| variance(&flights[index..=index], column));
+        let variance = super::sticks::lower_quartile(each.filter(|variance| *variance > 0.0).collect())?;
         // An error that is as likely anywhere within a step has a twelfth of its square as variance.
         let share = |step: f64| step * step / 12.0 / variance;
         let noticed = |(index, step): (usize, &Option<f64>)| step.filter(|step| share(*step) > NOTICED).map(|step| (index, step));
@@ -246,7 +250,7 @@ impl Grains {
             100.0 * share(step)
         );
         let is_coarse = share(step) > COARSE && share(step).is_finite();
-        if such.len() as f64 > MOST * flights.len() as f64 {
+        if such.len() as f64 > MOST * self.telling as f64 {
             let verdict = if is_coarse { Verdict::Fault } else { Verdict::Warning };
             return Some(finding(&format!("rounding_{name}"), verdict, message, None));
         }
@@ -255,20 +259,23 @@ impl Grains {
     }
 }
 
-/// The step that all values are whole multiples apart by, if they are.
-fn grain(mut values: Vec<f64>) -> Option<f64> {
+/// Whether there are values enough to tell, and the step that all are whole multiples apart by, if they are.
+fn grain(mut values: Vec<f64>) -> (bool, Option<f64>) {
     let looked_at = values.len();
     values.sort_unstable_by(f64::total_cmp);
-    let range = values.last()? - values.first()?;
+    let range = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);
     // Conversion of units leaves the last digits open.
     values.dedup_by(|next, before| *next - *before <= 1e-9 * range);
-    if values.len() < 3 || values.len() * PER_VALUE > looked_at {
-        return None;
+    if values.len() < 3 {
+        return (false, None);
+    }
+    if values.len() * PER_VALUE > looked_at {
+        return (true, None);
     }
     let gaps = || values.windows(2).map(|pair| pair[1] - pair[0]);
     let grain = gaps().fold(f64::INFINITY, f64::min);
     let is_whole = |gap: f64| (gap / grain - (gap / grain).round()).abs() < 0.02;
-    gaps().all(is_whole).then_some(grain)
+    (true, gaps().all(is_whole).then_some(grain))
 }
 
 fn variance(flights: &[Flight], column: Column) -> f64 {
