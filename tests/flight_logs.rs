@@ -357,6 +357,14 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     assert_eq!(data.flights.iter().map(|flight| flight.manoeuvre.as_str()).collect::<Vec<_>>(), ["a", "a10"]);
     assert_says(&data.notes.join("\n"), &["left out, as dataset.toml says: `turn`"]);
 
+    put(root, "dataset.toml", "leave_out = [\"b\", \"hover/a9\", \"c\"]")?;
+    let data = data_set(root, &plain)?;
+    assert_eq!(data.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["hover/a10", "turn/a9"]);
+    let notes = data.notes.join("\n");
+    assert_says(&notes, &["left out, as dataset.toml says: hover/a9, turn/b", "but no flight has this name: c"]);
+    put(root, "dataset.toml", "leave_out = [\"a9\"]")?;
+    assert_says(&refusal(data_set(root, &plain)), &["leave_out", "`a9`, which 2 flights are called", "a flight's path"]);
+
     // A description elsewhere is taken instead, and its faults name it.
     put(root, "other.toml", "exclud = \"turn\"")?;
     let options = ReadOptions { dataset: Some(root.join("other.toml")), ..ReadOptions::default() };
@@ -368,5 +376,30 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     assert_says(&refusal(data_set(&root.join("nowhere"), &plain)), &["nowhere"]);
     std::fs::create_dir(root.join("empty"))?;
     assert_says(&refusal(data_set(&root.join("empty"), &plain)), &["no logs", "DATA/<manoeuvre>/<flight>.csv"]);
+    Ok(())
+}
+
+#[test]
+fn a_stream_that_comes_late_is_moved_back() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let root = folder.path();
+    put(root, "a.csv", &Sheet::canonical(60).csv())?;
+    let plain = data_set(root, &ReadOptions::default())?;
+    let step_s = plain.flights[0].step_s;
+    put(root, "dataset.toml", &format!("[late]\nrates = {}\nu1 = {}", 3.0 * step_s, -2.0 * step_s))?;
+    let moved = data_set(root, &ReadOptions::default())?;
+    let (before, after) = (&plain.flights[0], &moved.flights[0]);
+    // Of the first two rows no u1 is known, of the last three no rates.
+    assert_eq!((after.len(), after.start_s), (55, before.time_s(2)));
+    assert_eq!(after.column(Column::Wy)[..], before.column(Column::Wy)[5..60]);
+    assert_eq!(after.column(Column::U1)[..], before.column(Column::U1)[..55]);
+    assert_eq!(after.column(Column::Vx)[..], before.column(Column::Vx)[2..57]);
+    assert_says(&moved.notes.join("\n"), &["moved back in time, as dataset.toml says"]);
+    for (late, says) in
+        [("rates = 2.0", "a time from -1 to 1 s"), ("t = 0.1", "`late.t` is an unknown key"), ("rate = 0.1", "did you mean `rates`")]
+    {
+        put(root, "dataset.toml", &format!("[late]\n{late}"))?;
+        assert_says(&refusal(data_set(root, &ReadOptions::default())), &[says]);
+    }
     Ok(())
 }

@@ -302,8 +302,11 @@ impl DataSet {
         self.flights.iter().map(Flight::duration_s).sum()
     }
 
-    /// Leaves flights out, by their names with or without the manoeuvre before them, with a note that says why; names that no flight has are told
-    /// too.
+    /// Leaves flights out, by their paths or, where only one has it, by their own names, with a note that says why; names that no flight has are
+    /// told too.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that several flights have.
     ///
     /// # Examples
     /// ```
@@ -311,24 +314,41 @@ impl DataSet {
     /// # fn main() -> phyture::Result<()> {
     /// let mut set = simulate(&Simulation { minutes: 2.0, ..Simulation::baseline() })?;
     /// let name = set.flights[0].name.clone();
-    /// set.leave_out(&[name.clone()], "as asked");
+    /// let notes = set.notes.len();
+    /// set.leave_out(&[name.clone()], "as asked")?;
     /// assert!(set.flights.iter().all(|flight| flight.name != name));
-    /// assert_eq!(set.notes, [format!("left out, as asked: {name}")]);
+    /// assert_eq!(set.notes[notes..], [format!("left out, as asked: {name}")]);
     /// # Ok(())
     /// # }
     /// ```
-    pub fn leave_out(&mut self, names: &[String], why: &str) {
-        let is_of = |flight: &Flight, name: &str| flight.name == name || flight.name.rsplit('/').next() == Some(name);
-        let (known, unknown): (Vec<&String>, Vec<&String>) =
-            names.iter().partition(|name| self.flights.iter().any(|flight| is_of(flight, name)));
-        let list = |names: &[&String]| names.iter().map(|name| name.as_str()).collect::<Vec<_>>().join(", ");
-        self.flights.retain(|flight| !known.iter().any(|name| is_of(flight, name)));
+    pub fn leave_out(&mut self, wanted: &[String], why: &str) -> Result<()> {
+        let (mut known, mut unknown): (Vec<usize>, Vec<&str>) = (Vec::new(), Vec::new());
+        for name in wanted {
+            match names::find(&self.flights, name).as_slice() {
+                [] => unknown.push(name),
+                [one] => known.push(*one),
+                several => {
+                    let found = format!("`{name}`, which {} flights are called", several.len());
+                    let expected = "a flight's path below the data folder".to_owned();
+                    return Err(Error::Config { place: why.into(), field: "leave_out".into(), found, expected });
+                }
+            }
+        }
+        known.sort_unstable();
+        known.dedup();
         if !known.is_empty() {
-            self.notes.push(format!("left out, {why}: {}", list(&known)));
+            let names: Vec<&str> = known.iter().map(|&flight| self.flights[flight].name.as_str()).collect();
+            self.notes.push(format!("left out, {why}: {}", names.join(", ")));
         }
         if !unknown.is_empty() {
-            self.notes.push(format!("to be left out, {why}, but no flight has this name: {}", list(&unknown)));
+            self.notes.push(format!("to be left out, {why}, but no flight has this name: {}", unknown.join(", ")));
         }
+        let mut index = 0;
+        self.flights.retain(|_| {
+            index += 1;
+            known.binary_search(&(index - 1)).is_err()
+        });
+        Ok(())
     }
 }
 

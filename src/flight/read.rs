@@ -93,7 +93,7 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
             .iter()
             .map(|(first, others)| format!("left out, since they hold the same numbers as `{first}`: {}", others.join(", "))),
     );
-    data.leave_out(&schema.leave_out, "as dataset.toml says");
+    data.leave_out(&schema.leave_out, "as dataset.toml says")?;
     if data.flights.is_empty() {
         let found = format!("{} logs of which no piece is left", logs.len());
         let expected = format!("at least one flight; what was left out: {}", data.notes.join("; "));

@@ -403,6 +403,7 @@ impl Keys {
         let prefix = match key {
             "columns" => "columns.",
             "units" => "units.",
+            "late" => "late.",
             _ => "repair.",
         };
         match self.take(key) {

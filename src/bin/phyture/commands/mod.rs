@@ -346,14 +346,14 @@ const MOST_CHECKS: usize = 3;
 /// The flights without those that were asked to be left out.
 fn without(mut set: DataSet, data: &Data) -> Result<DataSet> {
     let names: Vec<String> = data.leave_out.iter().filter(|name| *name != SUSPECTS).cloned().collect();
-    set.leave_out(&names, "as --leave-out says");
+    set.leave_out(&names, "as --leave-out says")?;
     if data.leave_out.iter().any(|name| name == SUSPECTS) {
         for _ in 0..MOST_CHECKS {
             let suspects = check(&set, None).suspects();
             if suspects.is_empty() {
                 break;
             }
-            set.leave_out(&suspects, "as suspects");
+            set.leave_out(&suspects, "as suspects")?;
         }
     }
     if set.flights.is_empty() {
