@@ -527,6 +527,12 @@ fn frozen_held_and_rounded_streams_are_named() {
         (column == Column::Vx).then_some(values)
     };
     assert_odd(&[2], "frozen_vx", "it keeps one value for up to 25.0 s", frozen);
+    let never =
+        |flight: &Flight, column: Column| [Column::X, Column::Y, Column::Z].contains(&column).then(|| vec![1.0; flight.len()]);
+    let report = changed(&[0, 1, 2, 3], never);
+    assert_fault(&report, "frozen_y", "y is frozen: it keeps one value for up to 50.0 s");
+    assert_eq!(finding(&report, "frozen_y").set.as_deref(), Some("ignore = [\"y\"], missing = [\"y\"]"));
+    assert_eq!(report.findings.iter().filter(|finding| finding.verdict == Verdict::Fault).count(), 3, "{report}");
     let held = |of: [Column; 3], samples: usize| {
         move |flight: &Flight, column: Column| {
             let values = flight.column(column);

@@ -395,9 +395,11 @@ fn a_stream_that_comes_late_is_moved_back() -> Outcome {
     assert_eq!(after.column(Column::U1)[..], before.column(Column::U1)[..55]);
     assert_eq!(after.column(Column::Vx)[..], before.column(Column::Vx)[2..57]);
     assert_says(&moved.notes.join("\n"), &["moved back in time, as dataset.toml says"]);
-    for (late, says) in
-        [("rates = 2.0", "a time from -1 to 1 s"), ("t = 0.1", "`late.t` is an unknown key"), ("rate = 0.1", "did you mean `rates`")]
-    {
+    for (late, says) in [
+        ("rates = 2.0", "a time from -1 to 1 s"),
+        ("t = 0.1", "`late.t` is an unknown key"),
+        ("rate = 0.1", "did you mean `rates`"),
+    ] {
         put(root, "dataset.toml", &format!("[late]\n{late}"))?;
         assert_says(&refusal(data_set(root, &ReadOptions::default())), &[says]);
     }

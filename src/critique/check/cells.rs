@@ -23,13 +23,16 @@ struct Spikes {
     range: [f64; 2],
 }
 
-/// A finding for each column with spikes.
-pub(super) fn spikes(flights: &[Flight]) -> Vec<Finding> {
+/// A finding for each column with spikes, and the flights that hold them.
+pub(super) fn spikes(flights: &[Flight]) -> Vec<(Finding, Vec<usize>)> {
     let present = |column: &Column| flights.iter().all(|flight| !flight.absent.contains(column));
     Column::ALL
         .into_iter()
         .filter(present)
-        .filter_map(|column| Some(finding(column, &of_column(flights, column)?, flights)))
+        .filter_map(|column| {
+            let spikes = of_column(flights, column)?;
+            Some((finding(column, &spikes, flights), spikes.flights))
+        })
         .collect()
 }
 

@@ -50,10 +50,10 @@ impl Evidence {
         let mut findings = Vec::new();
         for relation in &self.relations {
             let Some(finding) = relation.finding() else { continue };
-            // Gains of a relation that is known to be read wrongly say nothing more.
-            let fault = finding.verdict == Verdict::Fault;
+            // Gains of a relation that is known to be read wrongly, or in which nothing moves, say nothing more.
+            let is_read = finding.verdict != Verdict::Fault && finding.measured.is_some_and(f64::is_finite);
             findings.push(finding);
-            if !fault {
+            if is_read {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }

@@ -49,7 +49,8 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let quaternion = data.source.quaternion.map(other_order);
     let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
     let (each, sticks) = read(data, quaternion, step_s);
-    let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(cells::spikes(&data.flights)).collect();
+    let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
+    let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(spikes).collect();
     let names: Vec<&String> =
         poor.iter().filter(|finding| finding.verdict == Verdict::Fault).flat_map(|finding| &finding.flights).collect();
     let unfit = |flight: usize| names.contains(&&data.flights[flight].name);
@@ -74,7 +75,9 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     findings.extend(together.kinematics(0.0));
     findings.extend(together.forces.lateral());
     if !misread {
-        findings.extend(sticks.findings(&data.flights, &except));
+        // A spike moves no axis; without it the rest of the flight is as good as any.
+        let unjudged = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
+        findings.extend(sticks.findings(&data.flights, &unjudged));
     }
     // What thrust does along z is known from the collective alone.
     let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);

@@ -159,7 +159,7 @@ impl Rests {
             "{name} is frozen: it keeps one value for up to {longest:.1} s while the rest moves, as where it was not recorded"
         );
         let is_set = such.len() as f64 > MOST * flights.len() as f64;
-        let missing = format!("missing = [{name:?}]");
+        let missing = format!("ignore = [{name:?}], missing = [{name:?}]");
         let set = (POSITION.contains(&column) || column == Column::Yaw).then_some(missing.as_str());
         match such.as_slice() {
             [] => None,
