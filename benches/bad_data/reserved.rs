@@ -1,4 +1,4 @@
-//! Corruptions that were written down before any check was tuned on bad data, and are only reported: development never runs them, and what
+//! Corruptions that were written down before checks were tuned on this benchmark, and are only reported: development never runs them, and what
 //! they show decides nothing. They are half of all, by turns within each kind; the other half stands in `corruptions`.
 
 use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Change, Corruption, Kind, LINEAR, POSITION, Part, RATES, VELOCITY};

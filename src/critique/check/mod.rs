@@ -61,7 +61,9 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         evidence
     };
     let all = of(&except);
-    let judged: Vec<&Own> = each.iter().filter(|own| !except.contains(&own.flight)).collect();
+    // A spike moves no axis; without it the rest of the flight is as good as any.
+    let unjudged: BTreeSet<usize> = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
+    let judged: Vec<&Own> = each.iter().filter(|own| !unjudged.contains(&own.flight)).collect();
     let misread = odd::is_misread(&judged, &all);
     let odd = Odd::new(&judged, &all, &data.flights);
     except.extend(&odd.flights);
@@ -75,9 +77,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     findings.extend(together.kinematics(0.0));
     findings.extend(together.forces.lateral());
     if !misread {
-        // A spike moves no axis; without it the rest of the flight is as good as any.
-        let unjudged = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
-        findings.extend(sticks.findings(&data.flights, &unjudged));
+        findings.extend(sticks.findings(&data.flights, &unjudged.union(&except).copied().collect()));
     }
     // What thrust does along z is known from the collective alone.
     let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);

@@ -104,7 +104,8 @@ fn every_entry_is_whole() -> Result<()> {
             }
             assert!(!standard_names().contains(&name) && !Model::CONSTANTS.contains(&name), "{kind}.{name}");
         }
-        assert!(combinations <= 15, "{kind}: {combinations} columns");
+        // A budget of time: each is tried in every step of a search.
+        assert!(combinations <= 20, "{kind}: {combinations} columns");
         for within in entry.swaps.iter().flat_map(|swap| swap.within) {
             assert!(definition(within).is_some(), "{kind} swaps within {within}");
         }
