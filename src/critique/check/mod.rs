@@ -2,7 +2,9 @@
 //!
 //! A wrong sign or frame looks like a missing effect, and a large one; so this comes first and blocks what follows. Kinematic
 //! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
-//! little (`forces`); which stick moves which axis is asked of each flight (`sticks`), and cells that cannot be are counted (`cells`). Nothing here changes the data: a finding says what to set in `dataset.toml`.
+//! little (`forces`); which stick moves which axis is asked of each flight (`sticks`). Each flight is judged by itself and against the others
+//! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), and cells that cannot be are counted (`cells`).
+//! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
 mod cells;
@@ -46,55 +48,9 @@ const RARE_SHARE: f64 = 0.01;
 /// 10 s. A fault is named only where another convention explains the log better by a wide margin; a modelling error alone
 /// does not make one.
 pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
-    let quaternion = data.source.quaternion.map(other_order);
-    let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
-    let (each, sticks) = read(data, quaternion, step_s);
-    let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
-    let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(spikes).collect();
-    let names: Vec<&String> =
-        poor.iter().filter(|finding| finding.verdict == Verdict::Fault).flat_map(|finding| &finding.flights).collect();
-    let unfit = |flight: usize| names.contains(&&data.flights[flight].name);
-    let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(|&flight| unfit(flight)).collect();
-    let of = |except: &BTreeSet<usize>| {
-        let mut evidence = Evidence::new(quaternion, step_s);
-        each.iter().filter(|own| !except.contains(&own.flight)).for_each(|own| evidence.absorb(&own.evidence, 1));
-        evidence
-    };
-    let all = of(&except);
-    // A spike moves no axis; without it the rest of the flight is as good as any.
-    let unjudged: BTreeSet<usize> = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
-    let judged: Vec<&Own> = each.iter().filter(|own| !unjudged.contains(&own.flight)).collect();
-    let misread = odd::is_misread(&judged, &all);
-    let odd = Odd::new(&judged, &all, &data.flights);
-    except.extend(&odd.flights);
-    let together = of(&except);
-
-    let mut findings = vec![origin(&data.flights)];
-    // A stream that is held is late by half of its rest: that is said already.
-    let is_held = poor.iter().any(|finding| finding.name.starts_with(streams::HELD));
-    findings.extend(poor);
-    findings.extend(odd.findings);
-    findings.extend(together.kinematics(0.0));
-    findings.extend(together.forces.lateral());
-    if !misread {
-        findings.extend(sticks.findings(&data.flights, &unjudged.union(&except).copied().collect()));
-    }
-    // What thrust does along z is known from the collective alone.
-    let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
-    findings.extend(places(together.forces.coefficients(), unsure));
-    findings.extend(plausibility(
-        &data.flights.iter().enumerate().filter(|(flight, _)| !except.contains(flight)).map(|entry| entry.1).collect::<Vec<_>>(),
-    ));
-    if is_held {
-        findings.extend(together.timing.offsets(0.0));
-    } else {
-        findings.extend(odd::late_streams(&together.timing));
-        findings.extend(odd::late_controls(&together.timing));
-    }
-    if misread {
-        findings = findings.into_iter().map(symptom).collect();
-    }
-    let (delay, control_delay) = together.timing.control_delay(model.map(|model| model.data.control_delay_s));
+    let gathered = Gathered::new(data);
+    let (delay, control_delay) = gathered.together.timing.control_delay(model.map(|model| model.data.control_delay_s));
+    let mut findings = gathered.findings(data);
     findings.push(delay);
     let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
     findings.extend(excitation::findings(&excitation, &collinearity));
@@ -115,6 +71,74 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
         excitation,
         collinearity,
         notes: data.notes.clone(),
+    }
+}
+
+/// What the flights say by themselves, and those together of which nothing is known to be wrong.
+struct Gathered {
+    /// Of columns by themselves.
+    poor: Vec<Finding>,
+    /// Of flights that break with the others.
+    odd: Vec<Finding>,
+    /// All read something in the same other way.
+    misread: bool,
+    /// Flights that are left out of what is said of all …
+    except: BTreeSet<usize>,
+    /// … and those of which the sticks say nothing.
+    unjudged: BTreeSet<usize>,
+    together: Evidence,
+    sticks: Sticks,
+}
+
+impl Gathered {
+    fn new(data: &DataSet) -> Self {
+        let quaternion = data.source.quaternion.map(other_order);
+        let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
+        let (each, sticks) = read(data, quaternion, step_s);
+        let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
+        let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(spikes).collect();
+        let faults = poor.iter().filter(|finding| finding.verdict == Verdict::Fault);
+        let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
+        let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
+        let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(unfit).collect();
+        let of = |except: &BTreeSet<usize>| {
+            let mut evidence = Evidence::new(quaternion, step_s);
+            each.iter().filter(|own| !except.contains(&own.flight)).for_each(|own| evidence.absorb(&own.evidence, 1));
+            evidence
+        };
+        // A spike moves no axis; without it the rest of the flight is as good as any.
+        let mut unjudged: BTreeSet<usize> = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
+        let judged: Vec<&Own> = each.iter().filter(|own| !unjudged.contains(&own.flight)).collect();
+        let all = of(&except);
+        let misread = odd::is_misread(&judged, &all);
+        let odd = Odd::new(&judged, &all, &data.flights);
+        except.extend(&odd.flights);
+        unjudged.extend(&odd.flights);
+        Self { poor, odd: odd.findings, misread, together: of(&except), except, unjudged, sticks }
+    }
+
+    /// All that is said of conventions and of streams against each other, causes before symptoms.
+    fn findings(&self, data: &DataSet) -> Vec<Finding> {
+        let mut findings = vec![origin(&data.flights)];
+        findings.extend(self.poor.iter().chain(&self.odd).cloned());
+        findings.extend(self.together.kinematics(0.0));
+        findings.extend(self.together.forces.lateral());
+        if !self.misread {
+            findings.extend(self.sticks.findings(&data.flights, &self.unjudged));
+        }
+        // What thrust does along z is known from the collective alone.
+        let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
+        findings.extend(places(self.together.forces.coefficients(), unsure));
+        let rest = data.flights.iter().enumerate().filter(|(flight, _)| !self.except.contains(flight));
+        findings.extend(plausibility(&rest.map(|entry| entry.1).collect::<Vec<_>>()));
+        // A stream that is held is late by half of its rest: that is said already.
+        if self.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
+            findings.extend(self.together.timing.offsets(0.0));
+        } else {
+            findings.extend(odd::late_streams(&self.together.timing));
+            findings.extend(odd::late_controls(&self.together.timing));
+        }
+        if self.misread { findings.into_iter().map(symptom).collect() } else { findings }
     }
 }
 

@@ -6,7 +6,7 @@ use super::increments::{Motion, TOGETHER};
 use super::relations::Relation;
 use super::report::{Finding, Subject, Verdict};
 use super::timing::Timing;
-use super::{left_out, named};
+use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -134,8 +134,7 @@ impl Odd {
         for relation in RELATIONS {
             let such = scaled(relation, &by_name);
             odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
-            let name = relation.trim_end_matches('_');
-            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
+            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(relation, &indices, &message, flights)));
         }
         for (name, mut of_flights) in by_name {
             // A flight all of whose controls are late says nothing more of each.
@@ -173,9 +172,8 @@ pub(super) fn is_misread(each: &[&Own], all: &Evidence) -> bool {
 }
 
 const CONTROLS: &str = "control_delay";
-/// How findings of single sticks begin, and those of gains.
+/// How findings of single sticks begin.
 const STICK: &str = "delay_";
-const RELATIONS: [&str; 4] = ["position_rate_", "attitude_rate_", "velocity_targets_", "rate_targets_"];
 pub(super) const LATERAL: &str = "lateral_force";
 
 /// A fault of some flights.
@@ -213,7 +211,8 @@ fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
 fn scaled(relation: &str, by_name: &BTreeMap<&str, Vec<(usize, &Finding)>>) -> Vec<(Vec<usize>, String)> {
     let mut of_flight: BTreeMap<usize, Vec<f64>> = BTreeMap::new();
     let mut count = 0;
-    for (_, axis) in by_name.iter().filter(|(name, _)| name.starts_with(relation)) {
+    let is_gain = |name: &str| name.strip_prefix(relation).is_some_and(|axis| axis.starts_with('_'));
+    for (_, axis) in by_name.iter().filter(|(name, _)| is_gain(name)) {
         count = count.max(axis.len());
         for (flight, ratio) in ratios(axis) {
             of_flight.entry(flight).or_default().push(ratio);
