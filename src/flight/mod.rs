@@ -16,6 +16,7 @@ pub mod differentiate;
 pub mod guard;
 #[cfg(feature = "files")]
 mod hypotheses;
+#[cfg(feature = "files")]
 mod late;
 #[cfg(feature = "files")]
 mod listing;
