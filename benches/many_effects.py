@@ -4,7 +4,7 @@
     cargo build --release --features cli
     python3 benches/many_effects.py target/release/phyture OUT [SEED...]
 
-A row for each seed, or for all that are reported: of 72000 to 72002 all 33 effects are missing in 30 minutes, of 72010 in 7376 s, of 74400 to 74401
+A row for each seed, or for all that are reported: of 72000 to 72002 all mechanisms of the simulator are missing in 30 minutes, of 72010 in 7376 s, of 74400 to 74401
 three of random size, of 74700 to 74701 six, of 75300 to 75301 twelve. A seed with `=N` behind it is a development run of N effects, 0 being all.
 What is there already in OUT is not run again. Nothing is timed that other work on the machine does not slow down.
 """
@@ -79,7 +79,7 @@ def row(seed, count, result):
     removed = result["locked"]["removable_removed"]
     shown = " ".join("–" if removed.get(channel) is None else f"{100 * removed[channel]:.0f}" for channel in CHANNELS)
     bars = sum(1 for bar in result["locked"]["waterfall"] if bar.get("rises"))
-    what = {0: "all 33, 30 min", -1: "all 33, 7376 s"}.get(count, f"{count} of random size")
+    what = {0: "everything, 30 min", -1: "everything, 7376 s"}.get(count, f"{count} of random size")
     false = ", ".join(f"`{effect}`" for effect in sorted(named - truth)) or "0"
     return (
         f"| {what} | {seed} | {len(truth & named)} of {len(truth)} | {false} | {len(worth)} of {len(worth | missed)} | {shown} "

@@ -39,7 +39,7 @@ pub(super) fn spikes(flights: &[Flight]) -> Vec<(Finding, Vec<usize>)> {
 fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
     let [low, high] = usual(flights, column)?;
     let jump = OUTSIDE * (high - low);
-    let is_control = [Column::U1, Column::U2, Column::U3, Column::U4].contains(&column);
+    let is_control = super::CONTROLS.contains(&column);
     let size = low.abs().max(high.abs()).max(1.0);
     let far = |value: f64| (value < low - jump || value > high + jump) && (!is_control || value.abs() > LARGEST_CONTROL * size);
     let mut spikes = Spikes { cells: 0, flights: Vec::new(), longest_s: 0.0, range: [low - jump, high + jump] };

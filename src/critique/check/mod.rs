@@ -34,6 +34,7 @@ use odd::{Odd, Own};
 use std::collections::BTreeSet;
 use sticks::Sticks;
 
+const CONTROLS: [Column; 4] = [Column::U1, Column::U2, Column::U3, Column::U4];
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
 /// Relations whose readings say how a log is written.
@@ -275,19 +276,18 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
             format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
         findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
     }
-    let controls = [Column::U1, Column::U2, Column::U3, Column::U4];
     let beyond = |column: Column| {
         let samples: usize = flights.iter().map(|flight| flight.len()).sum();
         of_all(flights.iter().copied(), column).filter(|(value, _)| value.abs() > LARGEST_CONTROL).count() as f64
             > RARE_SHARE * samples as f64
     };
-    if controls.into_iter().any(beyond) {
+    if CONTROLS.into_iter().any(beyond) {
         let message = format!(
             "controls reach {:.1}; the program works, but expected ranges of coefficients assume about [-1, 1]",
-            largest(&controls)
+            largest(&CONTROLS)
         );
         let least = of_all(flights.iter().copied(), Column::U4).fold(f64::INFINITY, |least, (value, _)| least.min(value));
-        let set = match largest(&controls) {
+        let set = match largest(&CONTROLS) {
             percent if percent <= 150.0 && percent > 15.0 => "[units] controls = \"%\"",
             pulses if pulses <= 2300.0 && least >= 700.0 => {
                 "[columns] u1 = \"(u1 - 1500) / 500\" and so on for pulses in us, with the file's names"

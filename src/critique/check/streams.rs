@@ -3,7 +3,7 @@
 
 use super::odd::{MOST, in_flights};
 use super::report::{Finding, Verdict};
-use super::{finding, of_all};
+use super::{CONTROLS, finding, of_all};
 use crate::flight::{Column, Flight};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -32,45 +32,17 @@ const LEAST_NOISE: f64 = 0.03;
 /// How findings of held streams begin.
 pub(super) const HELD: &str = "held_";
 
-/// Columns whose rests mean something: a stick may rest.
-const MEASURED: [Column; 18] = [
-    Column::X,
-    Column::Y,
-    Column::Z,
-    Column::Roll,
-    Column::Pitch,
-    Column::Yaw,
-    Column::Vx,
-    Column::Vy,
-    Column::Vz,
-    Column::Wx,
-    Column::Wy,
-    Column::Wz,
-    Column::VxDot,
-    Column::VyDot,
-    Column::VzDot,
-    Column::WxDot,
-    Column::WyDot,
-    Column::WzDot,
-];
 /// Position matters for the height above ground alone.
 const POSITION: [Column; 3] = [Column::X, Column::Y, Column::Z];
+/// Columns whose rests mean something: a stick may rest.
+fn measured() -> impl Iterator<Item = Column> {
+    Column::ALL.into_iter().filter(|column| !CONTROLS.contains(column))
+}
+
 /// What the physics is driven by.
-const DRIVING: [Column; 13] = [
-    Column::Roll,
-    Column::Pitch,
-    Column::Yaw,
-    Column::Vx,
-    Column::Vy,
-    Column::Vz,
-    Column::Wx,
-    Column::Wy,
-    Column::Wz,
-    Column::U1,
-    Column::U2,
-    Column::U3,
-    Column::U4,
-];
+fn driving() -> impl Iterator<Item = Column> {
+    Column::ALL.into_iter().filter(|column| !POSITION.contains(column) && !Column::TARGETS.contains(column))
+}
 
 /// Where noise is looked for: what a stick does need not be smooth, and the heading jumps by a turn.
 const NOISY: [Column; 8] = [Column::Roll, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
@@ -78,12 +50,11 @@ const NOISY: [Column; 8] = [Column::Roll, Column::Pitch, Column::Vx, Column::Vy,
 /// Frozen, held, rounded and noisy columns.
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let present = |column: &Column| flights.iter().all(|flight| !flight.absent.contains(column));
-    let grains: Vec<(Column, Grains)> =
-        DRIVING.into_iter().filter(present).map(|column| (column, Grains::of(flights, column))).collect();
+    let grains: Vec<(Column, Grains)> = driving().filter(present).map(|column| (column, Grains::of(flights, column))).collect();
     let is_rounded = |column: Column| grains.iter().any(|entry| entry.0 == column && entry.1.steps.iter().any(Option::is_some));
     let mut findings = Vec::new();
     let mut held: Vec<(Hold, Vec<Column>)> = Vec::new();
-    for column in MEASURED.into_iter().filter(present) {
+    for column in measured().filter(present) {
         let rests = Rests::of(flights, column);
         findings.extend(rests.frozen(flights, column));
         let Some(hold) = rests.held(flights).filter(|_| !is_rounded(column)) else { continue };
@@ -189,7 +160,7 @@ impl Rests {
 
 /// Whether most other measured columns change within these samples.
 fn others_move(flight: &Flight, column: Column, samples: &Range<usize>) -> bool {
-    let others = MEASURED.into_iter().filter(|other| *other != column && !flight.absent.contains(other));
+    let others = measured().filter(|other| *other != column && !flight.absent.contains(other));
     let moves = |other: Column| {
         let values = &flight.column(other)[samples.clone()];
         values.windows(2).filter(|pair| pair[0] != pair[1]).count() * 4 > values.len()
