@@ -86,6 +86,7 @@ fn found() -> Diagnosis {
             }],
             parameters: Vec::new(),
             would_tell_apart: "hover at 0.5, 1, 2 and 4 m".into(),
+            fault_of_log: Some("u4 recorded late".into()),
             formula: "k * <height>".into(),
             rests_on_flight: None,
         }],

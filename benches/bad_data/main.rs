@@ -2,11 +2,11 @@
 //!
 //!     cargo bench --features cli --bench bad_data                                      a few cases, some minutes
 //!     cargo bench --features cli --bench bad_data -- run OUT.jsonl [SEEDS] [WHAT…]     everything, resumable
-//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   the half in `corruptions.rs`, on development seeds
+//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   what is in `corruptions.rs` and `further.rs`, on development seeds
 //!     cargo bench --features cli --bench bad_data -- table OUT.jsonl                   the tables
 //!     cargo bench --features cli --bench bad_data -- sound                             only that each corruption changes what it is to change
 //!
-//! SEEDS is how many, 10 and 2 if it is not given; WHAT are corruptions, or `clean` for data with nothing wrong. Each case is a line of
+//! SEEDS is how many, 10 and 2 if it is not given, or some of them: `501..504`; WHAT are corruptions, or `clean` for data with nothing wrong. Each case is a line of
 //! JSON, appended; one that is there already is not repeated.
 
 #[path = "../hidden_effect/cases.rs"]
@@ -14,6 +14,7 @@
 mod cases;
 mod change;
 mod corruptions;
+mod further;
 mod mend;
 mod reserved;
 mod run;
@@ -21,6 +22,7 @@ mod sound;
 mod tables;
 
 use run::Plan;
+use std::ops::Range;
 use std::path::Path;
 
 fn main() -> phyture::Result<()> {
@@ -48,9 +50,14 @@ fn main() -> phyture::Result<()> {
 /// Runs a plan with what the command line adds to it.
 fn asked(out: &str, words: &[&str], plan: Plan) -> phyture::Result<()> {
     sound::all()?;
+    let some = |word: &str| -> Option<Range<u64>> {
+        let (first, end) = word.split_once("..")?;
+        Some(first.parse().ok()?..end.parse().ok()?)
+    };
+    let count = |word: &str| Some(plan.seeds.start..plan.seeds.start + word.parse::<u64>().ok()?);
     let (seeds, what) = match words {
-        [first, rest @ ..] => first.parse().map_or((plan.seeds, words), |seeds| (seeds, rest)),
-        [] => (plan.seeds, words),
+        [first, rest @ ..] => some(first).or_else(|| count(first)).map_or((plan.seeds.clone(), words), |seeds| (seeds, rest)),
+        [] => (plan.seeds.clone(), words),
     };
     run::all(Path::new(out), &Plan { seeds, ..plan }, what)
 }

@@ -3,6 +3,7 @@
 use crate::cases::SINGLES;
 use crate::change::{Chance, Change, Corruption, Log, Part};
 use crate::corruptions;
+use crate::further::FURTHER;
 use crate::mend::{mend, through_files};
 use crate::reserved::RESERVED;
 use phyture::critique::check::{self, CheckReport, check};
@@ -14,15 +15,14 @@ use phyture::sim::{INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Si
 use phyture::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 use std::time::Instant;
 
 /// Which cases, and how many.
 pub struct Plan {
-    /// First seed.
-    pub first: u64,
-    /// So many data sets to corrupt without a hidden effect, and as many with one.
-    pub seeds: u64,
+    /// Of each a data set to corrupt without a hidden effect, and one with it.
+    pub seeds: Range<u64>,
     /// Data sets with nothing wrong.
     pub clean: u64,
     /// Each so-manieth corruption.
@@ -32,11 +32,11 @@ pub struct Plan {
 }
 
 /// What is reported.
-pub const REPORTED: Plan = Plan { first: 80_000, seeds: 10, clean: 400, every: 1, reserved: true };
+pub const REPORTED: Plan = Plan { seeds: 80_000..80_010, clean: 400, every: 1, reserved: true };
 /// On which checks are tuned.
-pub const DEVELOPMENT: Plan = Plan { first: 500, seeds: 2, clean: 40, every: 1, reserved: false };
+pub const DEVELOPMENT: Plan = Plan { seeds: 500..502, clean: 40, every: 1, reserved: false };
 /// Some minutes.
-pub const FEW: Plan = Plan { seeds: 1, clean: 8, every: 5, ..DEVELOPMENT };
+pub const FEW: Plan = Plan { seeds: 500..501, clean: 8, every: 5, ..DEVELOPMENT };
 
 /// Seeds of clean sets begin so far behind the first.
 const CLEAN: u64 = 1000;
@@ -52,6 +52,12 @@ const HIDDEN: [&str; 8] =
     ["collective_torque", "weathercock", "rate_cross", "dihedral_speedstab", "ctrl_cross", "transl_lift", "tail_lag", "quad_drag"];
 /// Share of the error that a hidden effect makes: large.
 const SHARE: f64 = 0.5;
+
+/// What is only reported.
+const RESERVED_HALF: &str = "reserved";
+/// All corruptions, by the round in which they were written.
+pub const HALVES: [(&str, &[Corruption]); 3] =
+    [("development", corruptions::DEVELOPMENT), ("further", FURTHER), (RESERVED_HALF, RESERVED)];
 
 /// What `diagnose` says where `check` found a fault.
 pub const CONVENTION_FAULT: &str = "convention fault";
@@ -93,7 +99,7 @@ pub struct Mended {
 /// One case.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Line {
-    /// `development`, `reserved`, `uncorrupted` or `clean`.
+    /// `development`, `further`, `reserved`, `uncorrupted` or `clean`.
     pub half: String,
     /// Identifier; of a clean set what flies in it.
     pub corruption: String,
@@ -249,6 +255,18 @@ fn mended(line: &Line, report: &CheckReport, set: &DataSet) -> Option<Mended> {
     Some(Mended { description, is_free, verdict: after.verdict, accepted: after.accepted, rmse: after.rmse })
 }
 
+/// One corruption of a data set, judged, and mended where that can be.
+fn case(mut line: Line, corruption: &Corruption, part: Part, set: &DataSet) -> Result<Line> {
+    let Corrupted { set, hit } = corrupted(set, corruption, part, line.seed)?;
+    let report = judge(&mut line, &set, true);
+    recognise(&mut line, corruption, &set, &hit);
+    line.mended = mended(&line, &report, &set);
+    Ok(line)
+}
+
+/// So many cases of a data set side by side: much of each is done by one thread.
+const BESIDE: usize = 2;
+
 /// Cases that are there, and the file for those that are made.
 struct Bench<'a> {
     out: &'a Path,
@@ -301,12 +319,21 @@ impl Bench<'_> {
             judge(&mut line, &set, true);
             self.write(&line)?;
         }
-        for (mut line, corruption, part) in open {
-            let Corrupted { set, hit } = corrupted(&set, corruption, part, seed)?;
-            let report = judge(&mut line, &set, true);
-            recognise(&mut line, corruption, &set, &hit);
-            line.mended = mended(&line, &report, &set);
-            self.write(&line)?;
+        for some in open.chunks(BESIDE) {
+            let lines: Vec<Result<Line>> = std::thread::scope(|scope| {
+                let mut begun = Vec::new();
+                for (line, corruption, part) in some {
+                    let set = &set;
+                    begun.push(scope.spawn(move || case(line.clone(), corruption, *part, set)));
+                }
+                let ended = |case: std::thread::ScopedJoinHandle<'_, Result<Line>>| {
+                    case.join().unwrap_or_else(|_| Err(Error::Undetermined("a case ended in a panic".into())))
+                };
+                begun.into_iter().map(ended).collect()
+            });
+            for line in lines {
+                self.write(&line?)?;
+            }
         }
         Ok(())
     }
@@ -353,16 +380,17 @@ pub fn all(out: &Path, plan: &Plan, what: &[&str]) -> Result<()> {
     let done = read(out)?.iter().map(Line::key).collect();
     let mut bench = Bench { out, done };
     let asked = |id: &str| what.is_empty() || what.contains(&id);
-    let development = corruptions::DEVELOPMENT.iter().map(|corruption| ("development", corruption));
-    let reserved = RESERVED.iter().filter(|_| plan.reserved).map(|corruption| ("reserved", corruption));
-    let list: Vec<_> = development.chain(reserved).filter(|(_, corruption)| asked(corruption.id)).step_by(plan.every).collect();
-    for index in 0..plan.seeds {
-        let seed = plan.first + index;
+    let of = |half: &'static str, list: &'static [Corruption]| list.iter().map(move |corruption| (half, corruption));
+    let every =
+        HALVES.into_iter().filter(|(half, _)| plan.reserved || *half != RESERVED_HALF).flat_map(|(half, list)| of(half, list));
+    let list: Vec<_> = every.filter(|(_, corruption)| asked(corruption.id)).step_by(plan.every).collect();
+    for seed in plan.seeds.clone() {
+        let hidden = HIDDEN[seed as usize % HIDDEN.len()];
         bench.corruptions(&list, seed, None)?;
-        bench.corruptions(&list, seed, Some(HIDDEN[index as usize % HIDDEN.len()]))?;
+        bench.corruptions(&list, seed, Some(hidden))?;
     }
     for index in (0..plan.clean).filter(|_| asked(CLEAN_HALF)) {
-        bench.clean(index, plan.first + CLEAN + index)?;
+        bench.clean(index, plan.seeds.start.next_multiple_of(100) + CLEAN + index)?;
     }
     Ok(())
 }

@@ -1,9 +1,7 @@
 //! From lines of cases to the tables that are reported.
 
 use crate::change::{Corruption, Part};
-use crate::corruptions::DEVELOPMENT;
-use crate::reserved::RESERVED;
-use crate::run::{CLEAN_HALF, CONVENTION_FAULT, Line, NULL, UNCORRUPTED, read};
+use crate::run::{CLEAN_HALF, CONVENTION_FAULT, HALVES, Line, NULL, UNCORRUPTED, read};
 use phyture::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -70,7 +68,7 @@ pub fn print(path: &Path) -> Result<()> {
     let lines = read(path)?;
     let clean: BTreeMap<(u64, &str), &Line> =
         lines.iter().filter(|line| line.half == UNCORRUPTED).map(|line| ((line.seed, line.hidden.as_str()), line)).collect();
-    for (half, corruptions) in [("development", DEVELOPMENT), ("reserved", RESERVED)] {
+    for (half, corruptions) in HALVES {
         // In the order of the list.
         let own = |corruption: &'static Corruption| {
             lines.iter().filter(move |line| line.half == half && line.corruption == corruption.id).filter_map(|line| {

@@ -235,6 +235,8 @@ pub struct Notes {
     pub confusable_with: &'static [&'static str],
     /// The manoeuvre that would tell it from those.
     pub would_tell_apart: &'static str,
+    /// What is wrong with a log that looks like it, and how the two would differ.
+    pub fault_of_log: Option<&'static str>,
     /// Where the formula and the sizes come from.
     pub source: &'static str,
     /// Whether a search tries it; a negligible effect is listed only.

@@ -172,6 +172,7 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
         would_tell_apart: definition
             .and_then(|definition| definition.notes)
             .map_or_else(String::new, |notes| notes.would_tell_apart.into()),
+        fault_of_log: definition.and_then(|definition| definition.notes?.fault_of_log).map(str::to_owned),
         formula: effect.to_string(),
         ..Step::default()
     }

@@ -109,6 +109,9 @@ pub struct Step {
     pub parameters: Vec<ParameterValue>,
     /// The manoeuvre that would tell it from what it is mistaken for.
     pub would_tell_apart: String,
+    /// What could be wrong with the log instead, and how that would differ.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fault_of_log: Option<String>,
     /// The effect as formulas with its numbers in place.
     pub formula: String,
     /// A flight without which its sign would change, if there is one.

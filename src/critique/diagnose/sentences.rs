@@ -193,6 +193,11 @@ pub fn effects(diagnosis: &Diagnosis, confirmation: Confirmation) -> String {
     }
 }
 
+/// What could be wrong with the log in the place of an effect.
+pub fn or_the_log(fault: &str) -> String {
+    format!("or a fault of the log: {fault}")
+}
+
 /// What no effect of the catalogue explains.
 pub fn not_in_catalogue(unknown: &[UnknownChannel]) -> String {
     let one = |unknown: &UnknownChannel| {

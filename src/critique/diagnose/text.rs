@@ -100,6 +100,9 @@ fn step(f: &mut fmt::Formatter<'_>, number: usize, step: &Step, worth: Option<&W
             line(&format!("these flights cannot tell it from {}; to tell: {}", others.join(", "), step.would_tell_apart))?;
         }
     }
+    if let Some(fault) = step.fault_of_log.as_ref().filter(|_| long) {
+        line(&sentences::or_the_log(fault))?;
+    }
     match &step.rests_on_flight {
         Some(flight) => line(&format!("CAUTION: rests on flight `{flight}` alone")),
         None => Ok(()),

@@ -5,7 +5,7 @@ use super::super::compare::{channel_columns, channel_panels};
 use super::super::figures;
 use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
-use crate::critique::diagnose::sentences::{removable, rises, share, tried, unseen, worth};
+use crate::critique::diagnose::sentences::{or_the_log, removable, rises, share, tried, unseen, worth};
 use crate::critique::diagnose::{CandidateReport, Diagnosis, Locked, Status, Step, number_remark};
 use crate::critique::table::{Kind, OWN_FROM_FIRST_HALF, significant};
 use crate::error::{Error, Result};
@@ -305,6 +305,10 @@ pub(super) fn not_judged(diagnosis: &Diagnosis) -> Vec<Part> {
     for step in diagnosis.steps.iter().filter(|step| !step.indistinguishable.is_empty()) {
         let others = step.indistinguishable.join(", ");
         parts.push(Part::Text(format!("{} or {others}? These flights fit both. To tell: {}.", step.effect, step.would_tell_apart)));
+    }
+    for step in &diagnosis.steps {
+        let fault = step.fault_of_log.iter();
+        parts.extend(fault.map(|fault| Part::Text(format!("{}, {}.", step.effect, or_the_log(fault)))));
     }
     let mut candidates: Vec<&CandidateReport> =
         diagnosis.candidates.iter().filter(|candidate| candidate.status != Status::Accepted).collect();

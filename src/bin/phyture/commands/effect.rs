@@ -156,6 +156,9 @@ fn text(definition: &Definition) -> String {
         line(0, format!("Shows in          {}", notes.excitation));
         line(0, format!("Mistaken for      {alike}"));
         line(0, format!("Would tell apart  {}", notes.would_tell_apart));
+        if let Some(fault) = notes.fault_of_log {
+            line(0, format!("Fault of a log    {fault}"));
+        }
         line(0, format!("Source            {}", notes.source));
         line(0, format!("Vehicles          {}", vehicles.join(", ")));
         if !notes.searched {
@@ -199,6 +202,7 @@ fn described(definition: &Definition) -> Value {
         "excitation": definition.notes.map(|notes| notes.excitation),
         "confusable_with": definition.notes.map(|notes| notes.confusable_with),
         "would_tell_apart": definition.notes.map(|notes| notes.would_tell_apart),
+        "fault_of_log": definition.notes.and_then(|notes| notes.fault_of_log),
         "source": definition.notes.map(|notes| notes.source),
         "vehicles": definition.notes.map(|notes| notes.vehicles),
         "searched": definition.notes.is_some_and(|notes| notes.searched),
