@@ -9,8 +9,7 @@ const ALL_OR_HALF: [Part; 2] = [Part::All, Part::Half];
 const ALL_OR_ONE: [Part; 2] = [Part::All, Part::One];
 const HALF_OR_ONE: [Part; 2] = [Part::Half, Part::One];
 
-/// m/s.
-const KNOT: f64 = 1852.0 / 3600.0;
+const FOOT_M: f64 = 0.3048;
 
 /// The second round.
 pub const FURTHER: &[Corruption] = &[
@@ -98,12 +97,12 @@ pub const FURTHER: &[Corruption] = &[
         right: &[&["coriolis"], &["inertial_derivative"], &["targets", "inertial"], &["w x v"]],
     },
     Corruption {
-        id: "velocity_knots",
+        id: "vx_feet",
         kind: Kind::Units,
-        says: "the velocity is in knots",
+        says: "the forward velocity alone is in ft/s",
         parts: ALL_OR_ONE,
-        change: Change::Columns(|log, _| log.scale(&VELOCITY, 1.0 / KNOT)),
-        right: &[&["knot"], &["\"kn\""], &["velocity = \"kt"]],
+        change: Change::Columns(|log, _| log.scale(&[Column::Vx], 1.0 / FOOT_M)),
+        right: &[&["vx", "feet"], &["vx", "ft"], &["vx", "scale"], &["vx", "3.28"], &["vx", "times"]],
     },
     Corruption {
         id: "wy_degrees",
