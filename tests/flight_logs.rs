@@ -357,13 +357,26 @@ fn the_folder_gives_names_and_classes() -> Outcome {
     assert_eq!(data.flights.iter().map(|flight| flight.manoeuvre.as_str()).collect::<Vec<_>>(), ["a", "a10"]);
     assert_says(&data.notes.join("\n"), &["left out, as dataset.toml says: `turn`"]);
 
-    put(root, "dataset.toml", "leave_out = [\"b\", \"hover/a9\", \"c\"]")?;
+    put(root, "dataset.toml", "leave_out = [\"b\", \"hover/a9\"]")?;
     let data = data_set(root, &plain)?;
     assert_eq!(data.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["hover/a10", "turn/a9"]);
-    let notes = data.notes.join("\n");
-    assert_says(&notes, &["left out, as dataset.toml says: hover/a9, turn/b", "but no flight has this name: c"]);
+    assert_says(&data.notes.join("\n"), &["left out, as dataset.toml says: hover/a9, turn/b"]);
+    // A part of the set need not hold them all.
+    let part = data_set(&root.join("hover"), &plain)?;
+    assert_eq!(part.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["a10"]);
+    assert_says(&part.notes.join("\n"), &["left out, as dataset.toml says: a9", "not among these flights: b"]);
+    for (wrong, meant) in [("hovr/a10", "hover/a10"), ("a19", "a10")] {
+        put(root, "dataset.toml", &format!("leave_out = [\"{wrong}\"]"))?;
+        let says = ["dataset.toml: `leave_out` is", "no flight of this data set", "one of the flights `hover/a10`, `hover/a9`"];
+        let refused = refusal(data_set(root, &plain));
+        assert_says(&refused, &says);
+        assert_says(&refused, &[&format!("did you mean `{meant}`?")]);
+    }
     put(root, "dataset.toml", "leave_out = [\"a9\"]")?;
-    assert_says(&refusal(data_set(root, &plain)), &["leave_out", "`a9`, which 2 flights are called", "a flight's path"]);
+    assert_says(
+        &refusal(data_set(root, &plain)),
+        &["dataset.toml: `leave_out` is `a9`, which 2 flights are called", "a flight's path"],
+    );
 
     // A description elsewhere is taken instead, and its faults name it.
     put(root, "other.toml", "exclud = \"turn\"")?;

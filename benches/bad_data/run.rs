@@ -4,7 +4,7 @@ use crate::cases::SINGLES;
 use crate::change::{Chance, Change, Corruption, Log, Part};
 use crate::corruptions;
 use crate::further::FURTHER;
-use crate::mend::{mend, through_files};
+use crate::mend::through_files;
 use crate::reserved::RESERVED;
 use phyture::critique::check::{self, CheckReport, check};
 use phyture::critique::diagnose::{Options, diagnose};
@@ -245,7 +245,8 @@ fn recognise(line: &mut Line, corruption: &Corruption, set: &DataSet, hit: &[Str
 
 /// The same flights with what `check` says to set; `None` where it says nothing that a file can hold.
 fn mended(line: &Line, report: &CheckReport, set: &DataSet) -> Option<Mended> {
-    let description = mend(report).filter(|_| report.fault)?;
+    let suggestion = report.suggestion(&set.source).filter(|suggestion| !suggestion.mends.is_empty())?;
+    let description = suggestion.text;
     let mut after = Line { seed: line.seed, ..Line::default() };
     match through_files(&set.flights, Some(&description)) {
         Ok(set) => drop(judge(&mut after, &set, true)),

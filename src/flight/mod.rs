@@ -11,6 +11,8 @@ mod column;
 #[cfg(feature = "files")]
 mod convert;
 pub mod derived;
+#[cfg(feature = "files")]
+mod description;
 pub mod differentiate;
 #[cfg(feature = "parquet")]
 pub mod guard;
@@ -51,9 +53,16 @@ pub mod write;
 
 pub use attitude::Axes;
 pub use column::Column;
+#[cfg(feature = "files")]
+pub(crate) use description::Description;
+#[cfg(feature = "files")]
+pub(crate) use schema::{Frame, Schema, TargetKind};
 pub use source::Source;
+#[cfg(feature = "files")]
+pub(crate) use units::{column_names, columns_of};
 
 use crate::error::{Error, Result};
+use crate::suggest::did_you_mean;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 use store::Store;
@@ -303,11 +312,10 @@ impl DataSet {
         self.flights.iter().map(Flight::duration_s).sum()
     }
 
-    /// Leaves flights out, by their paths or, where only one has it, by their own names, with a note that says why; names that no flight has are
-    /// told too.
+    /// Leaves flights out, by their paths or, where only one has it, by their own names, with a note that says why.
     ///
     /// # Errors
-    /// [`Error::Config`] for a name that several flights have.
+    /// [`Error::Config`] for a name that no flight has, with the nearest that one has, and for a name that several have; all flights stay then.
     ///
     /// # Examples
     /// ```
@@ -323,15 +331,20 @@ impl DataSet {
     /// # }
     /// ```
     pub fn leave_out(&mut self, wanted: &[String], why: &str) -> Result<()> {
-        let (mut known, mut unknown): (Vec<usize>, Vec<&str>) = (Vec::new(), Vec::new());
+        let mut known = Vec::new();
         for name in wanted {
+            let fault = |found: &str, expected: String| Error::Config {
+                place: "flights".into(),
+                field: "leave_out".into(),
+                found: format!("`{name}`, which {found}"),
+                expected,
+            };
             match names::find(&self.flights, name).as_slice() {
-                [] => unknown.push(name),
+                [] => return Err(fault("is no flight of this data set", self.one_like(name))),
                 [one] => known.push(*one),
                 several => {
-                    let found = format!("`{name}`, which {} flights are called", several.len());
-                    let expected = "a flight's path below the data folder".to_owned();
-                    return Err(Error::Config { place: why.into(), field: "leave_out".into(), found, expected });
+                    let found = format!("{} flights are called", several.len());
+                    return Err(fault(&found, "a flight's path below the data folder".into()));
                 }
             }
         }
@@ -341,15 +354,19 @@ impl DataSet {
             let names: Vec<&str> = known.iter().map(|&flight| self.flights[flight].name.as_str()).collect();
             self.notes.push(format!("left out, {why}: {}", names.join(", ")));
         }
-        if !unknown.is_empty() {
-            self.notes.push(format!("to be left out, {why}, but no flight has this name: {}", unknown.join(", ")));
-        }
         let mut index = 0;
         self.flights.retain(|_| {
             index += 1;
             known.binary_search(&(index - 1)).is_err()
         });
         Ok(())
+    }
+
+    /// What could have been written for a name that no flight has.
+    fn one_like(&self, name: &str) -> String {
+        let known = || self.flights.iter().map(|flight| flight.name.as_str());
+        let hint = did_you_mean(name, known().chain(known().map(names::own_name)));
+        format!("one of the flights {}{hint}", names::listed(known().collect::<Vec<_>>().into_iter()))
     }
 }
 

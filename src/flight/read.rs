@@ -9,7 +9,7 @@ use super::listing::{Listing, Log, check_unique, ending, list};
 use super::schema::Schema;
 use super::source::Read;
 use super::table::{fault, read_csv};
-use super::{DataSet, Flight, Source, stanford};
+use super::{DataSet, Flight, Source, names, stanford};
 use crate::error::{Error, Result};
 use std::collections::hash_map::{DefaultHasher, Entry};
 use std::collections::{BTreeMap, HashMap};
@@ -44,12 +44,13 @@ pub(super) const DESCRIPTION: &str = "dataset.toml";
 pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let mut notes = Vec::new();
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
-    let (mut schema, mut described) = (Schema::default(), None);
+    let (mut schema, mut described, mut text) = (Schema::default(), None, None);
     if let Some(description) = options.dataset.clone().or_else(|| description(folder)) {
         notes.push(format!("read as {} describes", description.display()));
         let bytes = std::fs::read(&description).map_err(Error::io(&description))?;
         schema = Schema::parse(&bytes, &description.display().to_string())?;
         described = Some(Read::of(&description, &bytes));
+        text = String::from_utf8(bytes).ok();
     }
     let Listing { logs, notes: unread } = list(path, &schema)?;
     notes.extend(unread);
@@ -93,20 +94,45 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
             .iter()
             .map(|(first, others)| format!("left out, since they hold the same numbers as `{first}`: {}", others.join(", "))),
     );
-    data.leave_out(&schema.leave_out, "as dataset.toml says")?;
+    // A description that was found above the folder, or beside a single log, is that of a larger set.
+    let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
+    leave_out(&mut data, &schema, &logs, is_whole)
+        .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     if data.flights.is_empty() {
         let found = format!("{} logs of which no piece is left", logs.len());
         let expected = format!("at least one flight; what was left out: {}", data.notes.join("; "));
         return Err(fault(path, found, expected));
     }
     let quaternion = (quaternions == logs.len()).then_some(schema.quaternion);
-    data.source = Source { axes: schema.axes, quaternion, stated: schema.stated, ..Source::default() };
+    data.source = Source { axes: schema.axes, quaternion, stated: schema.stated, description: text, ..Source::default() };
     data.source.record(path, read, described);
     if held.into_inner() > LARGEST_HELD {
         data.flights = data.flights.into_iter().map(Flight::out_of_memory).collect();
     }
     data.flights.sort_by(|a, b| (&a.manoeuvre, a.name.len(), &a.name).cmp(&(&b.manoeuvre, b.name.len(), &b.name)));
     Ok(data)
+}
+
+/// Leaves out what the description says. A name that is not among the flights may be that of another part of a larger set, or of a log of which no
+/// piece is left: that is told.
+fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], is_whole: bool) -> Result<()> {
+    let has_log = |name: &str| !names::matching(name, logs.iter().map(|log| log.name.as_str())).is_empty();
+    let is_asked = |name: &String| !names::find(&data.flights, name).is_empty() || (is_whole && !has_log(name));
+    let (asked, gone): (Vec<String>, Vec<String>) = schema.leave_out.iter().cloned().partition(is_asked);
+    if !gone.is_empty() {
+        data.notes.push(format!("to be left out, as dataset.toml says, but not among these flights: {}", gone.join(", ")));
+    }
+    data.leave_out(&asked, "as dataset.toml says")
+}
+
+/// The error with the description that the key stands in.
+fn at(description: &Path, error: Error) -> Error {
+    match error {
+        Error::Config { field, found, expected, .. } => {
+            Error::Config { place: description.display().to_string(), field, found, expected }
+        }
+        other => other,
+    }
 }
 
 /// What two flights share only if all their numbers are the same.

@@ -36,14 +36,14 @@ use toml::{Table, Value};
 
 /// Components the file's velocity is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Frame {
+pub(crate) enum Frame {
     Body,
     Inertial,
 }
 
 /// What the file's `vx_dot vy_dot vz_dot` hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum TargetKind {
+pub(crate) enum TargetKind {
     /// Derivative of the body components of velocity.
     Derivative,
     /// Accelerometer: non-gravitational force by mass, body axes.
@@ -56,7 +56,7 @@ pub(super) enum TargetKind {
 
 /// How a flight's manoeuvre is named.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Manoeuvre {
+pub(crate) enum Manoeuvre {
     /// After the folder the file is in.
     Folder,
     /// After one part (counted from 1) of the file's name without its ending.
@@ -65,7 +65,7 @@ pub(super) enum Manoeuvre {
 
 /// A rule for known-bad cells of some columns of the file.
 #[derive(Clone, Debug)]
-pub(super) struct Repair {
+pub(crate) struct Repair {
     pub columns: Vec<String>,
     /// All must be true of `value`, else the cell is bad. NaN is bad always.
     pub valid: Vec<Formula>,
@@ -75,7 +75,7 @@ pub(super) struct Repair {
 
 /// A parsed `dataset.toml`; the default is the canonical form.
 #[derive(Clone, Debug)]
-pub(super) struct Schema {
+pub(crate) struct Schema {
     pub axes: Axes,
     pub velocity: Frame,
     pub targets: TargetKind,

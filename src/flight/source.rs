@@ -21,6 +21,8 @@ pub struct Source {
     /// What the description states: `axes`, `velocity`, `units.vx`, `columns.roll`, … with the text given. A group of units stands under
     /// each of its columns, too.
     pub stated: BTreeMap<String, String>,
+    /// The text of the description in force.
+    pub description: Option<String>,
 }
 
 #[cfg(feature = "files")]

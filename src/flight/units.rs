@@ -61,8 +61,15 @@ impl Group {
     }
 }
 
+/// The columns that a word of `[units]` or `[late]` stands for: those of the group, or the one of that name; none for another word.
+pub(crate) fn columns_of(word: &str) -> &'static [&'static str] {
+    let single = |group: &'static Group| group.columns.iter().find(|column| **column == word).map(std::slice::from_ref);
+    let of_group = |group: &'static Group| if group.name == word { Some(group.columns) } else { single(group) };
+    GROUPS.iter().find_map(of_group).unwrap_or_default()
+}
+
 /// All column names a log can give: `t`, the canonical columns, the quaternion.
-pub(super) fn column_names() -> impl Iterator<Item = &'static str> {
+pub(crate) fn column_names() -> impl Iterator<Item = &'static str> {
     GROUPS.iter().flat_map(|group| group.columns.iter().copied())
 }
 
@@ -79,5 +86,7 @@ mod tests {
             assert_eq!(group.and_then(|group| group.factor(column.unit())), Some(1.0), "{column:?}");
         }
         assert_eq!(column_names().count(), Column::COUNT + 5);
+        assert_eq!((columns_of("angles"), columns_of("u2")), (&["roll", "pitch", "yaw"][..], &["u2"][..]));
+        assert!(columns_of("angle").is_empty());
     }
 }

@@ -162,7 +162,9 @@ pub enum Command {
         explainable: Option<PathBuf>,
     },
     /// Conventions, timing and excitation of a data set; exit code 3 on a convention fault
-    #[command(after_help = "Example:\n  phyture check flights --json check.json")]
+    #[command(
+        after_help = "Examples:\n  phyture check flights --json check.json\n  phyture check flights --suggest flights/dataset.toml"
+    )]
     Check {
         /// Flights.
         #[command(flatten)]
@@ -170,6 +172,10 @@ pub enum Command {
         /// Model file [default: DATA/model.toml if there is one]
         #[arg(short, long)]
         model: Option<PathBuf>,
+        /// Write a dataset.toml that mends what is at fault, on top of the one in force; where it takes the name of that one, the old one is kept
+        /// beside it
+        #[arg(long, value_name = "FILE")]
+        suggest: Option<PathBuf>,
     },
     /// Least squares of the model's coefficients on the training part
     #[command(after_help = "Example:\n  phyture calibrate flights -m n9.toml -o n9-calibrated.toml")]

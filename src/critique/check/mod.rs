@@ -19,10 +19,14 @@ mod relations;
 mod report;
 mod sticks;
 mod streams;
+#[cfg(feature = "files")]
+mod suggestion;
 mod timing;
 
 pub use excitation::{Collinearity, Excitation};
 pub use report::{CheckReport, Finding, Subject, Verdict};
+#[cfg(feature = "files")]
+pub use suggestion::{Open, Suggestion};
 pub use timing::DelayProfile;
 
 use crate::flight::attitude::QuaternionOrder;

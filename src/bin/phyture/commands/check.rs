@@ -1,19 +1,54 @@
-//! `check`: conventions, timing and excitation of a data set.
+//! `check`: conventions, timing and excitation of a data set, and the description that mends what is at fault.
 
 use super::{CHECK_FAILED, Context};
 use crate::arguments::Data;
 use phyture::Result;
-use phyture::critique::check::{CheckReport, check};
+use phyture::critique::check::{CheckReport, Suggestion, check};
+use phyture::critique::wrap::wrapped;
+use phyture::disk::{Target, write_atomically};
+use phyture::flight::DataSet;
 use std::path::Path;
 use std::process::ExitCode;
 
-/// Checks and prints; exit code 3 on a convention fault, after the report is written.
-pub fn run(context: &Context, data: &Data, model: Option<&Path>) -> Result<ExitCode> {
+/// Checks and prints; exit code 3 on a convention fault, after the report and what was asked for are written.
+pub fn run(context: &Context, data: &Data, model: Option<&Path>, suggest: Option<&Path>) -> Result<ExitCode> {
+    let in_force = data.dataset.clone().unwrap_or_else(|| data.data.join("dataset.toml"));
+    let target = suggest.map(|path| context.new_file(path, &[&in_force])).transpose()?;
     let set = context.flights(data, 1)?;
     let model = context.model_if_any(model, data)?;
     let report = check(&set, model.as_ref());
     // The notes on the data have been said, and folded.
     context.say(format!("\n{}", CheckReport { notes: Vec::new(), ..report.clone() }));
+    match target {
+        Some(target) => write(context, &report, &set, &target, data)?,
+        None if report.suggestion(&set.source).is_some_and(|suggestion| !suggestion.mends.is_empty()) => {
+            context.say("--suggest FILE writes a dataset.toml with the lines that mend this");
+        }
+        None => {}
+    }
     context.json(&report)?;
     Ok(if report.fault { ExitCode::from(CHECK_FAILED) } else { ExitCode::SUCCESS })
+}
+
+/// Writes what mends the faults, and says what is left to a person.
+fn write(context: &Context, report: &CheckReport, set: &DataSet, target: &Target, data: &Data) -> Result<()> {
+    let Some(Suggestion { text, mends, open }) = report.suggestion(&set.source) else {
+        context.say(format!("nothing is at fault; {} is not written", target.path().display()));
+        return Ok(());
+    };
+    open.iter().for_each(|open| context.say(wrapped("", &format!("left to you: {}; {}", open.name, open.reason))));
+    if mends.is_empty() {
+        context.say(format!("no line of a description mends this; {} is not written", target.path().display()));
+        return Ok(());
+    }
+    let path = context.ready(target)?;
+    write_atomically(path, |file| file.write_all(text.as_bytes()))?;
+    context.say(wrapped("", &format!("written to {}, which mends {}", path.display(), mends.join(", "))));
+    let of = if path.file_name() == Some("dataset.toml".as_ref()) && path.parent() == Some(&data.data) {
+        String::new()
+    } else {
+        format!(" --dataset {}", path.display())
+    };
+    context.say(format!("next: phyture check {}{of}", data.data.display()));
+    Ok(())
 }

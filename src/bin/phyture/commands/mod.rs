@@ -57,7 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             let wanted = simulate::Wanted { minutes, hide, baseline, like, layout, level, noise, wind, explainable };
             simulate::run(&context, dir, &wanted)
         }
-        Command::Check { data, model } => check::run(&context, data, model.as_deref()),
+        Command::Check { data, model, suggest } => check::run(&context, data, model.as_deref(), suggest.as_deref()),
         Command::Calibrate { data, model, output, division } => calibrate::run(&context, data, model.as_deref(), output, division),
         Command::Compare { data, model, network, report, stride, all, ridge, uncertainty, explainable, division } => {
             let wanted = compare::Wanted {
@@ -346,7 +346,12 @@ const MOST_CHECKS: usize = 3;
 /// The flights without those that were asked to be left out.
 fn without(mut set: DataSet, data: &Data) -> Result<DataSet> {
     let names: Vec<String> = data.leave_out.iter().filter(|name| *name != SUSPECTS).cloned().collect();
-    set.leave_out(&names, "as --leave-out says")?;
+    set.leave_out(&names, "as --leave-out says").map_err(|error| match error {
+        Error::Config { found, expected, .. } => {
+            Error::Config { place: "command line".into(), field: "--leave-out".into(), found, expected }
+        }
+        other => other,
+    })?;
     if data.leave_out.iter().any(|name| name == SUSPECTS) {
         for _ in 0..MOST_CHECKS {
             let suspects = check(&set, None).suspects();
