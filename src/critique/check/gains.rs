@@ -82,7 +82,10 @@ impl Gains {
     /// Findings of the relation of this name, see [`super::relations`]; of no axis of which less is explained.
     pub fn findings(&self, relation: &str, least_explained: f64) -> Vec<Finding> {
         let three = |regressions: &[BlockRegression<1>; 3]| {
-            let estimates = regressions.each_ref().map(|regression| enough(regression, least_explained).map(|[estimate]| estimate));
+            let estimate = |regression: &BlockRegression<1>| {
+                enough(regression, least_explained).map(|[estimate]| reversed(estimate, regression.explained()))
+            };
+            let estimates = regressions.each_ref().map(estimate);
             (regressions[0].blocks() > 0).then_some(estimates)
         };
         let (estimates, columns, units) = match relation {
@@ -104,6 +107,14 @@ fn enough<const K: usize>(regression: &BlockRegression<K>, least_explained: f64)
     let is_enough = regression.blocks() >= FEW_BLOCKS;
     let explains = || least_explained == 0.0 || regression.explained().is_some_and(|share| share >= least_explained);
     if is_enough && explains() { regression.estimates() } else { None }
+}
+
+/// The interval of a gain, as far as the regression of the rate on the change reaches: noise in the rate makes the gain too small, noise in the change
+/// the other one, and the true one lies between the two (Frisch 1934).
+fn reversed(estimate: Estimate, explained: Option<f64>) -> Estimate {
+    let Estimate { value, interval: [low, high] } = estimate;
+    let other = explained.filter(|share| *share > 0.0).map_or(value, |share| value / share);
+    Estimate { value, interval: [low.min(other), high.max(other)] }
 }
 
 fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<Estimate>) -> Finding {

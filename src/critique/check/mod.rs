@@ -3,16 +3,19 @@
 //! A wrong sign or frame looks like a missing effect, and a large one; so this comes first and blocks what follows. Kinematic
 //! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
 //! little (`forces`); which stick moves which axis is asked of each flight (`sticks`). Each flight is judged by itself and against the others
-//! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), and cells that cannot be are counted (`cells`).
+//! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), dropped samples (`dropouts`) and cells that cannot be
+//! (`cells`) are counted.
 //! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
 mod cells;
+mod dropouts;
 mod evidence;
 mod excitation;
 mod forces;
 mod gains;
 mod increments;
+mod limits;
 mod odd;
 mod regression;
 mod relations;
@@ -93,15 +96,18 @@ struct Gathered {
     unjudged: BTreeSet<usize>,
     together: Evidence,
     sticks: Sticks,
+    /// Sticks whose values pile up at an end, by flight.
+    piled: Vec<(usize, limits::Piled)>,
 }
 
 impl Gathered {
     fn new(data: &DataSet) -> Self {
         let quaternion = data.source.quaternion.map(other_order);
         let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
-        let (each, sticks) = read(data, quaternion, step_s);
+        let Read { each, sticks, piled } = read(data, quaternion, step_s);
         let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
-        let poor: Vec<Finding> = streams::findings(&data.flights).into_iter().chain(spikes).collect();
+        let poor = streams::findings(&data.flights).into_iter().chain(spikes);
+        let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).collect();
         let faults = poor.iter().filter(|finding| finding.verdict == Verdict::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
@@ -119,7 +125,7 @@ impl Gathered {
         let odd = Odd::new(&judged, &all, &data.flights);
         except.extend(&odd.flights);
         unjudged.extend(&odd.flights);
-        Self { poor, odd: odd.findings, misread, together: of(&except), except, unjudged, sticks }
+        Self { poor, odd: odd.findings, misread, together: of(&except), except, unjudged, sticks, piled }
     }
 
     /// All that is said of conventions and of streams against each other, causes before symptoms.
@@ -129,7 +135,9 @@ impl Gathered {
         findings.extend(self.together.kinematics(0.0));
         findings.extend(self.together.forces.lateral());
         if !self.misread {
+            let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             findings.extend(self.sticks.findings(&data.flights, &self.unjudged));
+            findings.extend(cut_off);
         }
         // What thrust does along z is known from the collective alone.
         let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
@@ -152,26 +160,33 @@ impl Gathered {
 const BESIDE: usize = 8;
 
 /// What each flight says by itself.
-fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> (Vec<Own>, Sticks) {
-    let mut sticks = Sticks::new();
+struct Read {
+    each: Vec<Own>,
+    sticks: Sticks,
+    piled: Vec<(usize, limits::Piled)>,
+}
+
+fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
     let one = |flight: usize| {
         let motion = increments::Motion::new(&data.flights[flight], &data.source);
         data.flights[flight].rest();
-        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion))
+        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion), limits::of(&motion))
     };
     let indices: Vec<usize> = (0..data.flights.len()).collect();
     #[cfg(feature = "rayon")]
-    let found: Vec<(Own, sticks::Regressions)> = {
+    let found: Vec<_> = {
         use rayon::prelude::*;
         indices.chunks(BESIDE).flat_map(|some| some.par_iter().map(|&flight| one(flight)).collect::<Vec<_>>()).collect()
     };
     #[cfg(not(feature = "rayon"))]
-    let found: Vec<(Own, sticks::Regressions)> = indices.into_iter().map(one).collect();
-    let each = found.into_iter().enumerate().map(|(flight, (own, regressions))| {
-        sticks.push(flight, regressions);
-        own
-    });
-    (each.collect(), sticks)
+    let found: Vec<_> = indices.into_iter().map(one).collect();
+    let mut read = Read { each: Vec::new(), sticks: Sticks::new(), piled: Vec::new() };
+    for (flight, (own, regressions, piled)) in found.into_iter().enumerate() {
+        read.each.push(own);
+        read.sticks.push(flight, regressions);
+        read.piled.push((flight, piled));
+    }
+    read
 }
 
 /// Coefficients of gravity and of the Coriolis term; where a unit of length explains their size, that unit in their place.

@@ -13,6 +13,7 @@ use super::report::{Finding, Verdict};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 /// The accelerations by which sticks are told, and the stick that moves each: the conventions of this program.
 const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
@@ -34,6 +35,12 @@ const MOVING: f64 = 0.5;
 pub(super) const EXPLAINED: f64 = 0.5;
 /// Gains of one aircraft differ by less than this factor from flight to flight: square of the rotor speed, weight, density.
 const LARGEST_RATIO: f64 = 3.0;
+/// Two groups of flights write a stick differently from this ratio of its gains on …
+const LEAST_RATIO: f64 = 1.7;
+/// … where they are so many times as far apart as the gains of each scatter.
+const APART: f64 = 8.0;
+/// So many axes that answer to no stick make the controls those of another motion.
+const DEAF: usize = 3;
 
 pub(super) type Regressions = [BlockRegression<COLUMNS>; 4];
 
@@ -113,27 +120,16 @@ impl Sticks {
         let mut regressions = empty();
         for (piece, number) in motion.pieces(0) {
             let block = (0, number);
-            let at = |sample: usize| &motion.instants[sample];
-            let integrals: [f64; 9] = motion.integral(&piece, |sample| {
-                let now = at(sample);
-                let [p, q, r] = now.rates;
-                let [one, two, three, four] = now.controls;
-                // What moves the heave beside the rotor.
-                let known = now.gravity[2] - cross(now.rates, now.velocity)[2];
-                [p, q, r, now.velocity[2], one, two, three, four, known]
+            let integrals: [f64; 8] = motion.integral(&piece, |sample| {
+                let [p, q, r, w] = [0, 1, 2, 3].map(|axis| state_of(motion, sample, axis));
+                let [one, two, three, four] = motion.instants[sample].controls;
+                [p, q, r, w, one, two, three, four]
             });
-            let [rates, others] = [&integrals[..4], &integrals[4..]];
+            let [states, sticks] = [&integrals[..4], &integrals[4..]];
             let length_s = super::increments::length_s(motion, &piece);
-            let change = |of: &dyn Fn(usize) -> f64| of(piece.end) - of(piece.start);
-            let changes = [
-                change(&|sample| at(sample).rates[0]),
-                change(&|sample| at(sample).rates[1]),
-                change(&|sample| at(sample).rates[2]),
-                change(&|sample| at(sample).velocity[2]) - others[4],
-            ];
             for (axis, regression) in regressions.iter_mut().enumerate() {
-                let row = [rates[axis], others[0], others[1], others[2], others[3], length_s];
-                regression.add(block, &row, changes[axis]);
+                let row = [states[axis], sticks[0], sticks[1], sticks[2], sticks[3], length_s];
+                regression.add(block, &row, change_of(motion, &piece, axis));
             }
         }
         regressions
@@ -180,6 +176,7 @@ impl Sticks {
             findings.extend((0..4).filter_map(|stick| of_size(stick, &known, flights)));
             let moves: Vec<&(usize, Regressions)> = judged().collect();
             findings.extend((0..4).filter_map(|stick| of_rest(stick, &moves, flights)));
+            findings.extend(findings.is_empty().then(|| foreign(&known, &moves, flights)).flatten());
         }
         if findings.is_empty() {
             let open: Vec<&str> =
@@ -192,6 +189,25 @@ impl Sticks {
         }
         findings
     }
+}
+
+/// What an axis damps: its rate, or the velocity along z.
+pub(super) fn state_of(motion: &Motion, sample: usize, axis: usize) -> f64 {
+    let now = &motion.instants[sample];
+    now.rates.get(axis).copied().unwrap_or(now.velocity[2])
+}
+
+/// What an axis does over a piece: the change of its rate, or of the velocity along z less what moves that beside the rotor.
+pub(super) fn change_of(motion: &Motion, piece: &Range<usize>, axis: usize) -> f64 {
+    let change = state_of(motion, piece.end, axis) - state_of(motion, piece.start, axis);
+    if axis < 3 {
+        return change;
+    }
+    let known = |sample: usize| {
+        let now = &motion.instants[sample];
+        [now.gravity[2] - cross(now.rates, now.velocity)[2]]
+    };
+    change - motion.integral(piece, known)[0]
 }
 
 /// A stick that stands still in some flights while its axis moves as in the others.
@@ -233,26 +249,68 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Opt
 }
 
 /// A stick whose gain in some flights is a multiple of that in the others, and whose travel is that much smaller: what takes the gain away from a
-/// rotor, a vortex ring or stall, leaves the stick its travel.
+/// rotor, a vortex ring or stall, leaves the stick its travel. Gains of one aircraft scatter from flight to flight; two groups far apart, each close
+/// together, are two ways of writing.
 fn of_size(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Option<Finding> {
-    let certain: Vec<(usize, Estimate, f64)> = known
+    let mut certain: Vec<Sized> = known
         .iter()
         .filter(|(_, answers)| answers.is_certain(stick, stick))
-        .map(|(flight, answers)| (*flight, answers.gains[stick][stick], answers.strength(stick, stick)))
+        .map(|(flight, answers)| Sized {
+            flight: *flight,
+            gain: answers.gains[stick][stick].value.abs().ln(),
+            strength: answers.strength(stick, stick).ln(),
+        })
         .collect();
-    let size = median(certain.iter().map(|entry| entry.1.value.abs()).collect())?;
-    let strength = median(certain.iter().map(|entry| entry.2).collect())?;
-    let beyond = |(_, estimate, own): &&(usize, Estimate, f64)| {
-        let [low, high] = estimate.interval.map(f64::abs);
-        let is_other = low.min(high) > LARGEST_RATIO * size || low.max(high) * LARGEST_RATIO < size;
-        is_other && (own / strength).ln().abs() < 0.5 * (estimate.value.abs() / size).ln().abs()
-    };
-    let such: Vec<(usize, f64)> = certain.iter().filter(beyond).map(|entry| (entry.0, entry.1.value.abs() / size)).collect();
-    let ratio = median(such.iter().map(|entry| entry.1).collect())?;
-    let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
+    certain.sort_unstable_by(|one, other| one.gain.total_cmp(&other.gain));
+    let split = (1..certain.len()).max_by(|one, other| {
+        let gap = |at: usize| certain[at].gain - certain[at - 1].gain;
+        gap(*one).total_cmp(&gap(*other))
+    })?;
+    let (small, large) = certain.split_at(split);
+    let middle = |group: &[Sized], of: fn(&Sized) -> f64| median(group.iter().map(of).collect());
+    let [low, high] = [middle(small, |one| one.gain)?, middle(large, |one| one.gain)?];
+    let scatter = small.iter().map(|one| (one.gain - low).abs()).chain(large.iter().map(|one| (one.gain - high).abs()));
+    let scatter = median(scatter.collect())?;
+    let (apart, gap) = (high - low, large[0].gain - small[split - 1].gain);
+    let travel = middle(large, |one| one.strength)? - middle(small, |one| one.strength)?;
+    if apart < LEAST_RATIO.ln() || gap < 0.5 * apart || apart < APART * scatter || travel.abs() > 0.5 * apart {
+        return None;
+    }
+    let (fewer, ratio) = if large.len() <= small.len() { (large, apart.exp()) } else { (small, (-apart).exp()) };
+    let mut indices: Vec<usize> = fewer.iter().map(|one| one.flight).collect();
+    indices.sort_unstable();
     let name = STICKS[stick];
     let message = format!("{name} has {ratio:.2} times the gain of the other flights: in other units there, or scaled");
     Some(in_flights(&format!("gain_{name}"), &indices, &message, flights))
+}
+
+/// What a flight says of the gain of a stick: the logarithms of the gain and of how far it moves its axis.
+struct Sized {
+    flight: usize,
+    gain: f64,
+    strength: f64,
+}
+
+/// Flights whose axes move as in the others and answer to no stick: these are of another flight, or of another time.
+fn foreign(known: &[(usize, &Answers)], each: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
+    let usual = |axis: usize| {
+        let certain = known.iter().filter(|(_, answers)| answers.is_certain(axis, axis));
+        let gains: Vec<f64> = certain.map(|(_, answers)| answers.gains[axis][axis].value.abs()).collect();
+        median(gains.clone()).filter(|_| 2 * gains.len() > known.len())
+    };
+    let usual: [Option<f64>; 4] = std::array::from_fn(usual);
+    let response = |axis: usize| median(each.iter().map(|(_, regressions)| regressions[axis].response()).collect());
+    let responses: [Option<f64>; 4] = std::array::from_fn(response);
+    let is_deaf = |flight: usize, answers: &Answers, axis: usize| {
+        let own = each.iter().find(|(index, _)| *index == flight).map(|(_, regressions)| regressions[axis].response());
+        let moves = own.zip(responses[axis]).is_some_and(|(own, usual)| own > MOVING * usual);
+        let [low, high] = answers.gains[axis][axis].interval.map(f64::abs);
+        moves && usual[axis].is_some_and(|usual| low.max(high) * LARGEST_RATIO < usual)
+    };
+    let such = known.iter().filter(|(flight, answers)| (0..4).filter(|&axis| is_deaf(*flight, answers, axis)).count() >= DEAF);
+    let such: Vec<usize> = such.map(|entry| entry.0).collect();
+    let message = "the axes move as in the other flights and answer to no stick: the controls do not belong to this motion, or are of another time";
+    (!such.is_empty()).then(|| in_flights("foreign_controls", &such, message, flights))
 }
 
 /// Which axes answer to which sticks, where these stand in each other's columns.

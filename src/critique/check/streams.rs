@@ -44,8 +44,12 @@ fn driving() -> impl Iterator<Item = Column> {
     Column::ALL.into_iter().filter(|column| !POSITION.contains(column) && !Column::TARGETS.contains(column))
 }
 
-/// Where noise is looked for: what a stick does need not be smooth, and the heading jumps by a turn.
+/// Where noise is looked for: the heading jumps by a turn.
 const NOISY: [Column; 8] = [Column::Roll, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
+/// White noise that is this share of a stick's root mean square is worth a word …
+const ROUGH: f64 = 0.2;
+/// … and that is this share makes lags of its own.
+const SWAMPED: f64 = 0.5;
 
 /// Frozen, held, rounded and noisy columns.
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
@@ -65,7 +69,8 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
     findings.extend(grains.into_iter().filter_map(|(column, grains)| grains.finding(flights, column)));
-    findings.extend(NOISY.into_iter().filter(present).filter_map(|column| noise(flights, column)));
+    findings.extend(NOISY.into_iter().chain(CONTROLS).filter(present).filter_map(|column| noise(flights, column)));
+    findings.extend(CONTROLS.into_iter().filter_map(|column| rough(flights, column)));
     findings
 }
 
@@ -272,6 +277,21 @@ fn noise(flights: &[Flight], column: Column) -> Option<Finding> {
         column.unit()
     );
     (such.len() as f64 <= MOST * flights.len() as f64).then(|| in_flights(&format!("noise_{name}"), &such, &message, flights))
+}
+
+/// A stick that trembles in most flights: as noise of the log it makes lags of its own; as the command of a controller it is what it is.
+fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
+    let size = super::sticks::median(flights.iter().map(|flight| noise_of(flight, column)).collect())?;
+    let deviation = variance(flights, column).sqrt();
+    let share = (size / deviation).powi(2);
+    let name = column.name();
+    let message = format!(
+        "{name} has noise of {size:.3} (rms), {:.0} % of its variance: unless that reaches the servo too, what it moves comes out too small, and late \
+         as behind a lag",
+        100.0 * share
+    );
+    let verdict = if size > SWAMPED * deviation { Verdict::Fault } else { Verdict::Warning };
+    (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
 }
 
 /// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there.

@@ -1,0 +1,150 @@
+//! Flights of the simulator with one thing wrong each: what `check` says, and the `dataset.toml` that it suggests, with which nothing is at fault.
+
+use phyture::Error;
+use phyture::critique::check::{Verdict, check};
+use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::write::data_set_csv;
+use phyture::flight::{Column, DataSet, Flight};
+use phyture::sim::{Level, Mechanisms, Simulation, simulate};
+use std::path::Path;
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+/// All flights changed.
+fn flights(change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Result<Vec<Flight>, Error> {
+    some(|_| true, change)
+}
+
+/// Some of the flights changed.
+fn some(which: impl Fn(usize) -> bool, change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Result<Vec<Flight>, Error> {
+    let simulation =
+        Simulation { seed: 11, minutes: 10.0, mechanisms: Mechanisms::none(), level: Level::TWO, ..Simulation::default() };
+    let changed = |(index, flight): (usize, &Flight)| {
+        let mut columns = Column::ALL.map(|column| flight.column(column).to_vec());
+        if which(index) {
+            change(&mut columns);
+        }
+        Flight::new(flight.name.clone(), flight.manoeuvre.clone(), 0.0, flight.step_s, columns, flight.targets)
+    };
+    simulate(&simulation)?.flights.iter().enumerate().map(changed).collect()
+}
+
+fn suggested(folder: &Path) -> Result<(bool, Option<String>), Error> {
+    let set = data_set(folder, &ReadOptions::default())?;
+    let report = check(&set, None);
+    Ok((report.fault, report.suggestion(&set.source).map(|suggestion| suggestion.text)))
+}
+
+#[test]
+fn two_faults_at_once_are_mended_by_what_is_suggested() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let path = folder.path();
+    data_set_csv(
+        path,
+        &flights(|columns| {
+            for velocity in [Column::Vx, Column::Vy, Column::Vz] {
+                columns[velocity as usize].iter_mut().for_each(|value| *value /= 0.3048);
+            }
+            columns.swap(Column::U1 as usize, Column::U2 as usize);
+        })?,
+    )?;
+    // What is behind a first fault shows once that is mended, and is added to what stands in the file.
+    let mut rounds = 0;
+    let text = loop {
+        match suggested(path)? {
+            (false, None) => break std::fs::read_to_string(path.join("dataset.toml"))?,
+            (true, Some(text)) if rounds < 3 => std::fs::write(path.join("dataset.toml"), text)?,
+            other => panic!("after {rounds} rounds: {other:?}"),
+        }
+        rounds += 1;
+    };
+    for line in ["velocity = \"ft/s\"", "u1 = \"u2\"", "u2 = \"u1\""] {
+        assert!(text.lines().any(|own| own == line), "{line} is not in\n{text}");
+    }
+    Ok(())
+}
+
+#[test]
+fn flights_without_a_fault_ask_for_nothing() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    data_set_csv(folder.path(), &flights(|_| {})?)?;
+    assert_eq!(suggested(folder.path())?, (false, None));
+    Ok(())
+}
+
+/// What is said of all flights changed, and of every other one: the name of the fault, and words of its message.
+fn assert_named(name: &str, says: &str, change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Outcome {
+    for every in [1, 2] {
+        let flights = some(|index| index % every == 0, &change)?;
+        let count = flights.len().div_ceil(every);
+        let report = check(&DataSet { flights, ..DataSet::default() }, None);
+        let finding = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Verdict::Fault);
+        let finding = finding.unwrap_or_else(|| panic!("no {name} in\n{report}"));
+        assert!(finding.message.contains(says), "{report}");
+        assert!(every == 1 || finding.flights.len() * 2 > count, "{report}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_stick_that_is_cut_off_is_told_from_one_at_its_end() -> Outcome {
+    assert_named("cut_off_u1", "u1 is cut off at 0.15", |columns| {
+        columns[Column::U1 as usize].iter_mut().for_each(|value| *value = value.clamp(-0.15, 0.15));
+    })
+}
+
+#[test]
+fn dropped_samples_that_were_filled_are_counted() -> Outcome {
+    assert_named("dropouts", "for up to 0.5", |columns| {
+        for column in Column::ALL.into_iter().filter(|column| !column.name().starts_with('u')) {
+            let values = &mut columns[column as usize];
+            for start in (300..values.len()).step_by(600) {
+                let last = (start + 51).min(values.len());
+                let held = values[start];
+                values[start..last].fill(held);
+            }
+        }
+    })
+}
+
+#[test]
+fn noise_on_a_stick_is_named() -> Outcome {
+    assert_named("noise_u3", "u3 has noise of 0.", |columns| {
+        let mut state = 1_u32;
+        for value in &mut columns[Column::U3 as usize] {
+            // A linear congruence (Knuth 1981) is noise enough; uniform numbers of rms 0.1.
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *value += 0.1 * 12_f64.sqrt() * (f64::from(state >> 8) / f64::from(1 << 24) - 0.5);
+        }
+    })
+}
+
+/// What `check` says of flights of which some are changed: a fault of this name, in flights of which each is one of these.
+fn assert_flights(name: &str, which: impl Fn(usize) -> bool, change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Outcome {
+    let flights = some(&which, change)?;
+    let changed: Vec<String> = (0..flights.len()).filter(|&index| which(index)).map(|index| flights[index].name.clone()).collect();
+    let report = check(&DataSet { flights, ..DataSet::default() }, None);
+    let found = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Verdict::Fault);
+    let found = found.unwrap_or_else(|| panic!("no {name} in\n{report}"));
+    assert!(2 * found.flights.len() >= changed.len() && found.flights.iter().all(|flight| changed.contains(flight)), "{report}");
+    Ok(())
+}
+
+#[test]
+fn controls_of_another_time_are_named_with_their_flights() -> Outcome {
+    assert_flights(
+        "foreign_controls",
+        |index| index == 1,
+        |columns| {
+            for stick in [Column::U1, Column::U2, Column::U3, Column::U4] {
+                columns[stick as usize].rotate_right(800);
+            }
+        },
+    )
+}
+
+#[test]
+fn a_stick_at_half_its_size_is_named_with_its_flights() -> Outcome {
+    let halved = |columns: &mut [Vec<f64>; Column::COUNT]| columns[Column::U4 as usize].iter_mut().for_each(|value| *value *= 0.5);
+    assert_flights("gain_u4", |index| index % 2 == 1, halved)
+}
