@@ -148,3 +148,36 @@ fn a_stick_at_half_its_size_is_named_with_its_flights() -> Outcome {
     let halved = |columns: &mut [Vec<f64>; Column::COUNT]| columns[Column::U4 as usize].iter_mut().for_each(|value| *value *= 0.5);
     assert_flights("gain_u4", |index| index % 2 == 1, halved)
 }
+
+#[test]
+fn one_column_in_other_units_is_told_from_all_three() -> Outcome {
+    assert_named("position_rate_x", "vx: the gain of this axis is that of velocity in feet a second", |columns| {
+        columns[Column::Vx as usize].iter_mut().for_each(|value| *value /= 0.3048);
+    })?;
+    assert_named("attitude_rate_y", "wy: the gain of this axis is that of rates in degrees a second", |columns| {
+        columns[Column::Wy as usize].iter_mut().for_each(|value| *value = value.to_degrees());
+    })
+}
+
+#[test]
+fn a_turned_heading_is_named_with_its_angle() -> Outcome {
+    assert_named("heading", "turned by 30° to the right", |columns| {
+        columns[Column::Yaw as usize].iter_mut().for_each(|value| *value += 30_f64.to_radians());
+    })
+}
+
+#[test]
+fn an_offset_of_a_rate_is_named_with_its_size() -> Outcome {
+    assert_named("offset_wx", "wx has an offset of 0.10 rad/s", |columns| {
+        columns[Column::Wx as usize].iter_mut().for_each(|value| *value += 0.1);
+    })
+}
+
+#[test]
+fn a_log_at_half_the_rate_it_is_stamped_with_is_named() -> Outcome {
+    assert_named("time_step", "the time step is 2.0", |columns| {
+        for values in columns.iter_mut().filter(|values| !values.is_empty()) {
+            *values = values.iter().step_by(2).copied().collect();
+        }
+    })
+}

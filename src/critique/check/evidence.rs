@@ -1,12 +1,19 @@
 //! What the streams of a log say of each other, gathered: of one flight, in short blocks, or of all together. Verdicts on single flights are the
 //! business of `odd`.
 
+use super::RELATIONS;
 use super::forces::Forces;
 use super::gains::Gains;
 use super::increments::Motion;
 use super::relations::Relation;
 use super::report::{Finding, Verdict};
 use super::timing::Timing;
+use std::collections::BTreeSet;
+
+/// Gains of all relations that are this far from 1 …
+const OTHER_TIME: f64 = 0.2;
+/// … and this near to each other say that the time runs otherwise.
+const SAME: f64 = 0.1;
 
 /// The accumulators of all checks that need no physics of the aircraft, and of the places of gravity.
 pub(super) struct Evidence {
@@ -49,7 +56,7 @@ impl Evidence {
     pub fn kinematics(&self, least_explained: f64) -> Vec<Finding> {
         let mut findings = Vec::new();
         for relation in &self.relations {
-            let Some(finding) = relation.finding() else { continue };
+            let Some(finding) = relation.finding(self.gains.left(relation.name)) else { continue };
             // Gains of a relation that is known to be read wrongly, or in which nothing moves, say nothing more.
             let is_read = finding.verdict != Verdict::Fault && finding.measured.is_some_and(f64::is_finite);
             findings.push(finding);
@@ -57,6 +64,40 @@ impl Evidence {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }
-        findings
+        time_step(findings)
     }
+
+    /// The other reading of a relation, by its place; none where single columns explain as much.
+    pub fn other_reading(&self, place: usize) -> Option<usize> {
+        self.relations[place].other_reading(self.gains.left(self.relations[place].name))
+    }
+}
+
+/// Gains of all relations that are the same other number are one of time, and say nothing more.
+fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
+    let of_relation = |finding: &Finding| {
+        RELATIONS.iter().find(|relation| finding.name.starts_with(**relation) && finding.name.len() > relation.len()).copied()
+    };
+    let is_known = |finding: &&Finding| finding.verdict != Verdict::Undetermined;
+    let gain = |finding: &Finding| of_relation(finding).zip(finding.measured);
+    let gains: Vec<(&str, f64)> = findings.iter().filter(is_known).filter_map(gain).collect();
+    let relations: BTreeSet<&str> = gains.iter().map(|gain| gain.0).collect();
+    let median = super::sticks::median(gains.iter().map(|gain| gain.1).collect()).filter(|times| *times > 0.0);
+    let Some(times) = median.filter(|_| relations.len() > 1) else { return findings };
+    let is_one = (times - 1.0).abs() < OTHER_TIME;
+    if is_one || gains.iter().any(|gain| (gain.1 / times - 1.0).abs() > SAME) {
+        let verdict = if is_one { Verdict::Ok } else { Verdict::Undetermined };
+        let message = if is_one { "what changes does so as fast as its rates say" } else { "the gains of single columns differ" };
+        return findings.into_iter().chain([step(verdict, times, message.into(), None)]).collect();
+    }
+    let message = format!(
+        "all that changes does so {times:.2} times as fast as its rates say: the time step is {times:.2} times as long as stamped"
+    );
+    let set = format!("[columns] t = \"t * {times:.3}\", with the file's name");
+    let others = findings.into_iter().filter(|finding| !RELATIONS.iter().any(|relation| finding.name.starts_with(relation)));
+    std::iter::once(step(Verdict::Fault, times, message, Some(&set))).chain(others).collect()
+}
+
+fn step(verdict: Verdict, times: f64, message: String, set: Option<&str>) -> Finding {
+    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..super::finding("time_step", verdict, message, set) }
 }

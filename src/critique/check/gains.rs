@@ -1,7 +1,9 @@
-//! Gains of single axes in the kinematic relations: how many metres, radians, metres a second the log's rates give for one of
-//! its states'. Each is 1 unless an axis has another sign, another unit, or the time step is wrong.
+//! Single columns in the kinematic relations: how many metres, radians, metres a second a column of rates gives for one of its state's, and by which
+//! constant it is off. Each gain is 1 and each offset 0 unless a column has another sign or another unit; all gains are another if the time step is wrong.
+//! Of the heading the angle is asked by which it is turned. This is what flight test calls data compatibility (Klein & Morelli 2006, ch. 10), one
+//! linear regression a relation. Other readings of whole relations are in `relations`.
 
-use super::increments::Motion;
+use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Subject, Verdict};
 use crate::blocks::FEW_BLOCKS;
@@ -12,13 +14,23 @@ const FAULT_MARGIN: f64 = 0.5;
 /// Ten per cent is more than smoothing and noise do to a gain, and less than a wrong time step.
 const WARNING_MARGIN: f64 = 0.1;
 
+/// An offset from here on is no drift of a sensor: of velocities, m/s, and of rates, rad/s.
+const OFFSETS: [f64; 2] = [0.5, 0.05];
+/// A heading that is turned by so much, rad, is no matter of declination.
+const TURNED: f64 = 0.17;
+/// Where the nose turns faster, rad/s, a heading that comes late looks turned.
+const SLOW: f64 = 0.5;
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Accumulates the gains over flights.
 pub(super) struct Gains {
-    position: [BlockRegression<1>; 3],
-    /// On the three rates together, since turning one axis moves the two others.
-    attitude: BlockRegression<3>,
+    /// Of the velocities along the nose, to the right and down, and their offsets: all three together move a position.
+    position: BlockRegression<6>,
+    /// Way gone over the ground on that way and on the one to its right.
+    heading: BlockRegression<2>,
+    /// Of the three rates and their offsets, since turning one axis moves the two others.
+    attitude: BlockRegression<6>,
     linear: [BlockRegression<1>; 3],
     angular: [BlockRegression<1>; 3],
 }
@@ -29,7 +41,13 @@ fn single() -> [BlockRegression<1>; 3] {
 
 impl Gains {
     pub fn new() -> Self {
-        Self { position: single(), attitude: BlockRegression::new(), linear: single(), angular: single() }
+        Self {
+            position: BlockRegression::new(),
+            heading: BlockRegression::new(),
+            attitude: BlockRegression::new(),
+            linear: single(),
+            angular: single(),
+        }
     }
 
     /// Adds a flight.
@@ -38,10 +56,7 @@ impl Gains {
             let block = (flight, number);
             let (start, end) = (&motion.instants[piece.start], &motion.instants[piece.end]);
             if motion.position && motion.heading {
-                let travel = motion.integral(&piece, |k| rotate(&motion.instants[k].rotation, motion.instants[k].velocity));
-                for (axis, regression) in self.position.iter_mut().enumerate() {
-                    regression.add(block, &[travel[axis]], end.position[axis] - start.position[axis]);
-                }
+                self.add_position(block, motion, &piece);
             }
             if motion.recorded {
                 let (linear, angular) = (
@@ -55,51 +70,171 @@ impl Gains {
             }
             // Without heading only the vertical axis is known.
             for row in if motion.heading { 0..3 } else { 2..3 } {
-                let turned = motion.integral(&piece, |k| {
-                    let Motion { instants, .. } = motion;
-                    let (axis, rates) = (instants[k].rotation[row], instants[k].rates);
-                    let by = [[rates[0], 0.0, 0.0], [0.0, rates[1], 0.0], [0.0, 0.0, rates[2]]].map(|rate| cross(axis, rate));
-                    [by[0][0], by[1][0], by[2][0], by[0][1], by[1][1], by[2][1], by[0][2], by[1][2], by[2][2]]
-                });
+                let by = |rates: Vector, axis: Vector| {
+                    let [p, q, r] =
+                        [[rates[0], 0.0, 0.0], [0.0, rates[1], 0.0], [0.0, 0.0, rates[2]]].map(|rate| cross(axis, rate));
+                    [p[0], q[0], r[0], p[1], q[1], r[1], p[2], q[2], r[2]]
+                };
+                let turned = motion.integral(&piece, |k| by(motion.instants[k].rates, motion.instants[k].rotation[row]));
+                let offset = motion.integral(&piece, |k| by([1.0; 3], motion.instants[k].rotation[row]));
                 for axis in 0..3 {
                     let change = end.rotation[row][axis] - start.rotation[row][axis];
-                    self.attitude.add(block, &[turned[3 * axis], turned[3 * axis + 1], turned[3 * axis + 2]], change);
+                    let columns: [f64; 6] =
+                        std::array::from_fn(|at| if at < 3 { turned[3 * axis + at] } else { offset[3 * axis + at - 3] });
+                    self.attitude.add(block, &columns, change);
                 }
             }
         }
     }
 
+    fn add_position(&mut self, block: (usize, usize), motion: &Motion, piece: &std::ops::Range<usize>) {
+        let at = |k: usize| &motion.instants[k];
+        let gone: Vector = std::array::from_fn(|axis| at(piece.end).position[axis] - at(piece.start).position[axis]);
+        for (row, gone) in gone.into_iter().enumerate() {
+            let columns = motion.integral(piece, |k| {
+                let direction = at(k).rotation[row];
+                let moved: Vector = std::array::from_fn(|axis| direction[axis] * at(k).velocity[axis]);
+                [moved[0], moved[1], moved[2], direction[0], direction[1], direction[2]]
+            });
+            self.position.add(block, &columns, gone);
+        }
+        let [turned] = motion.integral(piece, |k| [at(k).rates[2]]);
+        if turned.abs() < SLOW * length_s(motion, piece) {
+            let [north, east, _] = motion.integral(piece, |k| rotate(&at(k).rotation, at(k).velocity));
+            self.heading.add(block, &[north, -east], gone[0]);
+            self.heading.add(block, &[east, north], gone[1]);
+        }
+    }
+
     /// Adds the blocks of others, so many of them as one.
     pub fn absorb(&mut self, other: &Self, together: usize) {
+        self.position.absorb(&other.position, together);
+        self.heading.absorb(&other.heading, together);
+        self.attitude.absorb(&other.attitude, together);
         for axis in 0..3 {
-            self.position[axis].absorb(&other.position[axis], together);
             self.linear[axis].absorb(&other.linear[axis], together);
             self.angular[axis].absorb(&other.angular[axis], together);
         }
-        self.attitude.absorb(&other.attitude, together);
     }
 
-    /// Findings of the relation of this name, see [`super::relations`]; of no axis of which less is explained.
+    /// Share of the changes of a relation's state that its columns leave unexplained, each with its own gain; of the position also a heading that is turned.
+    pub fn left(&self, relation: &str) -> f64 {
+        let of = |explained: Option<f64>| explained.map_or(f64::INFINITY, |share| 1.0 - share);
+        let three = |regressions: &[BlockRegression<1>; 3]| {
+            let whole: f64 = regressions.iter().map(BlockRegression::square).sum();
+            let errors = regressions.iter().map(|one| Some(one.errors()?.iter().sum::<f64>())).sum::<Option<f64>>();
+            errors.map_or(f64::INFINITY, |errors| errors / whole)
+        };
+        match relation {
+            "position_rate" => of(self.position.explained()).min(of(self.heading.explained())),
+            "velocity_targets" => three(&self.linear),
+            "rate_targets" => three(&self.angular),
+            _ => of(self.attitude.explained()),
+        }
+    }
+
+    /// Findings of the relation of this name, see [`super::relations`]; of no column of which less is explained.
     pub fn findings(&self, relation: &str, least_explained: f64) -> Vec<Finding> {
         let three = |regressions: &[BlockRegression<1>; 3]| {
             let estimate = |regression: &BlockRegression<1>| {
                 enough(regression, least_explained).map(|[estimate]| reversed(estimate, regression.explained()))
             };
-            let estimates = regressions.each_ref().map(estimate);
-            (regressions[0].blocks() > 0).then_some(estimates)
+            (regressions[0].blocks() > 0).then(|| regressions.each_ref().map(estimate))
+        };
+        let six = |regression: &BlockRegression<6>| {
+            let estimates = enough(regression, least_explained);
+            let gain = |axis: usize| Some(reversed(estimates?[axis], regression.explained()));
+            (regression.blocks() > 0).then(|| [gain(0), gain(1), gain(2)])
         };
         let (estimates, columns, units) = match relation {
-            "position_rate" => (three(&self.position), ["x", "y", "z"], "position or velocity"),
+            "position_rate" => {
+                let turned = self.turned().filter(|turned| turned.verdict == Verdict::Fault);
+                if let Some(turned) = turned.filter(|_| self.heading.explained() > self.position.explained()) {
+                    return vec![turned];
+                }
+                (six(&self.position), ["vx", "vy", "vz"], "position or velocity")
+            }
             "velocity_targets" => (three(&self.linear), ["vx_dot", "vy_dot", "vz_dot"], "acceleration or velocity"),
             "rate_targets" => (three(&self.angular), ["wx_dot", "wy_dot", "wz_dot"], "angular_acceleration or rates"),
-            _ => {
-                let estimates = enough(&self.attitude, least_explained);
-                let of = |axis: usize| estimates.map(|estimates| estimates[axis]);
-                ((self.attitude.blocks() > 0).then(|| [of(0), of(1), of(2)]), ["wx", "wy", "wz"], "rates or angles")
-            }
+            _ => (six(&self.attitude), ["wx", "wy", "wz"], "rates or angles"),
         };
-        let findings = estimates.into_iter().flatten().zip(AXES).zip(columns);
-        findings.map(|((estimate, axis), column)| gain(relation, axis, column, units, estimate)).collect()
+        let gains = estimates.into_iter().flatten().zip(AXES).zip(columns);
+        let mut findings: Vec<Finding> =
+            gains.map(|((estimate, axis), column)| gain(relation, axis, column, units, estimate)).collect();
+        alone(&mut findings, columns);
+        let offsets = match relation {
+            "position_rate" => enough(&self.position, least_explained).map(|all| (all, OFFSETS[0], "m/s")),
+            "attitude_rate" => enough(&self.attitude, least_explained).map(|all| (all, OFFSETS[1], "rad/s")),
+            _ => None,
+        };
+        if let Some((estimates, least, unit)) = offsets {
+            findings.extend((0..3).map(|axis| offset(columns[axis], estimates[3 + axis], least, unit)));
+        }
+        // A single column that is read wrongly turns the way as well.
+        findings.extend(self.turned().filter(|turned| relation == "position_rate" && turned.verdict != Verdict::Fault));
+        findings
+    }
+
+    /// The heading against the way that is gone. `None` where that is not known, or the length of the way is another too.
+    fn turned(&self) -> Option<Finding> {
+        let [along, aside] = enough(&self.heading, 0.0)?;
+        let angle = aside.value.atan2(along.value);
+        let size = along.value.hypot(aside.value);
+        let half = 0.5 * (aside.interval[1] - aside.interval[0]).max(along.interval[1] - along.interval[0]) / size;
+        let estimate = Estimate { value: angle, interval: [angle - half, angle + half] };
+        let says = format!(
+            "the heading is turned by {:.0}° to the {}: the position moves otherwise than nose and velocity say",
+            angle.abs().to_degrees(),
+            if angle < 0.0 { "right" } else { "left" }
+        );
+        let set =
+            format!("[columns] yaw = \"yaw {} {:.4}\", with the file's name", if angle < 0.0 { '-' } else { '+' }, angle.abs());
+        ((size - 1.0).abs() < WARNING_MARGIN).then(|| constant("heading", estimate, TURNED, "rad", says, set))
+    }
+}
+
+/// What is said of one column and not of all three names that column, and sets its unit alone.
+fn alone(findings: &mut [Finding], columns: [&str; 3]) {
+    let is_fault = |finding: &Finding| finding.verdict == Verdict::Fault;
+    let sets: Vec<Option<String>> =
+        findings.iter().filter(|finding| is_fault(finding)).map(|finding| finding.set.clone()).collect();
+    let told = findings.iter().filter(|finding| finding.verdict != Verdict::Undetermined).count();
+    if sets.len() == told && sets.windows(2).all(|pair| pair[0] == pair[1]) && told > 1 {
+        return;
+    }
+    for (finding, column) in findings.iter_mut().zip(columns).filter(|(finding, _)| is_fault(finding)) {
+        finding.message = format!("{column}: {}", finding.message);
+        let unit = finding.set.as_ref().and_then(|set| set.strip_prefix("[units] ")?.split_once(" = "));
+        if let Some((_, unit)) = unit {
+            finding.set = Some(format!("[units] {column} = {unit}"));
+        }
+    }
+}
+
+/// A constant that a column has too much against the change of its state.
+fn offset(column: &str, estimate: Estimate, least: f64, unit: &str) -> Finding {
+    // What is regressed lacks it: the column less its offset is the rate.
+    let (value, [low, high]) = (-estimate.value, [-estimate.interval[1], -estimate.interval[0]]);
+    let says = format!("{column} has an offset of {value:.2} {unit} against the change of its state");
+    let sign = if value < 0.0 { '+' } else { '-' };
+    let set = format!("[columns] {column} = \"{column} {sign} {:.4}\", with the file's name", value.abs());
+    constant(&format!("offset_{column}"), Estimate { value, interval: [low, high] }, least, unit, says, set)
+}
+
+/// A finding on what should be 0, and is at fault from `least` on.
+fn constant(name: &str, estimate: Estimate, least: f64, unit: &str, says: String, set: String) -> Finding {
+    let Estimate { value, interval: [low, high] } = estimate;
+    let (verdict, message, set) = match () {
+        () if low > least || high < -least => (Verdict::Fault, says, Some(set)),
+        () if high - low > 2.0 * least => (Verdict::Undetermined, "these flights move too little to say".into(), None),
+        () => (Verdict::Ok, "none that is more than a sensor's drift".into(), None),
+    };
+    Finding {
+        measured: Some(value),
+        interval: Some([low, high]),
+        expected: Some(0.0),
+        unit: unit.into(),
+        ..super::finding(name, verdict, message, set.as_deref())
     }
 }
 

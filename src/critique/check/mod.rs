@@ -232,8 +232,10 @@ fn not_judged(finding: Finding) -> Finding {
 
 /// What rests on a reading that is known to be wrong is not judged.
 fn symptom(finding: Finding) -> Finding {
-    let is_reading = RELATIONS.contains(&finding.name.as_str()) || finding.name == odd::LATERAL;
-    let is_known = ["frozen_", streams::HELD, "spikes_", "rounding_", "noise_"].iter().any(|start| finding.name.starts_with(start));
+    let is_reading = RELATIONS.iter().any(|relation| finding.name.starts_with(relation)) || finding.name == odd::LATERAL;
+    let is_known = ["offset_", "heading", "time_step", "frozen_", streams::HELD, "spikes_", "rounding_", "noise_"]
+        .iter()
+        .any(|start| finding.name.starts_with(start));
     if is_reading || is_known || finding.verdict < Verdict::Warning {
         return finding;
     }

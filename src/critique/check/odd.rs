@@ -3,7 +3,6 @@
 
 use super::evidence::Evidence;
 use super::increments::{Motion, TOGETHER};
-use super::relations::Relation;
 use super::report::{Finding, Subject, Verdict};
 use super::timing::Timing;
 use super::{RELATIONS, left_out, named};
@@ -161,14 +160,22 @@ impl Odd {
 /// Whether nearly all flights read a relation, or the place of gravity, in the same other way: that is a fault of the set.
 pub(super) fn is_misread(each: &[&Own], all: &Evidence) -> bool {
     let most = |count: usize| count as f64 > MOST * each.len() as f64;
-    let mut relations = all.relations.iter().enumerate();
-    let is_common = |(place, relation): (usize, &Relation)| {
+    let is_common = |place: usize| {
         let agree = |reading| each.iter().filter(|own| own.evidence.relations[place].prefers(reading)).count();
-        relation.other_reading().is_some_and(|reading| most(agree(reading)))
+        all.other_reading(place).is_some_and(|reading| most(agree(reading)))
+    };
+    let columns = all.kinematics(0.0);
+    let faults = columns.iter().filter(|finding| finding.verdict == Verdict::Fault && finding.measured.is_some());
+    let is_of_column = |finding: &Finding| {
+        let own = each.iter().filter_map(|own| own.findings.iter().find(|other| other.name == finding.name));
+        let told: Vec<&Finding> = own.filter(|own| own.verdict != Verdict::Undetermined).collect();
+        told.len() > 1 && told.iter().filter(|own| own.verdict == Verdict::Fault).count() as f64 > MOST * told.len() as f64
     };
     let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Verdict::Fault;
     let is_turned = all.forces.lateral().is_some_and(|finding| turned(&finding));
-    relations.any(is_common) || is_turned && most(each.iter().filter(|own| own.findings.iter().any(turned)).count())
+    (0..all.relations.len()).any(is_common)
+        || faults.into_iter().any(is_of_column)
+        || is_turned && most(each.iter().filter(|own| own.findings.iter().any(turned)).count())
 }
 
 const CONTROLS: &str = "control_delay";
@@ -200,7 +207,9 @@ fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
             Subject::Timing => finding.measured.map_or("", |late| if late > 0.0 { "late" } else { "early" }),
             Subject::Conventions | Subject::Excitation => finding.set.as_deref().unwrap_or(&finding.message),
         };
-        kinds.entry(kind.to_owned()).or_default().push((flight, finding));
+        // Numbers differ from flight to flight.
+        let kind: String = kind.chars().filter(|c| !c.is_ascii_digit()).collect();
+        kinds.entry(kind).or_default().push((flight, finding));
     }
     let told = |alike: Vec<(usize, &Finding)>| (alike.iter().map(|entry| entry.0).collect(), alike[0].1.message.clone());
     kinds.into_values().map(told).collect()
@@ -255,6 +264,9 @@ fn contradicts(finding: &Finding) -> bool {
     let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
     match finding.subject {
         Subject::Timing => finding.verdict == Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
+        Subject::Conventions | Subject::Excitation if finding.expected == Some(0.0) => {
+            finding.verdict == Verdict::Fault && (low > 0.0 || high < 0.0)
+        }
         Subject::Conventions | Subject::Excitation => finding.verdict == Verdict::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
     }
 }

@@ -79,15 +79,19 @@ impl<const K: usize> BlockRegression<K> {
         (total(column, column) / weight - mean * mean).max(0.0).sqrt()
     }
 
+    /// Sum of the squares of what is regressed.
+    pub fn square(&self) -> f64 {
+        self.blocks.iter().map(|sums| sums.square).sum()
+    }
+
     /// Share of the squares of what is regressed that the fit explains. `None` as in [`BlockRegression::estimates`].
     pub fn explained(&self) -> Option<f64> {
-        let square: f64 = self.blocks.iter().map(|sums| sums.square).sum();
-        Some(1.0 - self.errors()?.iter().sum::<f64>() / square)
+        Some(1.0 - self.errors()?.iter().sum::<f64>() / self.square())
     }
 
     /// Root mean square of what is regressed.
     pub fn response(&self) -> f64 {
-        (self.blocks.iter().map(|sums| sums.square).sum::<f64>() / self.rows()).sqrt()
+        (self.square() / self.rows()).sqrt()
     }
 
     pub fn blocks(&self) -> usize {

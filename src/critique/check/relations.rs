@@ -46,6 +46,11 @@ const LARGEST_SHARE: f64 = 0.25;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
+/// A reading is the cause where it leaves at most so many times what columns with gains of their own leave …
+const OF_COLUMNS: f64 = 2.0;
+/// … and this share of the changes.
+const SLACK: f64 = 0.005;
+
 const TRANSPOSED: &str =
     "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
 const REORDERED: &str = "the quaternion's scalar stands at its other end";
@@ -231,12 +236,13 @@ impl Relation {
         if size > 0.0 { error / size } else { f64::NAN }
     }
 
-    /// The reading of which the nominal one is certainly worse.
-    pub fn other_reading(&self) -> Option<usize> {
+    /// The reading of which the nominal one is certainly worse. `left` is what single columns leave unexplained, each with a gain of its own: a reading
+    /// that leaves more is not the cause.
+    pub fn other_reading(&self, left: f64) -> Option<usize> {
         let nominal = self.share(0);
         let best = (1..self.hypotheses.len()).min_by(|a, b| self.share(*a).total_cmp(&self.share(*b)))?;
         // One that explains little itself only leaves out what is wrong.
-        let bar = LARGEST_SHARE.min(CONVINCING_SHARE * nominal);
+        let bar = LARGEST_SHARE.min(CONVINCING_SHARE * nominal).min(OF_COLUMNS * left + SLACK);
         (nominal > MATERIAL_SHARE && self.share(best) < bar && self.consistent(best)).then_some(best)
     }
 
@@ -254,8 +260,8 @@ impl Relation {
         self.open = None;
     }
 
-    /// Verdict over all flights; `None` where the relation never applied.
-    pub fn finding(&self) -> Option<Finding> {
+    /// Verdict over all flights, `left` as of [`Relation::other_reading`]; `None` where the relation never applied.
+    pub fn finding(&self, left: f64) -> Option<Finding> {
         let blocks = self.misfit.first()?.len();
         if blocks == 0 {
             return None;
@@ -276,7 +282,7 @@ impl Relation {
         if !nominal.is_finite() || blocks < FEW_BLOCKS {
             finding.verdict = Verdict::Undetermined;
             finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);
-        } else if let Some(index) = self.other_reading() {
+        } else if let Some(index) = self.other_reading(left) {
             finding.verdict = Verdict::Fault;
             finding.message = format!(
                 "{} does not hold; {} ({:.1} % unexplained that way)",
