@@ -168,8 +168,8 @@ fn a_turned_heading_is_named_with_its_angle() -> Outcome {
 
 #[test]
 fn an_offset_of_a_rate_is_named_with_its_size() -> Outcome {
-    assert_named("offset_wx", "wx has an offset of 0.10 rad/s", |columns| {
-        columns[Column::Wx as usize].iter_mut().for_each(|value| *value += 0.1);
+    assert_named("offset_wx", "wx has an offset of 0.20 rad/s", |columns| {
+        columns[Column::Wx as usize].iter_mut().for_each(|value| *value += 0.2);
     })
 }
 
@@ -178,6 +178,38 @@ fn a_log_at_half_the_rate_it_is_stamped_with_is_named() -> Outcome {
     assert_named("time_step", "the time step is 2.0", |columns| {
         for values in columns.iter_mut().filter(|values| !values.is_empty()) {
             *values = values.iter().step_by(2).copied().collect();
+        }
+    })
+}
+
+#[test]
+fn two_columns_in_each_others_place_are_named() -> Outcome {
+    assert_named("attitude_rate", "wx and wy are exchanged", |columns| columns.swap(Column::Wx as usize, Column::Wy as usize))?;
+    assert_named("position_rate", "vx and vy are exchanged", |columns| columns.swap(Column::Vx as usize, Column::Vy as usize))
+}
+
+#[test]
+fn an_attitude_that_is_off_is_told_from_a_gyro_that_is_turned() -> Outcome {
+    let angle = 6_f64.to_radians();
+    assert_named("mounts", "roll is off by 6.0°", |columns| {
+        columns[Column::Roll as usize].iter_mut().for_each(|value| *value += angle);
+    })?;
+    assert_named("mounts", "the axes of the rates are turned by 6.0° about y", |columns| {
+        for sample in 0..columns[0].len() {
+            let [wx, wz] = [Column::Wx, Column::Wz].map(|column| columns[column as usize][sample]);
+            columns[Column::Wx as usize][sample] = angle.cos() * wx - angle.sin() * wz;
+            columns[Column::Wz as usize][sample] = angle.sin() * wx + angle.cos() * wz;
+        }
+    })
+}
+
+#[test]
+fn a_clock_that_runs_fast_is_named_with_its_rate() -> Outcome {
+    assert_named("clock_controls", "a clock of its own, +0.", |columns| {
+        for stick in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = &mut columns[stick as usize];
+            let last = values.len() - 1;
+            *values = (0..values.len()).map(|sample| values[last.min((1.005 * sample as f64).round() as usize)]).collect();
         }
     })
 }

@@ -393,6 +393,20 @@ fn the_folder_gives_names_and_classes() -> Outcome {
 }
 
 #[test]
+fn what_is_left_out_may_be_unreadable() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let root = folder.path();
+    put(root, "a.csv", &Sheet::canonical(50).csv())?;
+    put(root, "b.csv", "t,roll\nnonsense,0")?;
+    assert_says(&refusal(data_set(root, &ReadOptions::default())), &["b.csv"]);
+    put(root, "dataset.toml", "leave_out = [\"b\"]")?;
+    let data = data_set(root, &ReadOptions::default())?;
+    assert_eq!(data.flights.iter().map(|flight| flight.name.as_str()).collect::<Vec<_>>(), ["a"]);
+    assert_says(&data.notes.join("\n"), &["left out, as dataset.toml says: b; it cannot be read:"]);
+    Ok(())
+}
+
+#[test]
 fn a_stream_that_comes_late_is_moved_back() -> Outcome {
     let folder = tempfile::tempdir()?;
     let root = folder.path();

@@ -68,8 +68,17 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let mut common: BTreeMap<String, Vec<String>> = BTreeMap::new();
     let mut own = Vec::new();
     let (mut seen, mut copies) = (HashMap::new(), BTreeMap::<String, Vec<String>>::new());
+    let mut unread = Vec::new();
     for (log, result) in logs.iter().zip(results) {
-        let (done, prints): (Assembled, Vec<u64>) = result?;
+        let (done, prints): (Assembled, Vec<u64>) = match result {
+            // What is left out may be wrong in any way.
+            Err(error) if is_left_out(log, &schema, &logs) => {
+                data.notes.push(format!("left out, as dataset.toml says: {}; it cannot be read: {error}", log.name));
+                unread.push(log.name.as_str());
+                continue;
+            }
+            result => result?,
+        };
         for (flight, print) in done.flights.into_iter().zip(prints) {
             match seen.entry(print) {
                 Entry::Vacant(entry) => {
@@ -96,7 +105,7 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     );
     // A description that was found above the folder, or beside a single log, is that of a larger set.
     let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
-    leave_out(&mut data, &schema, &logs, is_whole)
+    leave_out(&mut data, &schema, &logs, &unread, is_whole)
         .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     if data.flights.is_empty() {
         let found = format!("{} logs of which no piece is left", logs.len());
@@ -113,12 +122,19 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     Ok(data)
 }
 
-/// Leaves out what the description says. A name that is not among the flights may be that of another part of a larger set, or of a log of which no
+/// Whether the description leaves this whole log out.
+fn is_left_out(log: &Log, schema: &Schema, logs: &[Log]) -> bool {
+    let named = |wanted: &String| names::matching(wanted, logs.iter().map(|log| log.name.as_str())) == [log.name.as_str()];
+    schema.leave_out.iter().any(named)
+}
+
+/// Leaves out what the description says; `unread` is out already. A name that is not among the flights may be that of another part of a larger set, or of a log of which no
 /// piece is left: that is told.
-fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], is_whole: bool) -> Result<()> {
+fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], unread: &[&str], is_whole: bool) -> Result<()> {
+    let is_in = |name: &&String| names::matching(name, unread.iter().copied()).is_empty();
     let has_log = |name: &str| !names::matching(name, logs.iter().map(|log| log.name.as_str())).is_empty();
     let is_asked = |name: &String| !names::find(&data.flights, name).is_empty() || (is_whole && !has_log(name));
-    let (asked, gone): (Vec<String>, Vec<String>) = schema.leave_out.iter().cloned().partition(is_asked);
+    let (asked, gone): (Vec<String>, Vec<String>) = schema.leave_out.iter().filter(is_in).cloned().partition(is_asked);
     if !gone.is_empty() {
         data.notes.push(format!("to be left out, as dataset.toml says, but not among these flights: {}", gone.join(", ")));
     }

@@ -2,9 +2,11 @@
 //! business of `odd`.
 
 use super::RELATIONS;
+use super::clocks::Halves;
 use super::forces::Forces;
 use super::gains::Gains;
 use super::increments::Motion;
+use super::mounts::Mounts;
 use super::relations::Relation;
 use super::report::{Finding, Verdict};
 use super::timing::Timing;
@@ -19,8 +21,10 @@ const SAME: f64 = 0.1;
 pub(super) struct Evidence {
     pub relations: [Relation; 5],
     gains: Gains,
+    mounts: Mounts,
     pub forces: Forces,
     pub timing: Timing,
+    pub halves: Halves,
 }
 
 impl Evidence {
@@ -33,23 +37,29 @@ impl Evidence {
             Relation::linear_targets(),
             Relation::angular_targets(),
         ];
-        Self { relations, gains: Gains::new(), forces: Forces::new(quaternion), timing: Timing::new(step_s) }
+        let (forces, timing) = (Forces::new(quaternion), Timing::new(step_s));
+        Self { relations, gains: Gains::new(), mounts: Mounts::new(), forces, timing, halves: Halves::new(step_s) }
     }
 
-    /// Adds a flight in short blocks.
+    /// Adds the one flight, in short blocks.
     pub fn add(&mut self, flight: usize, motion: &Motion) {
         self.relations.iter_mut().for_each(|relation| relation.add(flight, motion));
         self.gains.add(flight, motion);
+        self.mounts.add(flight, motion);
         self.forces.add(flight, motion);
         self.timing.add(flight, motion);
+        let duration_s = motion.step_s * motion.instants.len() as f64;
+        self.halves = Halves::of(&self.timing, motion.step_s, duration_s);
     }
 
     /// Adds what another gathered, so many of its blocks as one.
     pub fn absorb(&mut self, one: &Self, together: usize) {
         self.relations.iter_mut().zip(&one.relations).for_each(|(relation, one)| relation.absorb(one, together));
         self.gains.absorb(&one.gains, together);
+        self.mounts.absorb(&one.mounts, together);
         self.forces.absorb(&one.forces, together);
         self.timing.absorb(&one.timing, together);
+        self.halves.absorb(&one.halves, together);
     }
 
     /// The relations, and the gains of those that hold; an axis says nothing of which less is explained by its gain.
@@ -64,13 +74,34 @@ impl Evidence {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }
-        time_step(findings)
+        let mut findings = time_step(without_consequences(findings));
+        let is_sound = |relation: &str| {
+            let is_faulty = |finding: &Finding| finding.verdict == Verdict::Fault && finding.name.starts_with(relation);
+            !findings.iter().any(|finding| is_faulty(finding) || finding.name == "time_step" && finding.verdict == Verdict::Fault)
+        };
+        findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")]));
+        findings
     }
 
     /// The other reading of a relation, by its place; none where single columns explain as much.
     pub fn other_reading(&self, place: usize) -> Option<usize> {
         self.relations[place].other_reading(self.gains.left(self.relations[place].name))
     }
+}
+
+/// Targets that are read as their states are known to be: one column of rates in degrees contradicts the attitude and its own derivative.
+fn without_consequences(mut findings: Vec<Finding>) -> Vec<Finding> {
+    let faults = || findings.iter().filter(|finding| finding.verdict == Verdict::Fault);
+    let of_states: BTreeSet<String> = faults().filter_map(|finding| finding.set.clone()).collect();
+    for finding in &mut findings {
+        let of_state = finding.set.as_ref().map(|set| set.replace("_dot", ""));
+        if finding.verdict == Verdict::Fault && finding.set != of_state && of_state.is_some_and(|set| of_states.contains(&set)) {
+            finding.verdict = Verdict::Undetermined;
+            finding.message = "not judged: the state is read otherwise, as is said above".into();
+            finding.set = None;
+        }
+    }
+    findings
 }
 
 /// Gains of all relations that are the same other number are one of time, and say nothing more.

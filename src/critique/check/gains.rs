@@ -14,8 +14,9 @@ const FAULT_MARGIN: f64 = 0.5;
 /// Ten per cent is more than smoothing and noise do to a gain, and less than a wrong time step.
 const WARNING_MARGIN: f64 = 0.1;
 
-/// An offset from here on is no drift of a sensor: of velocities, m/s, and of rates, rad/s.
-const OFFSETS: [f64; 2] = [0.5, 0.05];
+/// An offset from here on is no drift of a sensor: of velocities, m/s, and of rates, rad/s (6°/s, what a small gyroscope is allowed before it is
+/// calibrated). Half of it is worth a warning.
+const OFFSETS: [f64; 2] = [1.0, 0.1];
 /// A heading that is turned by so much, rad, is no matter of declination.
 const TURNED: f64 = 0.17;
 /// Where the nose turns faster, rad/s, a heading that comes late looks turned.
@@ -226,6 +227,7 @@ fn constant(name: &str, estimate: Estimate, least: f64, unit: &str, says: String
     let Estimate { value, interval: [low, high] } = estimate;
     let (verdict, message, set) = match () {
         () if low > least || high < -least => (Verdict::Fault, says, Some(set)),
+        () if low > 0.5 * least || high < -0.5 * least => (Verdict::Warning, says, Some(set)),
         () if high - low > 2.0 * least => (Verdict::Undetermined, "these flights move too little to say".into(), None),
         () => (Verdict::Ok, "none that is more than a sensor's drift".into(), None),
     };

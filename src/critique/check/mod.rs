@@ -9,6 +9,7 @@
 
 mod advice;
 mod cells;
+mod clocks;
 mod dropouts;
 mod evidence;
 mod excitation;
@@ -16,6 +17,7 @@ mod forces;
 mod gains;
 mod increments;
 mod limits;
+mod mounts;
 mod odd;
 mod regression;
 mod relations;
@@ -133,7 +135,13 @@ impl Gathered {
         let mut findings = vec![origin(&data.flights)];
         findings.extend(self.poor.iter().chain(&self.odd).cloned());
         findings.extend(self.together.kinematics(0.0));
-        findings.extend(self.together.forces.lateral());
+        // Of the attitude the relations know more than the force does.
+        let is_read = |finding: &Finding| finding.verdict == Verdict::Fault && RELATIONS[..2].contains(&finding.name.as_str());
+        let known: Vec<Option<String>> =
+            findings.iter().filter(|finding| is_read(finding)).map(|finding| finding.set.clone()).collect();
+        let lateral = self.together.forces.lateral();
+        let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Verdict::Fault;
+        findings.extend(lateral.map(|finding| if is_other(&finding) { not_judged(finding) } else { finding }));
         if !self.misread {
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             findings.extend(self.sticks.findings(&data.flights, &self.unjudged));
@@ -148,6 +156,7 @@ impl Gathered {
         if self.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
             findings.extend(self.together.timing.offsets(0.0));
         } else {
+            findings.extend(self.together.halves.findings());
             findings.extend(odd::late_streams(&self.together.timing));
             findings.extend(odd::late_controls(&self.together.timing));
         }
@@ -233,7 +242,7 @@ fn not_judged(finding: Finding) -> Finding {
 /// What rests on a reading that is known to be wrong is not judged.
 fn symptom(finding: Finding) -> Finding {
     let is_reading = RELATIONS.iter().any(|relation| finding.name.starts_with(relation)) || finding.name == odd::LATERAL;
-    let is_known = ["offset_", "heading", "time_step", "frozen_", streams::HELD, "spikes_", "rounding_", "noise_"]
+    let is_known = ["offset_", "heading", "time_step", mounts::NAME, "frozen_", streams::HELD, "spikes_", "rounding_", "noise_"]
         .iter()
         .any(|start| finding.name.starts_with(start));
     if is_reading || is_known || finding.verdict < Verdict::Warning {

@@ -48,6 +48,7 @@ impl Own {
         findings.extend(short.timing.offsets(CONVINCING_FALL));
         findings.push(short.timing.control_delay(None).0);
         findings.extend(short.timing.sticks());
+        findings.extend(short.halves.findings());
         findings.extend(short.forces.lateral());
         findings.extend(lengths(&short.forces.coefficients()));
         let mut evidence = Evidence::new(quaternion, step_s);
@@ -263,7 +264,7 @@ fn contradicts(finding: &Finding) -> bool {
     let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Verdict::Fault };
     let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
     match finding.subject {
-        Subject::Timing => finding.verdict == Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
+        Subject::Timing => finding.verdict >= Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
         Subject::Conventions | Subject::Excitation if finding.expected == Some(0.0) => {
             finding.verdict == Verdict::Fault && (low > 0.0 || high < 0.0)
         }

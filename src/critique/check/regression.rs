@@ -66,6 +66,22 @@ impl<const K: usize> BlockRegression<K> {
         self.open = None;
     }
 
+    /// Of these blocks only.
+    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+        Self { blocks: self.blocks.iter().take(range.end).skip(range.start).cloned().collect(), open: None }
+    }
+
+    /// On some of the columns.
+    pub fn on<const J: usize>(&self, columns: [usize; J]) -> BlockRegression<J> {
+        let of = |sums: &Sums<K>| Sums {
+            gram: columns.map(|i| columns.map(|j| sums.gram[i][j])),
+            moment: columns.map(|i| sums.moment[i]),
+            square: sums.square,
+            rows: sums.rows,
+        };
+        BlockRegression { blocks: self.blocks.iter().map(of).collect(), open: None }
+    }
+
     /// The blocks of several as one.
     pub fn merged<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
         Self { blocks: parts.flat_map(|part| part.blocks.iter().cloned()).collect(), open: None }

@@ -61,8 +61,17 @@ const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
 const EXCHANGED: &str = "roll and pitch are exchanged";
 const ROLL_PITCH: &str = "[columns] roll = \"pitch\", pitch = \"roll\", with the file's names";
 
-const fn exchanged([roll, pitch, yaw]: Vector) -> Vector {
-    [pitch, roll, yaw]
+/// Two columns of a vector in each other's place.
+const fn first_two([x, y, z]: Vector) -> Vector {
+    [y, x, z]
+}
+
+const fn last_two([x, y, z]: Vector) -> Vector {
+    [x, z, y]
+}
+
+const fn outer_two([x, y, z]: Vector) -> Vector {
+    [z, y, x]
 }
 
 fn stack(first: Vector) -> Stack {
@@ -128,7 +137,10 @@ impl Relation {
             read("pitch has the other sign", PITCH_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.velocity))),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.velocity))),
             read("the angles are in degrees", ANGLES_DEGREES, at, |i| stack(rotate(&turned(i.angles.map(|angle| angle * DEGREE)), i.velocity))),
-            read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(exchanged(i.angles)), i.velocity))),
+            read("vx and vy are exchanged", "[columns] vx = \"vy\", vy = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, first_two(i.velocity)))),
+            read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
+            read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
+            read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(first_two(i.angles)), i.velocity))),
         ], order.into_iter().collect()].concat())
     }
 
@@ -150,7 +162,10 @@ impl Relation {
                 read("roll has the other sign", ROLL_SIGN, |i| stack(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [-1.0, 1.0, 1.0]))[2], i.rates))),
                 read("pitch has the other sign", PITCH_SIGN, |i| stack(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2]), |i| stack(cross(turned(scaled(i.angles, [1.0, -1.0, 1.0]))[2], i.rates))),
                 read("the rates are in degrees a second", "[units] rates = \"deg/s\"", DOWN, |i| stack(cross(i.rotation[2], i.rates.map(|rate| rate * DEGREE)))),
-                read(EXCHANGED, ROLL_PITCH, |i| stack(turned(exchanged(i.angles))[2]), |i| stack(cross(turned(exchanged(i.angles))[2], i.rates))),
+                read("wx and wy are exchanged", "[columns] wx = \"wy\", wy = \"wx\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], first_two(i.rates)))),
+                read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], last_two(i.rates)))),
+                read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", DOWN, |i| stack(cross(i.rotation[2], outer_two(i.rates)))),
+                read(EXCHANGED, ROLL_PITCH, |i| stack(turned(first_two(i.angles))[2]), |i| stack(cross(turned(first_two(i.angles))[2], i.rates))),
                 read("the angles are in degrees", ANGLES_DEGREES, |i| stack(turned(i.angles.map(|angle| angle * DEGREE))[2]), |i| stack(cross(turned(i.angles.map(|angle| angle * DEGREE))[2], i.rates))),
             ]);
         }
@@ -169,7 +184,10 @@ impl Relation {
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
             read("the rates are in degrees a second", "[units] rates = \"deg/s\"", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates.map(|rate| rate * DEGREE))),
             read("the angles are in degrees", ANGLES_DEGREES, |i| axes(&turned(i.angles.map(|angle| angle * DEGREE))), |i| turning(&turned(i.angles.map(|angle| angle * DEGREE)), i.rates)),
-            read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(exchanged(i.angles))), |i| turning(&turned(exchanged(i.angles)), i.rates)),
+            read("wx and wy are exchanged", "[columns] wx = \"wy\", wy = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, first_two(i.rates))),
+            read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
+            read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
+            read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(first_two(i.angles))), |i| turning(&turned(first_two(i.angles)), i.rates)),
         ], order.into_iter().collect()].concat())
     }
 
@@ -193,6 +211,9 @@ impl Relation {
             read("the targets are specific force in units of g", "targets = \"specific_force\" and [units] acceleration = \"g\"", |i| without_turning(add(i.linear_target.map(|value| GRAVITY_M_S2 * value), i.gravity), i)),
             read("the targets are nose-port-up while the velocity is not", "[columns] vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(scaled(i.linear_target, FLIP))),
             Hypothesis { says: "the velocity is written in inertial axes", set: "velocity = \"inertial\"", state: |i| stack(rotate_back(&i.rotation, i.velocity)), rate: |i| stack(i.linear_target) },
+            read("vx_dot and vy_dot are exchanged", "[columns] vx_dot = \"vy_dot\", vy_dot = \"vx_dot\", with the file's names", |i| stack(first_two(i.linear_target))),
+            read("vy_dot and vz_dot are exchanged", "[columns] vy_dot = \"vz_dot\", vz_dot = \"vy_dot\", with the file's names", |i| stack(last_two(i.linear_target))),
+            read("vx_dot and vz_dot are exchanged", "[columns] vx_dot = \"vz_dot\", vz_dot = \"vx_dot\", with the file's names", |i| stack(outer_two(i.linear_target))),
             read("the targets have the other sign", "[columns] vx_dot = \"-vx_dot\", vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(i.linear_target.map(|value| -value))),
         ])
     }
@@ -207,6 +228,9 @@ impl Relation {
             read("the angular targets are in degrees", "[units] angular_acceleration = \"deg/s^2\"", |i| stack(i.angular_target.map(|value| value * DEGREE))),
             read("the rates are in degrees a second and their targets are not", "[units] rates = \"deg/s\"", |i| stack(i.angular_target.map(|value| value / DEGREE))),
             read("the angular targets are nose-port-up while the rates are not", "[columns] wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(scaled(i.angular_target, FLIP))),
+            read("wx_dot and wy_dot are exchanged", "[columns] wx_dot = \"wy_dot\", wy_dot = \"wx_dot\", with the file's names", |i| stack(first_two(i.angular_target))),
+            read("wy_dot and wz_dot are exchanged", "[columns] wy_dot = \"wz_dot\", wz_dot = \"wy_dot\", with the file's names", |i| stack(last_two(i.angular_target))),
+            read("wx_dot and wz_dot are exchanged", "[columns] wx_dot = \"wz_dot\", wz_dot = \"wx_dot\", with the file's names", |i| stack(outer_two(i.angular_target))),
             read("the angular targets have the other sign", "[columns] wx_dot = \"-wx_dot\", wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(i.angular_target.map(|value| -value))),
         ])
     }

@@ -68,9 +68,15 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         }
     }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
-    findings.extend(grains.into_iter().filter_map(|(column, grains)| grains.finding(flights, column)));
-    findings.extend(NOISY.into_iter().chain(CONTROLS).filter(present).filter_map(|column| noise(flights, column)));
-    findings.extend(CONTROLS.into_iter().filter_map(|column| rough(flights, column)));
+    let rounded: Vec<(Column, Finding)> =
+        grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
+    // Steps of rounding look like noise.
+    let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Verdict::Fault);
+    let noisy = NOISY.into_iter().chain(CONTROLS).filter(present).filter(is_smooth).filter_map(|column| noise(flights, column));
+    let noisy: Vec<Finding> =
+        noisy.chain(CONTROLS.into_iter().filter(is_smooth).filter_map(|column| rough(flights, column))).collect();
+    findings.extend(rounded.into_iter().map(|(_, finding)| finding));
+    findings.extend(noisy);
     findings
 }
 

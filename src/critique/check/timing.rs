@@ -230,6 +230,25 @@ impl Timing {
         controls.for_each(|(one, other)| one.absorb(other, together));
     }
 
+    /// How many blocks the pairs have of which there are most.
+    pub fn blocks(&self) -> usize {
+        let pairs = self.pairs.iter().map(|(_, profile)| profile.errors[0][0].len());
+        let controls = self.controls.iter().filter_map(|delays| delays.first()).map(BlockRegression::blocks);
+        pairs.chain(controls).max().unwrap_or(0)
+    }
+
+    /// Of these blocks only.
+    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+        let mut part = Self::new(self.step_s);
+        for ((_, profile), (_, own)) in part.pairs.iter_mut().zip(&self.pairs) {
+            let shifts = profile.errors.iter_mut().flatten().zip(own.errors.iter().flatten());
+            shifts.for_each(|(blocks, own)| blocks.extend(own.iter().take(range.end).skip(range.start)));
+        }
+        let controls = part.controls.iter_mut().flatten().zip(self.controls.iter().flatten());
+        controls.for_each(|(one, own)| *one = own.part(range.clone()));
+        part
+    }
+
     fn add_controls(&mut self, flight: usize, motion: &Motion) {
         let margin = self.delays.iter().map(|delay| delay.unsigned_abs()).max().unwrap_or(0);
         let end = motion.instants.len().saturating_sub(margin);

@@ -1,0 +1,98 @@
+//! Streams with a clock of their own: how far a stream comes later, or earlier, in the second half of flights than in the first. How late it comes on the
+//! whole is in `timing`.
+
+use super::report::{Finding, Subject, Verdict};
+use super::timing::Timing;
+
+/// A delay that grows by so much along a flight changes verdicts, s.
+const GROWS_S: f64 = 0.03;
+
+const CONTROLS: &str = "controls";
+
+/// The halves of flights.
+pub(super) struct Halves {
+    timing: [Timing; 2],
+    /// Of the flights, s, and their number.
+    duration_s: f64,
+    flights: usize,
+}
+
+impl Halves {
+    pub fn new(step_s: f64) -> Self {
+        Self { timing: [Timing::new(step_s), Timing::new(step_s)], duration_s: 0.0, flights: 0 }
+    }
+
+    /// Of one flight, in the short blocks of which `whole` is made.
+    pub fn of(whole: &Timing, step_s: f64, duration_s: f64) -> Self {
+        let mut halves = Self { duration_s, flights: 1, ..Self::new(step_s) };
+        let blocks = whole.blocks();
+        halves.timing[0].absorb(&whole.part(0..blocks / 2), 1);
+        halves.timing[1].absorb(&whole.part(blocks / 2..blocks), 1);
+        halves
+    }
+
+    /// Adds the blocks of others, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        self.timing.iter_mut().zip(&other.timing).for_each(|(one, other)| one.absorb(other, together));
+        self.duration_s += other.duration_s;
+        self.flights += other.flights;
+    }
+
+    /// By how much the delay of each stream grows.
+    pub fn findings(&self) -> Vec<Finding> {
+        let late = |timing: &Timing| {
+            let mut late = timing.offsets(0.0);
+            late.push(timing.control_delay(None).0);
+            late
+        };
+        let [first, second] = self.timing.each_ref().map(late);
+        // From the middle of one half to that of the other.
+        let apart_s = 0.5 * self.duration_s / self.flights.max(1) as f64;
+        let same = |one: &Finding| second.iter().find(|other| other.name == one.name).cloned();
+        first.iter().filter_map(|one| grown(one, &same(one)?, apart_s)).collect()
+    }
+}
+
+/// What a stream is called, by the finding on its delay.
+fn stream(of: &str) -> &'static str {
+    match of {
+        "velocity_offset" => "velocity",
+        "rates_offset" => "rates",
+        "targets_offset" => "acceleration",
+        "angular_targets_offset" => "angular_acceleration",
+        _ => CONTROLS,
+    }
+}
+
+fn grown(first: &Finding, second: &Finding, apart_s: f64) -> Option<Finding> {
+    let half = |finding: &Finding| Some(0.5 * (finding.interval?[1] - finding.interval?[0]));
+    let by = second.measured? - first.measured?;
+    let half = half(first)?.hypot(half(second)?);
+    let (low, high) = (by - half, by + half);
+    let stream = stream(&first.name);
+    // Controls that are recorded early act late; of two streams in step the one that is recorded early is early.
+    let fast = by / apart_s * if stream == CONTROLS { 1.0 } else { -1.0 };
+    let is_grown = by.abs() > GROWS_S && (low > 0.0 || high < 0.0);
+    let message = if is_grown {
+        format!(
+            "from the first half of a flight to the second the delay of the {stream} grows by {:.0} ms: a clock of its own, {:+.2} % fast",
+            1e3 * by,
+            100.0 * fast
+        )
+    } else {
+        "one clock".into()
+    };
+    Some(Finding {
+        subject: Subject::Timing,
+        measured: Some(by),
+        interval: Some([low, high]),
+        expected: Some(0.0),
+        unit: "s".into(),
+        ..super::finding(
+            &format!("clock_{stream}"),
+            if is_grown { Verdict::Fault } else { Verdict::Ok },
+            message.replace('_', " "),
+            None,
+        )
+    })
+}

@@ -1,0 +1,180 @@
+//! Sensors that sit turned in the aircraft: by which small angles the attitude is turned against the velocity and against the rates. Other orders and
+//! signs of whole columns are in `relations`, single columns in `gains`.
+//!
+//! If the attitude R is that of axes turned by δ against the body's, ṗ = R (v − δ × v) and ṙ = r × (ω − δ × ω) for its rows r, to first order in δ. Both
+//! are linear in δ. An attitude that is off shows the same δ in both; a turned gyro or velocity sensor in one. Offsets of v and ω are fitted beside it: at
+//! a constant speed they look the same.
+
+use super::increments::Motion;
+use super::regression::{BlockRegression, Estimate};
+use super::report::{Finding, Verdict};
+use crate::blocks::FEW_BLOCKS;
+use crate::flight::attitude::cross;
+
+/// A sensor that sits turned by so much, rad, is not mounted as meant.
+const TURNED: f64 = 0.05;
+/// Share of the error that is left at most where a turn is its cause.
+const CONVINCING_SHARE: f64 = 0.5;
+/// Two estimates of one angle differ at most by this share of it.
+const ALIKE: f64 = 0.5;
+
+/// Of the finding.
+pub(super) const NAME: &str = "mounts";
+
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// Accumulates over flights.
+pub(super) struct Mounts {
+    /// Against the velocity, where there is a position.
+    velocity: BlockRegression<6>,
+    rates: BlockRegression<6>,
+}
+
+/// What one regression says: δ about each axis.
+#[derive(Clone, Copy)]
+struct Turn {
+    angles: [Estimate; 3],
+    /// A turn is what is wrong with the relation.
+    convinces: bool,
+}
+
+impl Turn {
+    /// The axis about which the turn is certainly that of another mount.
+    fn axis(&self) -> Option<usize> {
+        let certain = |axis: &usize| {
+            let [low, high] = self.angles[*axis].interval;
+            low > TURNED || high < -TURNED
+        };
+        (0..3).filter(certain).max_by(|one, other| self.size(*one).total_cmp(&self.size(*other)))
+    }
+
+    fn size(&self, axis: usize) -> f64 {
+        self.angles[axis].value.abs()
+    }
+
+    fn largest(&self) -> usize {
+        (0..3).max_by(|one, other| self.size(*one).total_cmp(&self.size(*other))).expect("there are three axes")
+    }
+}
+
+impl Mounts {
+    pub fn new() -> Self {
+        Self { velocity: BlockRegression::new(), rates: BlockRegression::new() }
+    }
+
+    /// Adds a flight.
+    pub fn add(&mut self, flight: usize, motion: &Motion) {
+        for (piece, number) in motion.pieces(0) {
+            let block = (flight, number);
+            let at = |k: usize| &motion.instants[k];
+            for row in if motion.heading { 0..3 } else { 2..3 } {
+                if motion.position && motion.heading {
+                    // ∫ r·v, and ∫ r × v, which is −∫ r·(e × v) for the three axes e, and ∫ r.
+                    let [gone, columns @ ..] = motion.integral(&piece, |k| {
+                        let (axis, velocity) = (at(k).rotation[row], at(k).velocity);
+                        let [x, y, z] = cross(axis, velocity);
+                        [(0..3).map(|i| axis[i] * velocity[i]).sum(), x, y, z, axis[0], axis[1], axis[2]]
+                    });
+                    self.velocity.add(block, &columns, at(piece.end).position[row] - at(piece.start).position[row] - gone);
+                }
+                // ∫ r_a ω_b, and ∫ r.
+                let products: [f64; 12] = motion.integral(&piece, |k| {
+                    let axis = at(k).rotation[row];
+                    std::array::from_fn(|i| axis[i / 4] * if i % 4 < 3 { at(k).rates[i % 4] } else { 1.0 })
+                });
+                let product = |a: usize, b: usize| products[4 * a + b];
+                let along: f64 = (0..3).map(|axis| product(axis, axis)).sum();
+                for axis in 0..3 {
+                    let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
+                    let change = at(piece.end).rotation[row][axis] - at(piece.start).rotation[row][axis];
+                    let mut columns = [0.0; 6];
+                    // r × (e × ω) = e (r·ω) − ω (r·e).
+                    for (of, column) in columns[..3].iter_mut().enumerate() {
+                        *column = product(of, axis) - if of == axis { along } else { 0.0 };
+                    }
+                    // r × e.
+                    (columns[3 + last], columns[3 + next]) = (product(next, 3), -product(last, 3));
+                    self.rates.add(block, &columns, change - (product(next, last) - product(last, next)));
+                }
+            }
+        }
+    }
+
+    /// Adds the blocks of others, so many of them as one.
+    pub fn absorb(&mut self, other: &Self, together: usize) {
+        self.velocity.absorb(&other.velocity, together);
+        self.rates.absorb(&other.rates, together);
+    }
+
+    /// What is turned, or that nothing is; nothing is said of a stream in which a column is known to be read wrongly, as `sound` says of velocity and
+    /// rates.
+    pub fn findings(&self, sound: [bool; 2]) -> Vec<Finding> {
+        let of = |regression, sound: bool| turn(regression).filter(|_| sound);
+        let (velocity, rates) = (of(&self.velocity, sound[0]), of(&self.rates, sound[1]));
+        if let Some((velocity, axis)) = velocity.zip(rates).and_then(|(velocity, rates)| together(&velocity, &rates)) {
+            return vec![attitude(velocity.angles[axis], axis)];
+        }
+        let turned = [(velocity, "velocity"), (rates, "rates")];
+        let known = || turned.iter().filter_map(|(turn, stream)| Some((turn.as_ref()?, *stream)));
+        let faults =
+            known().filter(|(turn, _)| turn.convinces).filter_map(|(turn, stream)| Some(against(turn, turn.axis()?, stream)));
+        let faults: Vec<Finding> = faults.collect();
+        if !faults.is_empty() {
+            return faults;
+        }
+        let most =
+            known().map(|(turn, _)| turn.angles[turn.largest()]).max_by(|one, other| one.value.abs().total_cmp(&other.value.abs()));
+        let sound = |angle| of_angle(angle, Verdict::Ok, "attitude, velocity and rates are in the same axes".into(), None);
+        most.map(sound).into_iter().collect()
+    }
+}
+
+/// Where both say the same angle, and it is what is wrong with one of them: the turn against the velocity, and its axis.
+fn together(velocity: &Turn, rates: &Turn) -> Option<(Turn, usize)> {
+    let axis = velocity.axis()?;
+    let [one, other] = [velocity, rates].map(|turn| turn.angles[axis].value);
+    let is_alike = rates.axis() == Some(axis) && (one - other).abs() < ALIKE * one.abs();
+    (is_alike && (velocity.convinces || rates.convinces)).then_some((*velocity, axis))
+}
+
+fn turn(regression: &BlockRegression<6>) -> Option<Turn> {
+    if regression.blocks() < FEW_BLOCKS {
+        return None;
+    }
+    let [x, y, z, ..] = regression.estimates()?;
+    let left: f64 = regression.errors()?.iter().sum();
+    // Against offsets alone.
+    let without: f64 = regression.on([3, 4, 5]).errors()?.iter().sum();
+    Some(Turn { angles: [x, y, z], convinces: left < CONVINCING_SHARE * without })
+}
+
+/// The attitude is turned against both others.
+fn attitude(angle: Estimate, axis: usize) -> Finding {
+    let value = angle.value;
+    let message = format!(
+        "{} is off by {:.1}°: the attitude is turned about {} against velocity and rates",
+        ["roll", "pitch", "yaw"][axis],
+        value.to_degrees(),
+        AXES[axis]
+    );
+    let sign = if value < 0.0 { '+' } else { '-' };
+    // Only the roll is turned last, about the body's own axis.
+    let set = (axis == 0).then(|| format!("[columns] roll = \"roll {sign} {:.4}\", with the file's name", value.abs()));
+    of_angle(angle, Verdict::Fault, message, set)
+}
+
+fn against(turn: &Turn, axis: usize, stream: &str) -> Finding {
+    let degrees = -turn.angles[axis].value.to_degrees();
+    let message = format!("the axes of the {stream} are turned by {degrees:.1}° about {} against the attitude", AXES[axis]);
+    of_angle(turn.angles[axis], Verdict::Fault, message, None)
+}
+
+fn of_angle(angle: Estimate, verdict: Verdict, message: String, set: Option<String>) -> Finding {
+    Finding {
+        measured: Some(angle.value),
+        interval: Some(angle.interval),
+        expected: Some(0.0),
+        unit: "rad".into(),
+        ..super::finding(NAME, verdict, message, set.as_deref())
+    }
+}
