@@ -4,6 +4,7 @@
 use super::evidence::Evidence;
 use super::increments::{Motion, TOGETHER};
 use super::report::{Finding, Subject, Verdict};
+use super::sticks::median;
 use super::timing::Timing;
 use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
@@ -17,6 +18,10 @@ const OFF: f64 = 0.2;
 pub(super) const LATE_S: f64 = 0.03;
 /// Controls of a flight are late or early against those of the others from here on, s; estimates of a single flight scatter.
 const LATER_S: f64 = 0.05;
+/// Delays of flights that differ by so many times what they scatter are not those of what is flown.
+const APART: f64 = 3.0;
+/// From a median absolute deviation to the standard deviation of normal numbers.
+const NORMAL: f64 = 1.4826;
 /// Flights at least in which a single stick is late: there are many flights and many sticks.
 const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
@@ -133,8 +138,7 @@ impl Odd {
         }
         for relation in RELATIONS {
             let such = scaled(relation, &by_name);
-            odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
-            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(relation, &indices, &message, flights)));
+            odd.extend(relation, such, flights);
         }
         for (name, mut of_flights) in by_name {
             // A flight all of whose controls are late says nothing more of each.
@@ -144,17 +148,28 @@ impl Odd {
                 // One stick alone may well be slower than the rest in a flight; it cannot act before it is given.
                 name if name.starts_with(STICK) => {
                     let mut late = shifted(&of_flights, &name[STICK.len()..]);
-                    late.retain(|(indices, message)| {
-                        message.contains(" late ") && indices.len() >= FEWEST && 10 * indices.len() >= of_flights.len()
-                    });
+                    let are_some = |flights: usize| flights >= FEWEST && 10 * flights >= of_flights.len();
+                    late.retain(|shift| shift.is_late && are_some(shift.flights.len()));
                     late
                 }
-                _ => broken(&of_flights),
+                _ => {
+                    odd.extend(name, broken(&of_flights), flights);
+                    continue;
+                }
             };
-            odd.flights.extend(such.iter().flat_map(|(indices, _)| indices));
-            odd.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
+            let (apart, vague): (Vec<Shift>, Vec<Shift>) = such.into_iter().partition(|shift| shift.is_apart);
+            odd.extend(name, apart.into_iter().map(|shift| (shift.flights, shift.message)).collect(), flights);
+            odd.findings.extend(vague.into_iter().map(|shift| {
+                let message = format!("{}, or the sticks move so otherwise there that they look so", shift.message);
+                Finding { verdict: Verdict::Warning, ..in_flights(name, &shift.flights, &message, flights) }
+            }));
         }
         odd
+    }
+
+    fn extend(&mut self, name: &str, such: Vec<(Vec<usize>, String)>, flights: &[Flight]) {
+        self.flights.extend(such.iter().flat_map(|(indices, _)| indices));
+        self.findings.extend(such.into_iter().map(|(indices, message)| in_flights(name, &indices, &message, flights)));
     }
 }
 
@@ -272,34 +287,49 @@ fn contradicts(finding: &Finding) -> bool {
     }
 }
 
+/// Flights of which a stick, or all, come late or early against the others.
+struct Shift {
+    flights: Vec<usize>,
+    message: String,
+    is_late: bool,
+    /// Farther from the others than flights scatter by what is flown in them.
+    is_apart: bool,
+}
+
+/// A flight, its delay and the interval of that, s.
+type Delay = (usize, f64, [f64; 2]);
+
 /// Flights whose controls are recorded later or earlier than those of the others. When they act nobody knows beforehand, but not before they are
 /// given.
-fn shifted(of_flights: &[(usize, &Finding)], what: &str) -> Vec<(Vec<usize>, String)> {
-    let known: Vec<(usize, f64, [f64; 2])> =
+fn shifted(of_flights: &[(usize, &Finding)], what: &str) -> Vec<Shift> {
+    let known: Vec<Delay> =
         of_flights.iter().filter_map(|(flight, finding)| Some((*flight, finding.measured?, finding.interval?))).collect();
     let middle = |causal: bool| {
         let such = known.iter().map(|entry| entry.1).filter(|delay_s| !causal || *delay_s > -0.5 * LATE_S);
-        let mut delays: Vec<f64> = such.collect();
-        delays.sort_unstable_by(f64::total_cmp);
-        delays.get(delays.len() / 2).copied()
+        median(such.collect())
     };
     let Some(usual) = middle(true).or_else(|| middle(false)) else { return Vec::new() };
-    let of = |sign: f64| -> Option<(Vec<usize>, String)> {
-        let is_such = |(_, value, [low, high]): &&(usize, f64, [f64; 2])| {
-            let near = if sign > 0.0 { value - WIDER * (value - low) } else { value + WIDER * (high - value) };
+    let of = |is_late: bool| -> Option<Shift> {
+        let sign = if is_late { -1.0 } else { 1.0 };
+        let is_such = |(_, value, [low, high]): &&Delay| {
+            let near = if is_late { value + WIDER * (high - value) } else { value - WIDER * (value - low) };
             sign * (value - usual) > LATER_S && sign * (near - usual) > 0.5 * LATER_S
         };
-        let such: Vec<(usize, f64)> = known.iter().filter(is_such).map(|entry| (entry.0, sign * (entry.1 - usual))).collect();
+        let (such, rest): (Vec<&Delay>, Vec<_>) = known.iter().partition(is_such);
         if such.is_empty() || such.len() as f64 > MOST * known.len() as f64 {
             return None;
         }
-        let by_ms = 1e3 * such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
-        let how = if sign > 0.0 { "early" } else { "late" };
-        let message =
-            format!("{what} come{} {how} by about {by_ms:.0} ms against the others", if what.contains(' ') { "" } else { "s" });
-        Some((such.into_iter().map(|entry| entry.0).collect(), message))
+        let by = median(such.iter().map(|entry| sign * (entry.1 - usual)).collect())?;
+        let scatter = NORMAL * median(rest.iter().map(|entry| (entry.1 - usual).abs()).collect())?;
+        let message = format!(
+            "{what} come{} {} by about {:.0} ms against the others",
+            if what.contains(' ') { "" } else { "s" },
+            if is_late { "late" } else { "early" },
+            1e3 * by
+        );
+        Some(Shift { flights: such.into_iter().map(|entry| entry.0).collect(), message, is_late, is_apart: by > APART * scatter })
     };
-    [-1.0, 1.0].into_iter().filter_map(of).collect()
+    [true, false].into_iter().filter_map(of).collect()
 }
 
 /// Whether gravity says that all lengths of the flight are in another unit: then every stream agrees with every other, and only it has another size.

@@ -32,6 +32,13 @@ pub(super) struct BlockRegression<const K: usize> {
     open: Option<(usize, usize)>,
 }
 
+/// β, the lengths of the columns, and (XᵀX)⁻¹ in units of these.
+struct Solution<const K: usize> {
+    beta: [f64; K],
+    scale: [f64; K],
+    inverse: DMatrix<f64>,
+}
+
 /// One coefficient.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Estimate {
@@ -118,34 +125,39 @@ impl<const K: usize> BlockRegression<K> {
     /// 1986), times B/(B − 1), and Student's t with B − K degrees of freedom. `None` if there are too few blocks or the columns
     /// do not determine β.
     pub fn estimates(&self) -> Option<[Estimate; K]> {
-        let count = self.blocks.len();
-        if count <= K {
-            return None;
-        }
-        let total = |i: usize, j: usize| self.blocks.iter().map(|sums| sums.gram[i][j]).sum::<f64>();
-        // Columns in units of their own length, so that the factorisation sees correlations and not units.
-        let scale: [f64; K] = std::array::from_fn(|i| total(i, i).sqrt());
-        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
-            return None;
-        }
-        let gram = DMatrix::from_fn(K, K, |i, j| total(i, j) / (scale[i] * scale[j]));
-        let inverse = Cholesky::new(gram)?.inverse();
-        let moment = DVector::from_fn(K, |i, _| self.blocks.iter().map(|sums| sums.moment[i]).sum::<f64>() / scale[i]);
-        let beta = &inverse * moment;
+        let Solution { beta, scale, inverse } = self.solution()?;
         let mut meat = DMatrix::<f64>::zeros(K, K);
         for sums in &self.blocks {
-            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j] / scale[j]).sum::<f64>();
+            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j]).sum::<f64>();
             let score = DVector::from_fn(K, |i, _| (sums.moment[i] - fitted(i)) / scale[i]);
             meat += &score * score.transpose();
         }
-        let blocks = count as f64;
+        let blocks = self.blocks.len() as f64;
         let covariance = &inverse * meat * &inverse * (blocks / (blocks - 1.0));
-        let quantile = quantile_975((count - K) as f64);
+        let quantile = quantile_975((self.blocks.len() - K) as f64);
         let estimates = std::array::from_fn(|i| {
-            let (value, half) = (beta[i] / scale[i], quantile * covariance[(i, i)].max(0.0).sqrt() / scale[i]);
-            Estimate { value, interval: [value - half, value + half] }
+            let half = quantile * covariance[(i, i)].max(0.0).sqrt() / scale[i];
+            Estimate { value: beta[i], interval: [beta[i] - half, beta[i] + half] }
         });
         estimates.iter().all(|estimate| estimate.interval.iter().all(|bound| bound.is_finite())).then_some(estimates)
+    }
+
+    /// The common least-squares fit. `None` as in [`BlockRegression::estimates`].
+    fn solution(&self) -> Option<Solution<K>> {
+        if self.blocks.len() <= K {
+            return None;
+        }
+        let total = Sums::total(&self.blocks);
+        // Columns in units of their own length, so that the factorisation sees correlations and not units.
+        let scale: [f64; K] = std::array::from_fn(|i| total.gram[i][i].sqrt());
+        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
+            return None;
+        }
+        let gram = DMatrix::from_fn(K, K, |i, j| total.gram[i][j] / (scale[i] * scale[j]));
+        let inverse = Cholesky::new(gram)?.inverse();
+        let scaled = &inverse * DVector::from_fn(K, |i, _| total.moment[i] / scale[i]);
+        let beta: [f64; K] = std::array::from_fn(|i| scaled[i] / scale[i]);
+        beta.iter().all(|beta| beta.is_finite()).then_some(Solution { beta, scale, inverse })
     }
 
     /// Rows added.
@@ -155,7 +167,7 @@ impl<const K: usize> BlockRegression<K> {
 
     /// Sum of squared errors of each block under the common least-squares fit. `None` as in [`BlockRegression::estimates`].
     pub fn errors(&self) -> Option<Vec<f64>> {
-        let beta = self.estimates()?.map(|estimate| estimate.value);
+        let beta = self.solution()?.beta;
         let error = |sums: &Sums<K>| {
             let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j]).sum::<f64>();
             (sums.square + (0..K).map(|i| beta[i] * (fitted(i) - 2.0 * sums.moment[i])).sum::<f64>()).max(0.0)

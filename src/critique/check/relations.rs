@@ -46,6 +46,9 @@ const LARGEST_SHARE: f64 = 0.25;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
+/// So many pieces of a flight tell readings from each other; of a longer one every other, every third … is taken.
+const ENOUGH: usize = 600;
+
 /// A reading is the cause where it leaves at most so many times what columns with gains of their own leave …
 const OF_COLUMNS: f64 = 2.0;
 /// … and this share of the changes.
@@ -240,7 +243,8 @@ impl Relation {
         if !(self.applies)(motion) {
             return;
         }
-        for (piece, block) in motion.pieces(0) {
+        let every = motion.pieces(0).count().div_ceil(ENOUGH).max(1);
+        for (piece, block) in motion.pieces(0).step_by(every) {
             if self.open != Some((flight, block)) {
                 self.open = Some((flight, block));
                 self.misfit.iter_mut().for_each(|blocks| blocks.push((0.0, 0.0)));
