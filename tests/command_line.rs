@@ -50,6 +50,19 @@ fn results_go_to_standard_output_as_json_alone_when_asked() -> Result<()> {
 }
 
 #[test]
+fn a_model_file_says_which_flights_were_left_out() -> Result<()> {
+    let place = folder()?;
+    let model = |name: &str| std::fs::read_to_string(place.path().join(name)).map_err(Error::io(name));
+    assert!(phyture(place.path(), &["simulate", "data", "--minutes", "3", "--seed", "7300"])?.status.success());
+    let run = phyture(place.path(), &["calibrate", "data", "-o", "model.toml", "--leave-out", "chaos_0000"])?;
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert!(model("model.toml")?.contains("left_out = [\"chaos/chaos_0000\"]"), "{}", model("model.toml")?);
+    let run = phyture(place.path(), &["calibrate", "data", "-m", "model.toml", "-o", "whole.toml"])?;
+    assert!(run.status.success() && !model("whole.toml")?.contains("left_out"), "{}", model("whole.toml")?);
+    Ok(())
+}
+
+#[test]
 fn an_effect_is_listed_shown_and_added_once() -> Result<()> {
     let place = folder()?;
     let list = phyture(place.path(), &["effect", "list"])?;

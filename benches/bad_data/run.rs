@@ -1,6 +1,6 @@
 //! Runs cases and writes a line for each.
 
-use crate::cases::SINGLES;
+use crate::cases::{SINGLES, Single};
 use crate::change::{Chance, Change, Corruption, Log, Part};
 use crate::corruptions;
 use crate::further::FURTHER;
@@ -31,10 +31,10 @@ pub struct Plan {
     pub reserved: bool,
 }
 
-/// What is reported.
-pub const REPORTED: Plan = Plan { seeds: 80_000..80_010, clean: 400, every: 1, reserved: true };
+/// What is reported. Seeds 80000 to 80002 with clean sets 81000 to 81399 were looked at before the checks were as they are.
+pub const REPORTED: Plan = Plan { seeds: 83_000..83_010, clean: 400, every: 1, reserved: true };
 /// On which checks are tuned.
-pub const DEVELOPMENT: Plan = Plan { seeds: 500..502, clean: 40, every: 1, reserved: false };
+pub const DEVELOPMENT: Plan = Plan { seeds: 500..502, clean: 400, every: 1, reserved: false };
 /// Some minutes.
 pub const FEW: Plan = Plan { seeds: 500..501, clean: 8, every: 5, ..DEVELOPMENT };
 
@@ -50,6 +50,8 @@ const AEROBATICS: [&str; 6] = ["chaos", "flips", "freestyle_aggressive", "loops"
 /// Hidden effects, by turns.
 const HIDDEN: [&str; 8] =
     ["collective_torque", "weathercock", "rate_cross", "dihedral_speedstab", "ctrl_cross", "transl_lift", "tail_lag", "quad_drag"];
+/// The effect that is a fault of the log as well.
+const LATE_ATTITUDE: &str = "sync";
 /// Share of the error that a hidden effect makes: large.
 const SHARE: f64 = 0.5;
 
@@ -345,7 +347,9 @@ impl Bench<'_> {
         let level = if index.is_multiple_of(2) { Level::ONE } else { Level::TWO };
         let minutes = CLEAN_MINUTES[(index / 2) as usize % CLEAN_MINUTES.len()];
         let mut simulation = Simulation { seed, minutes, mechanisms: Mechanisms::none(), level, ..Simulation::default() };
-        let single = &SINGLES[(index / 5) as usize % SINGLES.len()];
+        // A late attitude is something wrong with the data.
+        let singles: Vec<&Single> = SINGLES.iter().filter(|single| single.id != LATE_ATTITUDE).collect();
+        let single = singles[(index / 5) as usize % singles.len()];
         let flies = match index % 5 {
             0 => NULL,
             1 => "wind",

@@ -353,6 +353,7 @@ impl DataSet {
         if !known.is_empty() {
             let names: Vec<&str> = known.iter().map(|&flight| self.flights[flight].name.as_str()).collect();
             self.notes.push(format!("left out, {why}: {}", names.join(", ")));
+            self.source.left_out.extend(names.into_iter().map(str::to_owned));
         }
         let mut index = 0;
         self.flights.retain(|_| {

@@ -113,7 +113,8 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
         return Err(fault(path, found, expected));
     }
     let quaternion = (quaternions == logs.len()).then_some(schema.quaternion);
-    data.source = Source { axes: schema.axes, quaternion, stated: schema.stated, description: text, ..Source::default() };
+    let left_out = unread.into_iter().map(str::to_owned).chain(std::mem::take(&mut data.source.left_out)).collect();
+    data.source = Source { axes: schema.axes, quaternion, stated: schema.stated, description: text, left_out, ..Source::default() };
     data.source.record(path, read, described);
     if held.into_inner() > LARGEST_HELD {
         data.flights = data.flights.into_iter().map(Flight::out_of_memory).collect();

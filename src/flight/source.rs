@@ -23,6 +23,8 @@ pub struct Source {
     pub stated: BTreeMap<String, String>,
     /// The text of the description in force.
     pub description: Option<String>,
+    /// Flights that were read, or could not be, and left out since, by name.
+    pub left_out: Vec<String>,
 }
 
 #[cfg(feature = "files")]

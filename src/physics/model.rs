@@ -9,7 +9,7 @@ use super::evaluate::{self, StreamingModel};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
-use crate::flight::{Accelerations, Column, Flight, names};
+use crate::flight::{Accelerations, Column, Flight, Source, names};
 use std::collections::BTreeMap;
 
 /// A value of the free table `[provenance]`.
@@ -109,6 +109,21 @@ impl Model {
     /// the flight, [`Error::Undetermined`] where a formula gives no finite number, [`Error::Config`] if the model is not whole.
     pub fn predict(&self, flight: &Flight) -> Result<Accelerations> {
         evaluate::predict(self, flight)
+    }
+
+    /// Notes under `[provenance]` what its numbers come from: the data, the flights of these that were left out, the seed of the split, the version.
+    pub fn note_source(&mut self, source: &Source, seed: u64) {
+        let mut note = |key: &str, entry: Entry| self.provenance.insert(key.into(), entry);
+        note("data_sha256", Entry::Text(source.sha256.clone()));
+        note("seed", Entry::Text(seed.to_string()));
+        note("version", Entry::Text(env!("CARGO_PKG_VERSION").into()));
+        let left_out = source.left_out.iter().cloned().map(Entry::Text).collect();
+        // A model that was calibrated before may have left out others.
+        if source.left_out.is_empty() {
+            self.provenance.remove("left_out")
+        } else {
+            self.provenance.insert("left_out".into(), Entry::List(left_out))
+        };
     }
 
     /// Refuses numbers by flight whose names could mean several of these flights: a model file may name a flight by the last part of its

@@ -8,6 +8,8 @@ use super::timing::Timing;
 const GROWS_S: f64 = 0.03;
 
 const CONTROLS: &str = "controls";
+/// How the findings begin.
+pub(super) const CLOCK: &str = "clock_";
 
 /// The halves of flights.
 pub(super) struct Halves {
@@ -89,7 +91,7 @@ fn grown(first: &Finding, second: &Finding, apart_s: f64) -> Option<Finding> {
         expected: Some(0.0),
         unit: "s".into(),
         ..super::finding(
-            &format!("clock_{stream}"),
+            &format!("{CLOCK}{stream}"),
             if is_grown { Verdict::Fault } else { Verdict::Ok },
             message.replace('_', " "),
             None,

@@ -3,9 +3,9 @@
 //!
 //! If the attitude R is that of axes turned by δ against the body's, ṗ = R (v − δ × v) and ṙ = r × (ω − δ × ω) for its rows r, to first order in δ. Both
 //! are linear in δ. An attitude that is off shows the same δ in both; a turned gyro or velocity sensor in one. Offsets of v and ω are fitted beside it: at
-//! a constant speed they look the same.
+//! a constant speed they look the same; and a delay of the attitude, which in a steady roll does.
 
-use super::increments::Motion;
+use super::increments::{Motion, Vector};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Verdict};
 use crate::blocks::FEW_BLOCKS;
@@ -26,8 +26,8 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 /// Accumulates over flights.
 pub(super) struct Mounts {
     /// Against the velocity, where there is a position.
-    velocity: BlockRegression<6>,
-    rates: BlockRegression<6>,
+    velocity: BlockRegression<7>,
+    rates: BlockRegression<7>,
 }
 
 /// What one regression says: δ about each axis.
@@ -69,25 +69,27 @@ impl Mounts {
             let at = |k: usize| &motion.instants[k];
             for row in if motion.heading { 0..3 } else { 2..3 } {
                 if motion.position && motion.heading {
-                    // ∫ r·v, and ∫ r × v, which is −∫ r·(e × v) for the three axes e, and ∫ r.
+                    // ∫ r·v, and ∫ r × v, which is −∫ r·(e × v) for the three axes e, ∫ r, and ∫ ṙ·v.
                     let [gone, columns @ ..] = motion.integral(&piece, |k| {
                         let (axis, velocity) = (at(k).rotation[row], at(k).velocity);
                         let [x, y, z] = cross(axis, velocity);
-                        [(0..3).map(|i| axis[i] * velocity[i]).sum(), x, y, z, axis[0], axis[1], axis[2]]
+                        [dot(axis, velocity), x, y, z, axis[0], axis[1], axis[2], dot(cross(axis, at(k).rates), velocity)]
                     });
                     self.velocity.add(block, &columns, at(piece.end).position[row] - at(piece.start).position[row] - gone);
                 }
-                // ∫ r_a ω_b, and ∫ r.
+                // ∫ r_a ω_b, and ∫ r; ∫ ṙ × ω.
+                let later = motion.integral(&piece, |k| cross(cross(at(k).rotation[row], at(k).rates), at(k).rates));
                 let products: [f64; 12] = motion.integral(&piece, |k| {
                     let axis = at(k).rotation[row];
                     std::array::from_fn(|i| axis[i / 4] * if i % 4 < 3 { at(k).rates[i % 4] } else { 1.0 })
                 });
                 let product = |a: usize, b: usize| products[4 * a + b];
                 let along: f64 = (0..3).map(|axis| product(axis, axis)).sum();
-                for axis in 0..3 {
+                for (axis, later) in later.into_iter().enumerate() {
                     let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
                     let change = at(piece.end).rotation[row][axis] - at(piece.start).rotation[row][axis];
-                    let mut columns = [0.0; 6];
+                    let mut columns = [0.0; 7];
+                    columns[6] = later;
                     // r × (e × ω) = e (r·ω) − ω (r·e).
                     for (of, column) in columns[..3].iter_mut().enumerate() {
                         *column = product(of, axis) - if of == axis { along } else { 0.0 };
@@ -137,14 +139,18 @@ fn together(velocity: &Turn, rates: &Turn) -> Option<(Turn, usize)> {
     (is_alike && (velocity.convinces || rates.convinces)).then_some((*velocity, axis))
 }
 
-fn turn(regression: &BlockRegression<6>) -> Option<Turn> {
+fn dot(one: Vector, other: Vector) -> f64 {
+    (0..3).map(|axis| one[axis] * other[axis]).sum()
+}
+
+fn turn(regression: &BlockRegression<7>) -> Option<Turn> {
     if regression.blocks() < FEW_BLOCKS {
         return None;
     }
     let [x, y, z, ..] = regression.estimates()?;
     let left: f64 = regression.errors()?.iter().sum();
-    // Against offsets alone.
-    let without: f64 = regression.on([3, 4, 5]).errors()?.iter().sum();
+    // Against offsets and delay alone.
+    let without: f64 = regression.on([3, 4, 5, 6]).errors()?.iter().sum();
     Some(Turn { angles: [x, y, z], convinces: left < CONVINCING_SHARE * without })
 }
 

@@ -1,6 +1,7 @@
 //! Flights that are read otherwise than the others: one in feet, one whose attitude comes late, one with a sign reversed. Each flight has been judged
 //! by itself; what most of them keep and some break is a fault of those, and they are left out of what all together are judged by.
 
+use super::clocks::CLOCK;
 use super::evidence::Evidence;
 use super::increments::{Motion, TOGETHER};
 use super::report::{Finding, Subject, Verdict};
@@ -22,8 +23,8 @@ const LATER_S: f64 = 0.05;
 const APART: f64 = 3.0;
 /// From a median absolute deviation to the standard deviation of normal numbers.
 const NORMAL: f64 = 1.4826;
-/// Flights at least in which a single stick is late: there are many flights and many sticks.
-const FEWEST: usize = 3;
+/// Flights at least in which a single stick is late or scaled, or a clock another: there are many flights and many sticks, and manoeuvres do the like.
+pub(super) const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
 const SCALED: f64 = 0.07;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
@@ -143,12 +144,19 @@ impl Odd {
         for (name, mut of_flights) in by_name {
             // A flight all of whose controls are late says nothing more of each.
             of_flights.retain(|(flight, _)| !name.starts_with(STICK) || !odd.flights.contains(flight));
+            let are_some = |flights: usize| flights >= FEWEST && 10 * flights >= of_flights.len();
             let such = match name {
+                // What is flown in it can change a delay along one flight; a clock is that of a logger.
+                name if name.starts_with(CLOCK) => {
+                    let mut such = broken(&of_flights);
+                    such.retain(|(indices, _)| are_some(indices.len()));
+                    odd.extend(name, such, flights);
+                    continue;
+                }
                 CONTROLS => shifted(&of_flights, "the controls"),
                 // One stick alone may well be slower than the rest in a flight; it cannot act before it is given.
                 name if name.starts_with(STICK) => {
                     let mut late = shifted(&of_flights, &name[STICK.len()..]);
-                    let are_some = |flights: usize| flights >= FEWEST && 10 * flights >= of_flights.len();
                     late.retain(|shift| shift.is_late && are_some(shift.flights.len()));
                     late
                 }

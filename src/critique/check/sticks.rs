@@ -7,7 +7,7 @@
 
 use super::finding;
 use super::increments::Motion;
-use super::odd::{MOST, WIDER, in_flights};
+use super::odd::{FEWEST, MOST, WIDER, in_flights};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Verdict};
 use crate::flight::Flight;
@@ -274,6 +274,10 @@ fn of_size(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Opt
     let (apart, gap) = (high - low, large[0].gain - small[split - 1].gain);
     let travel = middle(large, |one| one.strength)? - middle(small, |one| one.strength)?;
     if apart < LEAST_RATIO.ln() || gap < 0.5 * apart || apart < APART * scatter || travel.abs() > 0.5 * apart {
+        return None;
+    }
+    // What is flown in it can take half of a stick's gain in one flight.
+    if small.len().min(large.len()) < FEWEST && apart < LARGEST_RATIO.ln() {
         return None;
     }
     let (fewer, ratio) = if large.len() <= small.len() { (large, apart.exp()) } else { (small, (-apart).exp()) };

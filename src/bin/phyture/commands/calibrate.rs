@@ -1,6 +1,6 @@
 //! `calibrate`: least squares of the model's coefficients on the training part, and a model file to go on with.
 
-use super::{Context, data_sha256};
+use super::Context;
 use crate::arguments::{Data, Division};
 use phyture::critique::wrap::wrapped;
 use phyture::flight::split::Split;
@@ -29,11 +29,9 @@ pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, 
     let (mut calibrated, calibration, rmse) = fit(context, &set, &model, &split)?;
     calibrated.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
     calibrated.data.split = division.split.clone().unwrap_or(calibrated.data.split);
-    let mut note = |key: &str, text: String| calibrated.provenance.insert(key.into(), Entry::Text(text));
-    note("data_sha256", data_sha256(&set));
-    note("seed", context.seed().to_string());
-    note("version", env!("CARGO_PKG_VERSION").into());
-    note("calibrated_on", format!("{} of {} s", spans_s(&set, &split.training), set.duration_s().round()));
+    calibrated.note_source(&set.source, context.seed());
+    let on = format!("{} of {} s", spans_s(&set, &split.training), set.duration_s().round());
+    calibrated.provenance.insert("calibrated_on".into(), Entry::Text(on));
     calibrated.write(context.ready(&target)?)?;
     context.say(format!("\nwritten to {}", output.display()));
     context.json(&Output { calibration, rmse })?;

@@ -12,7 +12,7 @@ use phyture::disk::{Target, append_lines};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight, Span};
 use phyture::hybrid::network_target;
-use phyture::physics::{Entry, Model};
+use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::{Error, Result};
 use serde::Serialize;
@@ -346,9 +346,7 @@ pub fn run_loop(context: &Context, data: &Data, wanted: &Loop<'_>, division: &Di
     let mut amended = amend(context, &task, &model, &ledger)?;
     let model = &mut amended.model;
     model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
-    model.provenance.insert("data_sha256".into(), Entry::Text(data_sha256));
-    model.provenance.insert("seed".into(), Entry::Text(context.seed().to_string()));
-    model.provenance.insert("version".into(), Entry::Text(env!("CARGO_PKG_VERSION").into()));
+    model.note_source(&set.source, context.seed());
     // Before anything else is measured: what the search found is then safe.
     model.write(context.ready(&target)?)?;
     let together = told_together(context, &task, &before, &amended)?;
