@@ -64,6 +64,44 @@ fn two_faults_at_once_are_mended_by_what_is_suggested() -> Outcome {
     Ok(())
 }
 
+/// What is suggested of these flights, with this description beside them, leaves nothing at fault.
+fn assert_mended(flights: &[Flight], stated: &str, line: &str) -> Outcome {
+    let folder = tempfile::tempdir()?;
+    data_set_csv(folder.path(), flights)?;
+    let description = folder.path().join("dataset.toml");
+    std::fs::write(&description, stated)?;
+    let (fault, text) = suggested(folder.path())?;
+    let text = text.filter(|_| fault).ok_or("nothing is suggested")?;
+    assert!(text.lines().any(|own| own.starts_with(line)), "{text}");
+    std::fs::write(&description, text)?;
+    assert_eq!(suggested(folder.path())?, (false, None));
+    Ok(())
+}
+
+#[test]
+fn a_wrong_time_step_is_mended() -> Outcome {
+    let halved = flights(|columns| {
+        for values in columns {
+            *values = values.iter().step_by(2).copied().collect();
+        }
+    })?;
+    assert_mended(&halved, "", "t = \"t * 2")
+}
+
+#[test]
+fn an_offset_is_mended_in_the_units_of_the_file() -> Outcome {
+    let of_wx = |change: fn(f64) -> f64| {
+        flights(|columns| {
+            for rate in [Column::Wx, Column::Wy, Column::Wz] {
+                let offset = if rate == Column::Wx { 0.2 } else { 0.0 };
+                columns[rate as usize].iter_mut().for_each(|value| *value = change(*value + offset));
+            }
+        })
+    };
+    assert_mended(&of_wx(|value| value)?, "", "wx = \"wx - 0.2")?;
+    assert_mended(&of_wx(f64::to_degrees)?, "[units]\nrates = \"deg/s\"\n", "wx = ")
+}
+
 #[test]
 fn flights_without_a_fault_ask_for_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;

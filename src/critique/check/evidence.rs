@@ -17,6 +17,9 @@ const OTHER_TIME: f64 = 0.2;
 /// … and this near to each other say that the time runs otherwise.
 const SAME: f64 = 0.1;
 
+/// Of the finding on gains that are all alike.
+pub(super) const TIME_STEP: &str = "time_step";
+
 /// The accumulators of all checks that need no physics of the aircraft, and of the places of gravity.
 pub(super) struct Evidence {
     pub relations: [Relation; 5],
@@ -77,7 +80,7 @@ impl Evidence {
         let mut findings = time_step(without_consequences(findings));
         let is_sound = |relation: &str| {
             let is_faulty = |finding: &Finding| finding.verdict == Verdict::Fault && finding.name.starts_with(relation);
-            !findings.iter().any(|finding| is_faulty(finding) || finding.name == "time_step" && finding.verdict == Verdict::Fault)
+            !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Verdict::Fault)
         };
         findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")]));
         findings
@@ -130,5 +133,5 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
 }
 
 fn step(verdict: Verdict, times: f64, message: String, set: Option<&str>) -> Finding {
-    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..super::finding("time_step", verdict, message, set) }
+    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..super::finding(TIME_STEP, verdict, message, set) }
 }

@@ -22,6 +22,10 @@ const TURNED: f64 = 0.17;
 /// Where the nose turns faster, rad/s, a heading that comes late looks turned.
 const SLOW: f64 = 0.5;
 
+/// How findings on offsets begin, and the name of that on the heading.
+pub(super) const OFFSET: &str = "offset_";
+pub(super) const HEADING: &str = "heading";
+
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Accumulates the gains over flights.
@@ -190,7 +194,7 @@ impl Gains {
         );
         let set =
             format!("[columns] yaw = \"yaw {} {:.4}\", with the file's name", if angle < 0.0 { '-' } else { '+' }, angle.abs());
-        ((size - 1.0).abs() < WARNING_MARGIN).then(|| constant("heading", estimate, TURNED, "rad", says, set))
+        ((size - 1.0).abs() < WARNING_MARGIN).then(|| constant(HEADING, estimate, TURNED, "rad", says, set))
     }
 }
 
@@ -219,7 +223,7 @@ fn offset(column: &str, estimate: Estimate, least: f64, unit: &str) -> Finding {
     let says = format!("{column} has an offset of {value:.2} {unit} against the change of its state");
     let sign = if value < 0.0 { '+' } else { '-' };
     let set = format!("[columns] {column} = \"{column} {sign} {:.4}\", with the file's name", value.abs());
-    constant(&format!("offset_{column}"), Estimate { value, interval: [low, high] }, least, unit, says, set)
+    constant(&format!("{OFFSET}{column}"), Estimate { value, interval: [low, high] }, least, unit, says, set)
 }
 
 /// A finding on what should be 0, and is at fault from `least` on.

@@ -242,9 +242,19 @@ fn not_judged(finding: Finding) -> Finding {
 /// What rests on a reading that is known to be wrong is not judged.
 fn symptom(finding: Finding) -> Finding {
     let is_reading = RELATIONS.iter().any(|relation| finding.name.starts_with(relation)) || finding.name == odd::LATERAL;
-    let is_known = ["offset_", "heading", "time_step", mounts::NAME, "frozen_", streams::HELD, "spikes_", "rounding_", "noise_"]
-        .iter()
-        .any(|start| finding.name.starts_with(start));
+    let is_known = [
+        gains::OFFSET,
+        gains::HEADING,
+        evidence::TIME_STEP,
+        mounts::NAME,
+        "frozen_",
+        streams::HELD,
+        "spikes_",
+        "rounding_",
+        "noise_",
+    ]
+    .iter()
+    .any(|start| finding.name.starts_with(start));
     if is_reading || is_known || finding.verdict < Verdict::Warning {
         return finding;
     }

@@ -31,7 +31,6 @@ pub(super) struct Mounts {
 }
 
 /// What one regression says: δ about each axis.
-#[derive(Clone, Copy)]
 struct Turn {
     angles: [Estimate; 3],
     /// A turn is what is wrong with the relation.
@@ -113,8 +112,8 @@ impl Mounts {
     pub fn findings(&self, sound: [bool; 2]) -> Vec<Finding> {
         let of = |regression, sound: bool| turn(regression).filter(|_| sound);
         let (velocity, rates) = (of(&self.velocity, sound[0]), of(&self.rates, sound[1]));
-        if let Some((velocity, axis)) = velocity.zip(rates).and_then(|(velocity, rates)| together(&velocity, &rates)) {
-            return vec![attitude(velocity.angles[axis], axis)];
+        if let Some((angle, axis)) = velocity.as_ref().zip(rates.as_ref()).and_then(|(velocity, rates)| together(velocity, rates)) {
+            return vec![attitude(angle, axis)];
         }
         let turned = [(velocity, "velocity"), (rates, "rates")];
         let known = || turned.iter().filter_map(|(turn, stream)| Some((turn.as_ref()?, *stream)));
@@ -131,12 +130,12 @@ impl Mounts {
     }
 }
 
-/// Where both say the same angle, and it is what is wrong with one of them: the turn against the velocity, and its axis.
-fn together(velocity: &Turn, rates: &Turn) -> Option<(Turn, usize)> {
+/// Where both say the same angle, and it is what is wrong with one of them: the angle against the velocity, and its axis.
+fn together(velocity: &Turn, rates: &Turn) -> Option<(Estimate, usize)> {
     let axis = velocity.axis()?;
     let [one, other] = [velocity, rates].map(|turn| turn.angles[axis].value);
     let is_alike = rates.axis() == Some(axis) && (one - other).abs() < ALIKE * one.abs();
-    (is_alike && (velocity.convinces || rates.convinces)).then_some((*velocity, axis))
+    (is_alike && (velocity.convinces || rates.convinces)).then_some((velocity.angles[axis], axis))
 }
 
 fn dot(one: Vector, other: Vector) -> f64 {

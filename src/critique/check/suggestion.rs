@@ -35,6 +35,8 @@ pub struct Open {
 const TITLE: &str = "# How these flights are to be read. Above each line stands what `phyture check` found.\n";
 /// What stands behind the part of a line that a file can hold.
 const FOR_PEOPLE: [&str; 2] = [", with the file's name", ", or leave `quaternion` out"];
+/// The column that no axes and no frame change.
+const TIME: &str = "t";
 /// Lists, to which findings add.
 const LISTS: [&str; 3] = ["leave_out", "missing", "ignore"];
 /// Of these lists the entries are columns as the file has them.
@@ -222,12 +224,22 @@ impl<'a> Draft<'a> {
         if !is_sign && self.of_file(name).is_none_or(|(_, sign)| sign != 1.0) {
             return Err(self.not_of_file(name));
         }
+        let factor = self.schema.factor(name);
         let composed = |source: &String| {
             if text == read {
                 return Ok(source.clone());
             }
             let inner = Formula::parse(source).map_err(|_| format!("`{source}` cannot stand in a formula: {text}"))?;
-            formula.substitute(&|_| Some(inner.clone())).map(|whole| whole.to_string()).map_err(|error| error.to_string())
+            let with = |formula: &Formula, inner: &Formula| {
+                formula.substitute(&|_| Some(inner.clone())).map_err(|error| error.to_string())
+            };
+            if is_sign || factor == 1.0 {
+                return with(&formula, &inner).map(|whole| whole.to_string());
+            }
+            // Numbers in the formula are in the program's units, and the file has others.
+            let scaled = |text: String| Formula::parse(&text).map_err(|error| error.to_string());
+            let whole = with(&formula, &with(&scaled(format!("{factor:?} * value"))?, &inner)?)?;
+            with(&scaled(format!("value / {factor:?}"))?, &whole).map(|whole| whole.to_string())
         };
         let own = vec![read.to_owned()];
         let sources: Vec<String> = self.schema.columns.get(read).unwrap_or(&own).iter().map(composed).collect::<Result<_, _>>()?;
@@ -280,6 +292,9 @@ impl<'a> Draft<'a> {
 
     /// The column of a log in its own axes that a column of the program is but for its unit and this sign; `None` if it is made of several.
     fn of_file(&self, name: &str) -> Option<(&'static str, f64)> {
+        if name == TIME {
+            return Some((TIME, 1.0));
+        }
         let column = Column::from_name(name)?;
         let (place, axes) = (column as usize, self.schema.axes);
         let (first, axis) = (place - place % 3, place % 3);
