@@ -83,6 +83,7 @@ fn found() -> Diagnosis {
                 sign: None,
                 held: false,
                 rms_over_flights: None,
+                influence: None,
             }],
             parameters: Vec::new(),
             would_tell_apart: "hover at 0.5, 1, 2 and 4 m".into(),

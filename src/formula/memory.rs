@@ -34,9 +34,9 @@ pub(super) enum Memory {
     /// `y[k] = y[k-1] + (1 - a) (x[k-1] - y[k-1]) + ramp (x[k] - x[k-1])`, `a = exp(-T/tau)`, `ramp = 1 - (1 - a) tau/T`.
     Lag { approach: f64, ramp: f64, last: Option<(f64, f64)> },
     /// The same where the time constant varies: the coefficients of a step are those of its end.
-    VaryingLag { steps: LagSteps, last: Option<(f64, f64)> },
+    VaryingLag { steps: LagSteps<[f64; 2]>, last: Option<(f64, f64)> },
     /// Derivative of that by a number, from those of `x` and of the time constant. The last `x`, `y`, `dx` and `dy`.
-    LagTangent { steps: LagSteps, last: Option<[f64; 4]> },
+    LagTangent { steps: LagSteps<[[f64; 2]; 2]>, last: Option<[f64; 4]> },
     /// `dy/dtau` of the recursion of a lag; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
     LagByTime { approach: f64, ramp: f64, slopes: [f64; 2], last: Option<(f64, f64, f64)> },
     /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before.
@@ -51,34 +51,44 @@ pub(super) enum Memory {
     SlewTangent { limit: f64, step_s: f64, last: Option<(f64, f64)> },
 }
 
-/// `1 - a` and `ramp` of a lag, and their derivatives by its time constant.
-fn lag_coefficients(tau_s: f64, step_s: f64) -> ([f64; 2], [f64; 2]) {
+/// `1 - a` and `ramp` of a lag.
+fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
     if tau_s <= 0.0 {
-        return ([1.0, 1.0], [0.0, -1.0 / step_s]);
+        return [1.0, 1.0];
     }
     let approach = -(-step_s / tau_s).exp_m1();
-    let slope = -(-step_s / tau_s).exp() * step_s / (tau_s * tau_s);
-    ([approach, 1.0 - approach * tau_s / step_s], [slope, -(approach + tau_s * slope) / step_s])
+    [approach, 1.0 - approach * tau_s / step_s]
 }
 
-/// The coefficients of a lag from step to step; they are worked out when the time constant changes.
+/// These, and their derivatives by the time constant.
+fn lag_slopes(tau_s: f64, step_s: f64) -> [[f64; 2]; 2] {
+    let coefficients = lag_coefficients(tau_s, step_s);
+    if tau_s <= 0.0 {
+        return [coefficients, [0.0, -1.0 / step_s]];
+    }
+    let slope = -(-step_s / tau_s).exp() * step_s / (tau_s * tau_s);
+    [coefficients, [slope, -(coefficients[0] + tau_s * slope) / step_s]]
+}
+
+/// What a lag needs from step to step; it is worked out when the time constant changes.
 #[derive(Clone, Debug)]
-pub(super) struct LagSteps {
+pub(super) struct LagSteps<T> {
     step_s: f64,
     tau_s: f64,
-    coefficients: ([f64; 2], [f64; 2]),
+    of: fn(f64, f64) -> T,
+    needs: T,
 }
 
-impl LagSteps {
-    fn new(step_s: f64) -> Self {
-        Self { step_s, tau_s: 0.0, coefficients: lag_coefficients(0.0, step_s) }
+impl<T: Copy> LagSteps<T> {
+    fn new(step_s: f64, of: fn(f64, f64) -> T) -> Self {
+        Self { step_s, tau_s: 0.0, of, needs: of(0.0, step_s) }
     }
 
-    fn at(&mut self, tau_s: f64) -> ([f64; 2], [f64; 2]) {
+    fn at(&mut self, tau_s: f64) -> T {
         if tau_s != self.tau_s {
-            (self.tau_s, self.coefficients) = (tau_s, lag_coefficients(tau_s, self.step_s));
+            (self.tau_s, self.needs) = (tau_s, (self.of)(tau_s, self.step_s));
         }
-        self.coefficients
+        self.needs
     }
 }
 
@@ -106,23 +116,24 @@ impl Past {
 impl Memory {
     /// Of an operator with its time or limit; a rate has none, and that of a lag may vary.
     pub(super) fn new(recall: Recall, number: Option<f64>, step_s: f64) -> Self {
-        let steps = LagSteps::new(step_s);
         let number = match (recall, number) {
             (_, Some(number)) => number,
             (Recall::History(History::Rate), None) => 0.0,
-            (Recall::History(History::Lag), None) => return Self::VaryingLag { steps, last: None },
-            (Recall::LagTangent, None) => return Self::LagTangent { steps, last: None },
+            (Recall::History(History::Lag), None) => {
+                return Self::VaryingLag { steps: LagSteps::new(step_s, lag_coefficients), last: None };
+            }
+            (Recall::LagTangent, None) => 0.0,
             _ => unreachable!("a time that varies is that of a lag"),
         };
         let whole = (number / step_s).floor();
         match recall {
             Recall::History(History::Lag) => {
-                let ([approach, ramp], _) = lag_coefficients(number, step_s);
+                let [approach, ramp] = lag_coefficients(number, step_s);
                 Self::Lag { approach, ramp, last: None }
             }
-            Recall::LagTangent => Self::LagTangent { steps, last: None },
+            Recall::LagTangent => Self::LagTangent { steps: LagSteps::new(step_s, lag_slopes), last: None },
             Recall::LagByTime => {
-                let ([approach, ramp], slopes) = lag_coefficients(number, step_s);
+                let [[approach, ramp], slopes] = lag_slopes(number, step_s);
                 Self::LagByTime { approach, ramp, slopes, last: None }
             }
             Recall::History(History::Delay) => {
@@ -159,7 +170,7 @@ impl Memory {
             }
             Self::VaryingLag { steps, last } => {
                 for ((out, x), &tau_s) in samples.zip(number) {
-                    let ([approach, ramp], _) = steps.at(tau_s);
+                    let [approach, ramp] = steps.at(tau_s);
                     let (x_before, y_before) = last.unwrap_or((x, x));
                     *out = y_before + approach * (x_before - y_before) + ramp * (x - x_before);
                     *last = Some((x, *out));
@@ -168,7 +179,7 @@ impl Memory {
             Self::LagTangent { steps, last } => {
                 let [of_signal, of_time] = tangents;
                 for (((out, x), &tau_s), (&dx, &dtau)) in samples.zip(number).zip(of_signal.iter().zip(of_time)) {
-                    let ([approach, ramp], [of_approach, of_ramp]) = steps.at(tau_s);
+                    let [[approach, ramp], [of_approach, of_ramp]] = steps.at(tau_s);
                     let [x_before, y_before, dx_before, dy_before] = last.unwrap_or([x, x, dx, dx]);
                     let by_signal = dy_before + approach * (dx_before - dy_before) + ramp * (dx - dx_before);
                     *out = by_signal + dtau * (of_approach * (x_before - y_before) + of_ramp * (x - x_before));

@@ -3,10 +3,10 @@
 
 use super::account::selection;
 use super::candidate::{Candidate, with};
-use super::describe::decisive_flight;
 use super::engine::{Engine, permuted_folds};
 use super::gates::{BLOCK_S, LOOSE, SMALLEST_AMPLITUDE, SMALLEST_AMPLITUDE_OF_RIVAL, SMALLEST_FALL};
 use super::gram::blocks;
+use super::influence::{Influences, decisive_flight};
 use super::joint::{Errors, Folds, Point, undetermined};
 use super::score::{by_flight_of, gains_of};
 use super::search::Search;
@@ -93,11 +93,17 @@ impl Judged {
 /// What the road came to.
 pub(super) struct Backward {
     /// With what is needed, fitted, with intervals.
-    pub model: Model,
+    pub fitted: Fitted,
     /// The largest gain first.
     pub needed: Vec<Judged>,
     /// As they were when they were left out.
     pub needless: Vec<Judged>,
+}
+
+/// A model whose numbers and intervals are from all that was searched, and those of them that hang on one flight.
+pub(super) struct Fitted {
+    pub model: Model,
+    pub influences: Influences,
 }
 
 /// Effects by place in [`Point::optional`].
@@ -139,20 +145,21 @@ impl Search<'_> {
             }
             round += 1;
         };
-        Ok(Backward { model: self.refitted(&model, &[])?, needed, needless: gone })
+        Ok(Backward { fitted: self.refitted(&model, &[])?, needed, needless: gone })
     }
 
     /// A model without some effects, its numbers and their intervals from all that was searched.
     ///
     /// # Errors
     /// As [`Search::backward_road`].
-    pub(super) fn refitted(&self, model: &Model, without: &[String]) -> Result<Model> {
+    pub(super) fn refitted(&self, model: &Model, without: &[String]) -> Result<Fitted> {
         let mut model = model.clone();
         model.effects.retain(|effect| !without.contains(&effect.name));
         let whole = self.even((f64::INFINITY, 1), LONG_BLOCK_S);
         let mut point = Point::at(&whole, Point::fitted(&whole, model, STEPS[2])?, Vec::new())?;
         point.note_intervals(&point.folds(&whole, &[]).ok_or_else(undetermined)?);
-        Ok(point.model)
+        let influences = point.influences(&whole).ok_or_else(undetermined)?;
+        Ok(Fitted { model: point.model, influences })
     }
 
     /// The same search on as much of the flights as judges effects, where there is at least twice as much.
@@ -301,7 +308,10 @@ impl Road<'_> {
         let sum = |errors: &[f64]| errors.iter().sum::<f64>();
         let fall = |channel: usize| (channel, 1.0 - sum(&base[channel]) / sum(&errors[channel]));
         let by_flight = effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some());
-        let p_value = self.flips.p_value_of_sums(&[if by_flight { by_flight_of(&self.engine, &gains) } else { gains.clone() }]);
+        let p_value = match by_flight {
+            true => self.flips.p_value_of_sums(&by_flight_of(&self.engine, &gains)),
+            false => self.flips.p_value_of_sums(&gains),
+        };
         let falls = (0..6).filter(|&channel| channels[channel]).map(fall).collect();
         let rests_on = decisive_flight(&self.engine, &gains);
         let name = effect.name.clone();

@@ -1,16 +1,17 @@
 //! From what a search found to what is said of it. No measuring here.
 
-use super::backward::Judged;
+use super::backward::{Fitted, Judged};
 use super::candidate::Candidate;
-use super::engine::{Engine, Trial};
+use super::engine::Trial;
 use super::gates::SMALLEST_FALL;
+use super::influence::decisive_flight;
 use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
 use super::resample::{RESAMPLES, draw};
-use super::score::{Scored, by_flight_of};
+use super::score::Scored;
 use super::search::{Found, Search};
 use super::sentences;
 use crate::flight::Column;
-use crate::physics::{Coefficient, Definition, Effect, Model, Parameter, catalogue};
+use crate::physics::{Coefficient, Definition, Effect, Parameter, catalogue};
 use std::collections::BTreeMap;
 
 impl Search<'_> {
@@ -27,17 +28,22 @@ impl Search<'_> {
     }
 
     /// An effect that the backward road keeps, in the model with all that it keeps.
-    pub(super) fn needed(&self, judged: &Judged, model: &Model) -> Option<Found> {
-        let effect = model.effect(&judged.effect)?;
+    pub(super) fn needed(&self, judged: &Judged, Fitted { model, influences }: &Fitted) -> Option<Found> {
+        let index = model.effects.iter().position(|effect| effect.name == judged.effect)?;
+        let effect = &model.effects[index];
         let definition = catalogue::definition(&effect.kind).filter(|definition| definition.notes.is_some());
         let selection_frequency = self.frequency(&judged.gains);
-        let step = Step {
+        let mut step = Step {
             p_value: judged.p_value,
             selection_frequency,
             stability: stability(selection_frequency).into(),
             rests_on_flight: judged.rests_on.clone(),
             ..told_of(effect, definition, model.is_usual(), &judged.falls)
         };
+        // Numbers of an effect are its coefficients, then its parameters.
+        let coefficients = step.coefficients.iter_mut().map(|number| &mut number.influence);
+        let numbers = coefficients.chain(step.parameters.iter_mut().map(|parameter| &mut parameter.influence));
+        numbers.enumerate().for_each(|(position, influence)| *influence = influences.get(&(index, position)).cloned());
         Some(Found {
             step,
             gain: judged.gain(),
@@ -121,15 +127,6 @@ impl Search<'_> {
     }
 }
 
-/// A flight without which the gain would be gone.
-pub(super) fn decisive_flight(engine: &Engine<'_>, gains: &[f64]) -> Option<String> {
-    let total: f64 = gains.iter().sum();
-    let mut flights: Vec<usize> = engine.blocks.iter().map(|block| block.flight).collect();
-    flights.dedup();
-    let flight = flights.iter().zip(by_flight_of(engine, gains)).find(|(_, gain)| total - gain <= 0.0)?.0;
-    engine.flights.get(*flight).map(|flight| flight.name.clone()).filter(|_| flights.len() > 1)
-}
-
 fn channel_name(channel: usize) -> &'static str {
     Column::TARGETS.get(channel).map_or("?", |column| column.name())
 }
@@ -152,6 +149,7 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
             sign: None,
             held: false,
             rms_over_flights: rms,
+            influence: None,
         }
     };
     let value = |parameter: &Parameter| ParameterValue {
@@ -160,6 +158,7 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
         fixed: parameter.fixed,
         unit: parameter.unit.clone(),
         profile: parameter.ci95,
+        influence: None,
     };
     let worthy = falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
     Step {

@@ -5,7 +5,7 @@
 //! each flight is shrunk towards zero by its usual spread (ridge), and eliminated flight by flight.
 
 use super::design::Layout;
-use super::gram::{Block, BlockGram};
+use super::gram::{Block, BlockGram, Product};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// What is known about each coefficient of a layout.
@@ -31,36 +31,36 @@ pub(super) struct Reduced {
 impl Reduced {
     pub fn new(layout: &Layout, channel: usize, grams: &[BlockGram]) -> Self {
         let layout = &layout.channels[channel];
-        let size = layout.free.len() + 1;
-        let blocks = grams
-            .iter()
-            .map(|gram| {
-                let gram = &gram.channels[channel];
-                let target = gram.size() - 1;
-                // The last column: measured minus the fixed terms.
-                let mut parts: Vec<Vec<(usize, f64)>> = layout.free.iter().map(|(_, columns)| columns.clone()).collect();
-                parts.push(std::iter::once((target, 1.0)).chain(layout.fixed.iter().map(|&column| (column, -1.0))).collect());
-                let entry = |row: usize, column: usize| {
-                    let mut sum = 0.0;
-                    for &(i, a) in &parts[row] {
-                        for &(j, b) in &parts[column] {
-                            sum += a * b * gram.at(i, j);
-                        }
-                    }
-                    sum
-                };
-                let mut matrix = DMatrix::zeros(size, size);
-                for row in 0..size {
-                    for column in 0..=row {
-                        let value = entry(row, column);
-                        matrix[(row, column)] = value;
-                        matrix[(column, row)] = value;
-                    }
+        let free = layout.free.iter().map(|entry| entry.0).collect();
+        let Some(first) = grams.first() else { return Self { free, blocks: Vec::new() } };
+        let first = &first.channels[channel];
+        // The last column: measured minus the fixed terms.
+        let target = [(first.size() - 1, 1.0)];
+        let rest: Vec<(usize, f64)> = target.into_iter().chain(layout.fixed.iter().map(|&column| (column, -1.0))).collect();
+        let parts: Vec<&[(usize, f64)]> = layout.free.iter().map(|(_, columns)| columns.as_slice()).chain([&rest[..]]).collect();
+        // All blocks have their products at the same places.
+        let mut products: Vec<Vec<(Product, f64)>> = Vec::with_capacity(parts.len() * (parts.len() + 1) / 2);
+        for (row, of_row) in parts.iter().enumerate() {
+            for of_column in &parts[..=row] {
+                let pairs = of_row.iter().flat_map(|&(i, a)| of_column.iter().map(move |&(j, b)| (i, j, a * b)));
+                products.push(pairs.map(|(i, j, weight)| (first.place(i, j), weight)).collect());
+            }
+        }
+        let reduce = |gram: &BlockGram| {
+            let gram = &gram.channels[channel];
+            let mut matrix = DMatrix::zeros(parts.len(), parts.len());
+            let mut products = products.iter();
+            for row in 0..parts.len() {
+                for column in 0..=row {
+                    let products = products.next().expect("one list an entry");
+                    let value = products.iter().fold(0.0, |sum, (product, weight)| sum + weight * gram.at(*product));
+                    matrix[(row, column)] = value;
+                    matrix[(column, row)] = value;
                 }
-                matrix
-            })
-            .collect();
-        Self { free: layout.free.iter().map(|entry| entry.0).collect(), blocks }
+            }
+            matrix
+        };
+        Self { free, blocks: grams.iter().map(reduce).collect() }
     }
 
     fn sum(&self, wanted: impl Fn(usize) -> f64) -> DMatrix<f64> {
@@ -169,26 +169,15 @@ impl Component<'_> {
             let (values, bound) = self.bounded(&matrix, &side)?;
             return Some(Solution { values, bound, by_flight: Vec::new() });
         }
-        let flights = self.flights();
-        let local: Vec<usize> = (0..size).filter(|&member| self.is_local(member)).collect();
-        let mut eliminated = Vec::with_capacity(flights.len());
-        for &flight in &flights {
-            let (own, own_side) = self.of_flight(flight, weight);
-            // Shrinks W_f: [A_ll + P] W = b_l − A_lg θ.
-            let (a_ll, a_lg, b_l) = self.split(&own, &own_side, &local);
-            let inverse = Cholesky::new(a_ll)?;
-            let (to_global, to_side) = (inverse.solve(&a_lg), inverse.solve(&b_l));
-            matrix += &own - a_lg.transpose() * &to_global;
-            side += &own_side - a_lg.transpose() * &to_side;
-            eliminated.push((flight, to_global, to_side));
+        let local = self.local();
+        let mut eliminated = Vec::new();
+        for flight in self.flights() {
+            let part = self.eliminated(flight, &local, weight)?;
+            matrix += &part.matrix;
+            side += &part.side;
+            eliminated.push((flight, part.to_global, part.to_side));
         }
-        // The rows of local coefficients in the global system are those of numbers fixed at zero.
-        for &member in &local {
-            matrix.row_mut(member).fill(0.0);
-            matrix.column_mut(member).fill(0.0);
-            matrix[(member, member)] = 1.0;
-            side[member] = 0.0;
-        }
+        pin(&local, &mut matrix, &mut side);
         let (values, bound) = self.bounded(&matrix, &side)?;
         let global = DVector::from_column_slice(&values);
         let by_flight = eliminated
@@ -196,6 +185,45 @@ impl Component<'_> {
             .map(|(flight, to_global, to_side)| (flight, (to_side - to_global * &global).iter().copied().collect()))
             .collect();
         Some(Solution { values, bound, by_flight })
+    }
+
+    /// The common coefficients on the blocks of all flights but one, for each flight; nothing where the others do not determine them.
+    pub fn without_each_flight(&self) -> Vec<(usize, Option<Vec<f64>>)> {
+        if self.flights().len() < 2 {
+            return Vec::new();
+        }
+        let local = self.local();
+        let part = |flight| Some((flight, self.eliminated(flight, &local, &|_| 1.0)?));
+        let Some(parts) = self.flights().into_iter().map(part).collect::<Option<Vec<_>>>() else { return Vec::new() };
+        let size = self.members.len();
+        let (mut matrix, mut side) = (DMatrix::zeros(size, size), DVector::zeros(size));
+        for (_, part) in &parts {
+            matrix += &part.matrix;
+            side += &part.side;
+        }
+        let without = |(flight, part): (usize, Eliminated)| {
+            let (mut matrix, mut side) = (&matrix - part.matrix, &side - part.side);
+            pin(&local, &mut matrix, &mut side);
+            (flight, self.bounded(&matrix, &side).map(|(values, _)| values))
+        };
+        parts.into_iter().map(without).collect()
+    }
+
+    /// Members that each flight has for itself.
+    fn local(&self) -> Vec<usize> {
+        (0..self.members.len()).filter(|&member| self.is_local(member)).collect()
+    }
+
+    /// Normal equations of one flight without its own coefficients, and what those are made of.
+    fn eliminated(&self, flight: usize, local: &[usize], weight: &dyn Fn(usize) -> f64) -> Option<Eliminated> {
+        let (own, own_side) = self.of_flight(flight, weight);
+        // Shrinks W_f: [A_ll + P] W = b_l − A_lg θ.
+        let (a_ll, a_lg, b_l) = self.split(&own, &own_side, local);
+        let inverse = Cholesky::new(a_ll)?;
+        let (to_global, to_side) = (inverse.solve(&a_lg), inverse.solve(&b_l));
+        let matrix = own - a_lg.transpose() * &to_global;
+        let side = own_side - a_lg.transpose() * &to_side;
+        Some(Eliminated { matrix, side, to_global, to_side })
     }
 
     fn flights(&self) -> Vec<usize> {
@@ -306,6 +334,24 @@ impl Component<'_> {
     }
 }
 
+/// What a flight adds to the normal equations of the common coefficients, and what its own are made of.
+struct Eliminated {
+    matrix: DMatrix<f64>,
+    side: DVector<f64>,
+    to_global: DMatrix<f64>,
+    to_side: DVector<f64>,
+}
+
+/// Makes the rows of local coefficients in the common system those of numbers fixed at zero.
+fn pin(local: &[usize], matrix: &mut DMatrix<f64>, side: &mut DVector<f64>) {
+    for &member in local {
+        matrix.row_mut(member).fill(0.0);
+        matrix.column_mut(member).fill(0.0);
+        matrix[(member, member)] = 1.0;
+        side[member] = 0.0;
+    }
+}
+
 /// Smallest diagonal element of the Cholesky factor of a correlation matrix.
 const SMALLEST_PIVOT: f64 = 1e-4;
 
@@ -408,6 +454,35 @@ mod tests {
             let open: Vec<f64> = (0..4).filter(|&member| !bound[member]).map(|member| gradient[member]).collect();
             prop_assert!(near(&open, &vec![0.0; open.len()]), "{open:?}");
         }
+    }
+
+    /// With and without numbers of each flight.
+    #[test]
+    fn what_is_found_without_a_flight_is_what_the_others_give() -> Result<()> {
+        let flights = noise(31, &[900, 1100, 800]);
+        let cut = blocks(&flights, &whole(&flights), 2.0);
+        let plain = model();
+        let bias = crate::physics::catalogue::definition("sensor_bias").expect("in the catalogue").effect(4.58, 0.8);
+        for model in [plain.clone(), super::super::candidate::with(&plain, &bias)] {
+            let mut design = Design::default();
+            let layout = design.model(&model)?;
+            let all = grams(&flights, &cut, &design)?;
+            let fold = vec![0; cut.len()];
+            let engine = Engine { flights: &flights, blocks: cut.clone(), fold, correlation: 100.0, held: Vec::new() };
+            let priors = super::super::engine::priors(&model, &layout, &[]);
+            for (channels, members) in components(&layout) {
+                let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &all)).collect();
+                let component = engine.component(&channels, &members, &reduced, &[1.0; 6], &priors);
+                let found = component.without_each_flight();
+                assert_eq!(found.iter().map(|entry| entry.0).collect::<Vec<_>>(), [0, 1, 2]);
+                for (flight, values) in found {
+                    let others = component.solve(&|block| f64::from(u8::from(cut[block].flight != flight)));
+                    let (values, others) = (values.expect("determined"), others.expect("determined").values);
+                    assert!(near(&values, &others), "{values:?} {others:?}");
+                }
+            }
+        }
+        Ok(())
     }
 
     #[test]

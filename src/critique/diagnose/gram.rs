@@ -57,6 +57,13 @@ pub(super) struct Square {
     own: Vec<Array2<f64>>,
 }
 
+/// Where a product of two columns lies in a [`Square`]: among the common columns, or those of one model.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Product {
+    group: Option<usize>,
+    at: (usize, usize),
+}
+
 /// Where the columns of a channel lie: first those of several models, then y, then model after model.
 #[derive(Clone, Debug, Default)]
 struct Places {
@@ -122,16 +129,23 @@ impl Square {
         self.places.of.len()
     }
 
-    /// The product of two columns, by their places in the design; y is the last.
-    pub fn at(&self, row: usize, column: usize) -> f64 {
+    /// Where the product of two columns lies, by their places in the design; y is the last. The same in all squares of a channel.
+    pub fn place(&self, row: usize, column: usize) -> Product {
         match (self.places.of[row], self.places.of[column]) {
-            ((row, None), (column, _)) | ((column, _), (row, None)) => self.common[(row.min(column), row.max(column))],
+            ((row, None), (column, _)) | ((column, _), (row, None)) => {
+                Product { group: None, at: (row.min(column), row.max(column)) }
+            }
             ((row, Some(left)), (column, Some(right))) => {
                 assert_eq!(left, right, "columns of two models meet in no fit");
                 let start = self.places.groups[left].start;
-                self.own[left][(row - start, column - start)]
+                Product { group: Some(left), at: (row - start, column - start) }
             }
         }
+    }
+
+    /// The product at a place.
+    pub fn at(&self, Product { group, at }: Product) -> f64 {
+        group.map_or(&self.common, |group| &self.own[group])[at]
     }
 }
 
@@ -189,7 +203,7 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
     })?;
     for (block, gram) in blocks.iter().zip(&found) {
         for (columns, matrix) in design.channels.iter().zip(&gram.channels) {
-            if let Some(column) = (0..matrix.size()).find(|&column| !matrix.at(column, column).is_finite()) {
+            if let Some(column) = (0..matrix.size()).find(|&column| !matrix.at(matrix.place(column, column)).is_finite()) {
                 let label = columns.get(column).map(|&column| &design.labels[column]);
                 return Err(Error::Undetermined(format!(
                     "{} is not a finite number somewhere between t = {:.2} s and {:.2} s of flight `{}`; guard the formula, for example \
@@ -267,7 +281,8 @@ pub(super) mod tests {
             prop_assert_eq!(parts.iter().map(|part| part.rows).sum::<usize>(), one[0].rows);
             for channel in 0..6 {
                 let size = one[0].channels[channel].size();
-                let entries = |gram: &BlockGram| Array2::from_shape_fn((size, size), |(i, j)| gram.channels[channel].at(i, j));
+                let entry = |square: &Square, (i, j)| square.at(square.place(i, j));
+                let entries = |gram: &BlockGram| Array2::from_shape_fn((size, size), |at| entry(&gram.channels[channel], at));
                 let mut total = Array2::<f64>::zeros((size, size));
                 parts.iter().for_each(|part| total += &entries(part));
                 let expected: Vec<f64> = entries(&one[0]).iter().copied().collect();
@@ -298,7 +313,7 @@ pub(super) mod tests {
                 layout.channels[2].free.iter().flat_map(|entry| entry.1.iter().map(|column| column.0)).collect();
             for &i in columns.iter().chain(&[left.size() - 1]) {
                 for &j in columns.iter().chain(&[left.size() - 1]) {
-                    assert!(near(&[left.at(i, j)], &[right.at(i, j)]));
+                    assert!(near(&[left.at(left.place(i, j))], &[right.at(right.place(i, j))]));
                 }
             }
         }

@@ -12,6 +12,7 @@ use super::design::{Design, Free, Layout};
 use super::engine::{Engine, FOLDS};
 use super::fit::Reduced;
 use super::gram::grams;
+use super::influence::{Influences, decisive};
 use super::known::{Known, known};
 use super::own::prediction_errors;
 use crate::error::{Error, Result};
@@ -442,6 +443,21 @@ impl Point {
         }
     }
 
+    /// Numbers that hang on one flight, where they have intervals ([`Point::note_intervals`]).
+    pub fn influences(&self, engine: &Engine<'_>) -> Option<Influences> {
+        let (start, open) = self.start(&[]);
+        let normals = self.without_each_flight(engine, &self.locals(&[]))?;
+        let without: Vec<(usize, Option<Vec<f64>>)> =
+            normals.iter().map(|(flight, normal)| (*flight, self.solve(normal, &open, &start, 0.0))).collect();
+        let of = |&number: &usize| {
+            let free = self.layout.free[number];
+            let interval = self.model.effects[free.effect].number(free.coefficient)?.ci95?;
+            let of_flight = without.iter().map(|(flight, values)| (*flight, values.as_ref().map(|values| values[number])));
+            Some(((free.effect, free.coefficient), decisive(interval, of_flight, engine.flights)?))
+        };
+        Some(open.iter().filter_map(of).collect())
+    }
+
     /// For each effect that may be left out, how little these blocks know of it: the standard error of its best known number in usual sizes.
     pub fn looseness(&self, engine: &Engine<'_>) -> Option<Vec<f64>> {
         let (_, open) = self.start(&[]);
@@ -488,6 +504,7 @@ mod tests {
     use super::super::candidate::with;
     use super::super::gram::blocks;
     use super::super::gram::tests::{model, near, noise, whole};
+    use super::super::resample::tests::pulled_by;
     use super::*;
     use crate::flight::Flight;
     use crate::physics::{Effect, calibrate, catalogue};
@@ -566,6 +583,23 @@ mod tests {
         let intervals = point.model.effects.iter().flat_map(|effect| &effect.coefficients).map(|coefficient| coefficient.ci95);
         let widths: Vec<f64> = intervals.map(|ci95| ci95.map_or(f64::NAN, |[low, high]| high - low)).collect();
         assert!(widths.iter().all(|width| *width > 0.0 && *width < 1.0), "{widths:?}");
+        Ok(())
+    }
+
+    #[test]
+    fn a_number_that_hangs_on_one_flight_names_it() -> Result<()> {
+        let mut flights = noise(8, &[3000; 12]);
+        let found = |flights: &[Flight]| {
+            let engine = engine(flights);
+            let mut point = Point::at(&engine, Point::fitted(&engine, model(), 10)?, Vec::new())?;
+            point.note_intervals(&point.folds(&engine, &[]).expect("determined"));
+            Ok::<_, Error>(point.influences(&engine).expect("determined"))
+        };
+        assert!(found(&flights)?.is_empty());
+        pulled_by(&mut flights[11])?;
+        let influences = found(&flights)?;
+        let named: Vec<&str> = influences.values().map(|influence| influence.flight.as_str()).collect();
+        assert_eq!(named, ["f11"], "{influences:?}");
         Ok(())
     }
 

@@ -20,6 +20,7 @@ mod failure;
 mod fit;
 mod gates;
 mod gram;
+mod influence;
 mod joint;
 mod known;
 mod ladder;
@@ -42,7 +43,7 @@ pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
 pub use own::{Met, met};
 pub use report::{
-    Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Kept, Locked, Method, Number,
+    Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Influence, Kept, Locked, Method, Number,
     ParameterValue, Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,
 };
 pub use signs::number_remark;

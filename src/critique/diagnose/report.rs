@@ -66,6 +66,9 @@ pub struct Number {
     /// For a property of each flight: root mean square over the flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_over_flights: Option<f64>,
+    /// The flight on which it hangs most, if it hangs on one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub influence: Option<Influence>,
 }
 
 /// A parameter of an accepted effect.
@@ -82,6 +85,18 @@ pub struct ParameterValue {
     /// Values whose held-out gain is within two standard errors of the best.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<[f64; 2]>,
+    /// The flight on which it hangs most, if it hangs on one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub influence: Option<Influence>,
+}
+
+/// A flight without which a number would lie outside its own 95 % interval.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Influence {
+    /// Name of the flight.
+    pub flight: String,
+    /// The number on the other flights; `None` where they do not determine it.
+    pub without: Option<f64>,
 }
 
 /// One effect that was found missing.

@@ -3,6 +3,7 @@
 
 use super::engine::{Engine, priors};
 use super::fit::{Reduced, components};
+use super::influence::{Influences, decisive};
 use crate::error::Result;
 use crate::physics::{Correlation, Model};
 use phyture_kernels::random::Stream;
@@ -31,6 +32,8 @@ pub(super) struct Resampled {
     pub intervals: BTreeMap<(usize, usize), [f64; 2]>,
     /// How the coefficients vary together.
     pub correlations: Vec<Correlation>,
+    /// Coefficients that hang on one flight.
+    pub influences: Influences,
 }
 
 /// Intervals and correlations of the coefficients of a model.
@@ -38,7 +41,7 @@ pub(super) fn resampled(engine: &Engine<'_>, model: &Model, seed: u64) -> Result
     let pass = engine.pass(model, &[])?;
     let layout = &pass.base.layout;
     let (weights, priors) = (engine.weights(&pass.base), priors(model, layout, &engine.held));
-    let mut found = Resampled { intervals: BTreeMap::new(), correlations: Vec::new() };
+    let mut found = Resampled { intervals: BTreeMap::new(), correlations: Vec::new(), influences: Influences::new() };
     for (channels, members) in components(layout) {
         let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(layout, channel, &pass.grams)).collect();
         let component = engine.component(&channels, &members, &reduced, &weights, &priors);
@@ -68,23 +71,36 @@ pub(super) fn resampled(engine: &Engine<'_>, model: &Model, seed: u64) -> Result
         let deviations = |values: &Vec<f64>| common.iter().zip(&means).map(|(&at, mean)| values[at] - mean).collect();
         let deviations: Vec<Vec<f64>> = worlds.iter().map(deviations).collect();
         found.correlations.extend(Correlation::of_deviations(common.iter().map(label).collect(), &deviations));
+        let without = component.without_each_flight();
         for position in common {
             let mut values: Vec<f64> = worlds.iter().map(|values| values[position]).collect();
             values.sort_by(f64::total_cmp);
             let free = layout.free[members[position]];
-            found.intervals.insert((free.effect, free.coefficient), [quantile(&values, 0.025), quantile(&values, 0.975)]);
+            let interval = [quantile(&values, 0.025), quantile(&values, 0.975)];
+            found.intervals.insert((free.effect, free.coefficient), interval);
+            let of_flight = without.iter().map(|(flight, values)| (*flight, values.as_ref().map(|values| values[position])));
+            let influence = decisive(interval, of_flight, engine.flights);
+            found.influences.extend(influence.map(|influence| ((free.effect, free.coefficient), influence)));
         }
     }
     Ok(found)
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::gram::tests::{model, noise, whole};
     use super::super::gram::{Block, blocks};
     use super::*;
     use crate::flight::Column;
     use proptest::prelude::*;
+
+    /// A flight in which the roll acceleration answers to the stick.
+    pub(in super::super) fn pulled_by(flight: &mut crate::flight::Flight) -> Result<()> {
+        let mut accelerations = Column::TARGETS.map(|column| flight.column(column).to_vec());
+        accelerations[3].iter_mut().zip(flight.column(Column::U1)).for_each(|(value, stick)| *value += 3.0 * stick);
+        *flight = flight.with_accelerations(&accelerations)?;
+        Ok(())
+    }
 
     proptest! {
         #[test]
@@ -129,6 +145,24 @@ mod tests {
         };
         let (by_block, by_row) = (width(10.0)?, width(0.1)?);
         assert!(by_block > 2.0 * by_row, "{by_block} from blocks, {by_row} from rows");
+        Ok(())
+    }
+
+    #[test]
+    fn a_number_that_hangs_on_one_flight_names_it() -> Result<()> {
+        let mut flights = noise(8, &[3000; 12]);
+        let found = |flights: &[crate::flight::Flight]| {
+            let cut: Vec<Block> = blocks(flights, &whole(flights), 2.0);
+            let fold = (0..cut.len()).map(|block| block % 10).collect();
+            let engine = Engine { flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
+            resampled(&engine, &model(), 1).map(|found| found.influences)
+        };
+        assert!(found(&flights)?.is_empty());
+        pulled_by(&mut flights[11])?;
+        let influences = found(&flights)?;
+        let named: Vec<&str> = influences.values().map(|influence| influence.flight.as_str()).collect();
+        assert_eq!(named, ["f11"], "{influences:?}");
+        assert!(influences.values().all(|influence| influence.without.is_some_and(|value| value.abs() < 0.1)), "{influences:?}");
         Ok(())
     }
 

@@ -245,13 +245,14 @@ impl Search<'_> {
     /// Intervals of the accepted effects' coefficients, all of them in the model.
     pub(super) fn intervals(&self, found: &mut [Found]) -> Result<()> {
         let Some(model) = found.last().map(|last| last.model.clone()) else { return Ok(()) };
-        let Resampled { intervals, correlations } = resampled(&self.engine, &model, self.options.seed)?;
+        let Resampled { intervals, correlations, influences } = resampled(&self.engine, &model, self.options.seed)?;
         for found in found.iter_mut() {
             let Some(index) = model.effects.iter().position(|effect| effect.name == found.step.effect) else { continue };
             for (position, number) in found.step.coefficients.iter_mut().enumerate() {
                 number.value =
                     model.effects[index].coefficients.get(position).map_or(number.value, |coefficient| coefficient.value);
                 number.ci95 = intervals.get(&(index, position)).copied();
+                number.influence = influences.get(&(index, position)).cloned();
             }
             // The formula with the numbers that are printed beside it.
             found.step.formula = model.effects[index].to_string();

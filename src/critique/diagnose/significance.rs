@@ -16,7 +16,6 @@ use super::engine::Trial;
 use super::fit::{Reduced, components};
 use super::gram::BlockGram;
 use nalgebra::{Cholesky, DMatrix, DVector};
-use ndarray::{Array2, Axis};
 use phyture_kernels::random::Stream;
 use std::ops::Range;
 
@@ -253,38 +252,60 @@ pub(super) fn block_weights(base: &Trial, rows: &[usize]) -> [Vec<f64>; 6] {
 
 /// Random signs, the same for every candidate of a step.
 pub(super) struct Flips {
-    /// Choices by blocks.
-    signs: Array2<f32>,
+    /// Of eight blocks after the other a byte a choice, blocks before choices; a bit is set where the sign is minus.
+    signs: Vec<u8>,
 }
+
+/// Blocks whose signs are one byte.
+const OCTET: usize = 8;
 
 impl Flips {
     pub fn new(blocks: usize, seed: u64) -> Self {
         let stream = Stream::new(seed, 0, SITE, 0);
-        let mut signs = Array2::zeros((FLIPS, blocks));
-        for (index, mut row) in signs.rows_mut().into_iter().enumerate() {
-            let words = stream.sub(index as u64);
-            for (block, sign) in row.iter_mut().enumerate() {
-                *sign = if words.word((block / 32) as u32) >> (block % 32) & 1 == 0 { 1.0 } else { -1.0 };
+        let octets = blocks.div_ceil(OCTET);
+        let mut signs = vec![0; octets * FLIPS];
+        for choice in 0..FLIPS {
+            let words = stream.sub(choice as u64);
+            for octet in 0..octets {
+                signs[octet * FLIPS + choice] = words.word((octet / 4) as u32).to_le_bytes()[octet % 4];
             }
         }
         Self { signs }
     }
 
+    /// `Σ ± value(block)` over some blocks under each choice. The sums that eight blocks can make are looked up by their signs.
+    fn sums(&self, blocks: Range<usize>, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let mut sums = vec![0.0; FLIPS];
+        for octet in blocks.start / OCTET..blocks.end.div_ceil(OCTET) {
+            let own: [f64; OCTET] = std::array::from_fn(|bit| {
+                let block = octet * OCTET + bit;
+                if blocks.contains(&block) { value(block) } else { 0.0 }
+            });
+            let mut table = [own.iter().sum::<f64>(); 1 << OCTET];
+            for signs in 1..table.len() {
+                table[signs] = table[signs & (signs - 1)] - 2.0 * own[signs.trailing_zeros() as usize];
+            }
+            let signs = &self.signs[octet * FLIPS..(octet + 1) * FLIPS];
+            sums.iter_mut().zip(signs).for_each(|(sum, &signs)| *sum += table[usize::from(signs)]);
+        }
+        sums
+    }
+
     /// p-value of the largest statistic over the variants of one effect.
     pub fn p_value(&self, variants: &[Scores]) -> f64 {
         let mut observed = f64::NEG_INFINITY;
-        let mut largest = vec![f32::NEG_INFINITY; FLIPS];
-        for scores in variants {
-            let (blocks, columns) = scores.blocks.shape();
-            let z = Array2::from_shape_fn((blocks, columns), |(row, column)| scores.blocks[(row, column)] as f32);
-            let statistic = |sums: &dyn Fn(usize) -> f64| {
-                if scores.one_sided { sums(0) } else { (0..columns).map(|column| sums(column).powi(2)).sum() }
-            };
-            observed = observed.max(statistic(&|column| scores.blocks.column(column).sum()));
-            let flipped = self.signs.dot(&z);
-            for (largest, sums) in largest.iter_mut().zip(flipped.rows()) {
-                *largest = largest.max(statistic(&|column| f64::from(sums[column])) as f32);
+        let mut largest = vec![f64::NEG_INFINITY; FLIPS];
+        for Scores { blocks, one_sided } in variants {
+            let mut flipped = vec![0.0; FLIPS];
+            let mut unflipped = 0.0;
+            for column in blocks.column_iter() {
+                let sums = self.sums(0..column.len(), |block| column[block]);
+                let statistic = |sum: f64| if *one_sided { sum } else { sum * sum };
+                flipped.iter_mut().zip(sums).for_each(|(total, sum)| *total += statistic(sum));
+                unflipped += statistic(column.sum());
             }
+            observed = observed.max(unflipped);
+            largest.iter_mut().zip(flipped).for_each(|(largest, value)| *largest = largest.max(value));
         }
         self.share(observed, &largest)
     }
@@ -295,38 +316,25 @@ impl Flips {
     /// The statistic is the locally most powerful one for a variance between groups, Σ_f Σ_k (s_k Σ_b u_bk)² (Lin 1997, Biometrika 84:309):
     /// in a flight all blocks' scores lean the way of its number, and signs of blocks, chosen at random, undo that.
     pub fn p_value_between_flights(&self, scores: &DMatrix<f64>, spreads: &[f64], runs: &[Range<usize>]) -> f64 {
-        let scale = DVector::from_fn(scores.ncols(), |number, _| spreads[number]);
-        // In units in which single precision holds the sum.
-        let unit = 1.0 / (scores * DMatrix::from_diagonal(&scale)).norm().max(f64::MIN_POSITIVE);
-        let (mut observed, mut flipped) = (0.0, vec![0.0_f32; FLIPS]);
+        let (mut observed, mut flipped) = (0.0, vec![0.0; FLIPS]);
         for run in runs {
-            let own = Array2::from_shape_fn((run.len(), scores.ncols()), |(block, number)| {
-                (scores[(run.start + block, number)] * scale[number] * unit) as f32
-            });
-            let sums = self.signs.slice_axis(Axis(1), run.clone().into()).dot(&own);
-            flipped.iter_mut().zip(sums.rows()).for_each(|(total, sums)| *total += sums.dot(&sums));
-            let sums = own.sum_axis(Axis(0));
-            observed += f64::from(sums.dot(&sums));
+            for (column, spread) in scores.column_iter().zip(spreads) {
+                let sums = self.sums(run.clone(), |block| spread * column[block]);
+                flipped.iter_mut().zip(sums).for_each(|(total, sum)| *total += sum * sum);
+                observed += run.clone().map(|block| spread * column[block]).sum::<f64>().powi(2);
+            }
         }
         self.share(observed, &flipped)
     }
 
-    /// p-value of a sum of independent gains, one for each row of the signs that is used.
-    pub fn p_value_of_sums(&self, variants: &[Vec<f64>]) -> f64 {
-        let mut observed = f64::NEG_INFINITY;
-        let mut largest = vec![f32::NEG_INFINITY; FLIPS];
-        for gains in variants {
-            observed = observed.max(gains.iter().sum());
-            for (largest, signs) in largest.iter_mut().zip(self.signs.rows()) {
-                *largest = largest.max(signs.iter().zip(gains).map(|(sign, gain)| sign * *gain as f32).sum());
-            }
-        }
-        self.share(observed, &largest)
+    /// p-value of a sum of independent gains, one for each block that is used.
+    pub fn p_value_of_sums(&self, gains: &[f64]) -> f64 {
+        self.share(gains.iter().sum(), &self.sums(0..gains.len(), |block| gains[block]))
     }
 
-    fn share(&self, observed: f64, flipped: &[f32]) -> f64 {
-        // The slack of single precision counts against the effect.
-        let bar = (observed - 1e-5 * observed.abs()) as f32;
+    fn share(&self, observed: f64, flipped: &[f64]) -> f64 {
+        // What differs by rounding alone counts against the effect.
+        let bar = observed - 1e-9 * observed.abs();
         let reached = flipped.iter().filter(|value| **value >= bar).count();
         (reached + 1) as f64 / (FLIPS + 1) as f64
     }
@@ -372,7 +380,7 @@ mod tests {
     #[test]
     fn p_values_of_sums_of_pure_noise_are_uniform_too() {
         let flips = Flips::new(60, 1);
-        let p = |seed: u64| flips.p_value_of_sums(&[noise(seed, 60, 1).scores.column(0).iter().copied().collect()]);
+        let p = |seed: u64| flips.p_value_of_sums(noise(seed, 60, 1).scores.column(0).as_slice());
         let below = (300..500).map(p).filter(|p| *p < 0.05).count();
         assert!((2..=21).contains(&below), "{below} of 200");
     }
@@ -446,6 +454,18 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn sums_are_those_of_the_signs_one_by_one(seed: u64, values in prop::collection::vec(-1.0..1.0_f64, 1..90), from in 0.0..1.0_f64) {
+            let start = (from * values.len() as f64) as usize;
+            let found = Flips::new(values.len(), seed).sums(start..values.len(), |block| values[block]);
+            for choice in [0, 1, 4999, FLIPS - 1] {
+                let words = Stream::new(seed, 0, SITE, 0).sub(choice as u64);
+                let is_minus = |block: usize| words.word((block / 32) as u32) >> (block % 32) & 1 == 1;
+                let expected: f64 = (start..values.len()).map(|block| if is_minus(block) { -values[block] } else { values[block] }).sum();
+                prop_assert!((found[choice] - expected).abs() < 1e-12, "{} {expected}", found[choice]);
+            }
+        }
+
         #[test]
         fn studentised_scores_do_not_depend_on_units(seed: u64, factors in prop::collection::vec(1e-3..1e3_f64, 3)) {
             let raw = noise(seed, 40, 3);

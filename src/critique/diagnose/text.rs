@@ -34,7 +34,8 @@ fn number_text(number: &Number, long: bool) -> String {
     };
     let spread = number.rms_over_flights.map(|rms| format!("rms over flights {rms:.4}"));
     let remark = Some(number_remark(number).trim_start_matches("; ").to_owned()).filter(|remark| !remark.is_empty());
-    let remarks: Vec<String> = [usual, spread, remark].into_iter().flatten().collect();
+    let influence = number.influence.as_ref().map(ToString::to_string);
+    let remarks: Vec<String> = [usual, spread, remark, influence].into_iter().flatten().collect();
     let value = format!("{} = {:.4}{ci}{}", number.name, number.value, unit_text(&number.unit));
     match remarks.join("; ") {
         remarks if remarks.is_empty() => value,
@@ -49,7 +50,8 @@ fn parameter_text(parameter: &ParameterValue) -> String {
     } else {
         parameter.profile.map_or("fitted".into(), |[low, high]| format!("fitted, {low:.4} to {high:.4}"))
     };
-    format!("{} = {:.4}{} ({how})", parameter.name, parameter.value, unit_text(&parameter.unit))
+    let influence = parameter.influence.as_ref().map_or_else(String::new, |influence| format!("; {influence}"));
+    format!("{} = {:.4}{} ({how}{influence})", parameter.name, parameter.value, unit_text(&parameter.unit))
 }
 
 /// As many effects are told at length without being asked; of more, each takes few lines.
@@ -349,6 +351,7 @@ mod tests {
             sign,
             held,
             rms_over_flights: None,
+            influence: None,
         };
         use crate::physics::SignFinding::{NotDetermined, Physical};
         assert!(number_text(&number(Some(NotDetermined), false), true).ends_with("rad/(m s); sign not determined"));
@@ -387,6 +390,7 @@ mod tests {
             sign: None,
             held: false,
             rms_over_flights: None,
+            influence: None,
         };
         let step = |place: usize| Step {
             effect: name(place),

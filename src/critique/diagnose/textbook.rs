@@ -100,7 +100,9 @@ impl<'a> Problem<'a> {
             let mut total = Array2::<f64>::zeros((target + 1, target + 1));
             let mut rows = 0;
             for (gram, _) in grams.iter().zip(fold).filter(|(_, fold)| wanted(**fold)) {
-                total.indexed_iter_mut().for_each(|((i, j), sum)| *sum += gram.channels[channel].at(i, j));
+                total
+                    .indexed_iter_mut()
+                    .for_each(|((i, j), sum)| *sum += gram.channels[channel].at(gram.channels[channel].place(i, j)));
                 rows += gram.rows;
             }
             let parts = |index: usize| -> Vec<(usize, f64)> {

@@ -194,8 +194,9 @@ impl Search<'_> {
     /// The search from the other end: everything at once, the needless left out, what the rest depends on. `first` is what the forward search
     /// had found when it was left.
     fn hear_all(&self, ground: &Ground<'_>, candidates: &[Candidate], first: &[Found]) -> Result<Heard> {
-        let Backward { model, needed, needless } = self.backward_road(ground.before, candidates)?;
-        let mut found: Vec<Found> = needed.iter().filter_map(|judged| self.needed(judged, &model)).collect();
+        let Backward { fitted, needed, needless } = self.backward_road(ground.before, candidates)?;
+        let mut found: Vec<Found> = needed.iter().filter_map(|judged| self.needed(judged, &fitted)).collect();
+        let model = fitted.model;
         self.judge_signs(&model, &mut found);
         let applicable = candidates.iter().filter(|candidate| candidate.inapplicable.is_none());
         let tried = applicable.count() + ground.before.effects.iter().filter(|effect| is_found(effect)).count();
@@ -211,9 +212,10 @@ impl Search<'_> {
             return Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true });
         }
         left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
-        let model = self.refitted(&model, &stand_ins)?;
+        let fitted = self.refitted(&model, &stand_ins)?;
         let needed = needed.iter().filter(|judged| !stand_ins.contains(&judged.effect));
-        let mut found: Vec<Found> = needed.filter_map(|judged| self.needed(judged, &model)).collect();
+        let mut found: Vec<Found> = needed.filter_map(|judged| self.needed(judged, &fitted)).collect();
+        let model = fitted.model;
         self.judge_signs(&model, &mut found);
         let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
         Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true })

@@ -6,7 +6,7 @@ use super::super::figures;
 use super::super::page::{Cell, DATA_NOTE, Part, Table, data_notes};
 use super::{DiagnoseReport, notes};
 use crate::critique::diagnose::sentences::{or_the_log, removable, rises, share, tried, unseen, worth};
-use crate::critique::diagnose::{CandidateReport, Diagnosis, Locked, Status, Step, number_remark};
+use crate::critique::diagnose::{CandidateReport, Diagnosis, Influence, Locked, Status, Step, number_remark};
 use crate::critique::table::{Kind, OWN_FROM_FIRST_HALF, significant};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Span};
@@ -30,6 +30,11 @@ fn falls(falls: &BTreeMap<String, f64>) -> String {
     }
 }
 
+/// On which flight a number hangs, to stand behind it.
+fn influence(influence: &Option<Influence>) -> String {
+    influence.as_ref().map_or_else(String::new, |influence| format!("; {influence}"))
+}
+
 /// Coefficients and parameters of an accepted effect: as found, and what is usual.
 fn numbers(step: &Step) -> [String; 2] {
     let with_unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
@@ -39,13 +44,14 @@ fn numbers(step: &Step) -> [String; 2] {
         let interval = number.ci95.map(|[low, high]| format!(" [{}, {}]", significant(low, 3), significant(high, 3)));
         let spread = number.rms_over_flights.map(|rms| format!(", rms over flights {}", significant(rms, 3)));
         found.push(format!(
-            "{} = {}{}{}{}{}",
+            "{} = {}{}{}{}{}{}",
             number.name,
             significant(number.value, 4),
             interval.unwrap_or_default(),
             with_unit(&number.unit),
             spread.unwrap_or_default(),
-            number_remark(number)
+            number_remark(number),
+            influence(&number.influence)
         ));
         if let Some([low, high]) = number.expected {
             let outside = number.value < low || number.value > high;
@@ -58,7 +64,8 @@ fn numbers(step: &Step) -> [String; 2] {
             (false, None) => "fitted".to_owned(),
             (false, Some([low, high])) => format!("fitted, {} to {}", significant(low, 3), significant(high, 3)),
         };
-        found.push(format!("{} = {}{} ({how})", parameter.name, significant(parameter.value, 4), with_unit(&parameter.unit)));
+        let (value, unit) = (significant(parameter.value, 4), with_unit(&parameter.unit));
+        found.push(format!("{} = {value}{unit} ({how}{})", parameter.name, influence(&parameter.influence)));
     }
     [found.join("; "), usual.join("; ")].map(|text| if text.is_empty() { "–".into() } else { text })
 }

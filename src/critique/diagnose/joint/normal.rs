@@ -62,6 +62,21 @@ impl Point {
         })
     }
 
+    /// The squares of the blocks of all flights but one, for each flight if there are several, with the numbers of each flight eliminated.
+    pub(super) fn without_each_flight(&self, engine: &Engine<'_>, locals: &[usize]) -> Option<Vec<(usize, Normal)>> {
+        if engine.runs().nth(1).is_none() {
+            return Some(Vec::new());
+        }
+        let whole = self.normal(engine, locals)?.matrix;
+        let without = |run: Range<usize>| {
+            let flight = engine.blocks[run.start].flight;
+            let mut own = DMatrix::zeros(self.size(), self.size());
+            run.for_each(|block| self.add(block, &mut own));
+            Some((flight, Normal { matrix: &whole - self.eliminated(own, locals)?.0, by_flight: BTreeMap::new() }))
+        };
+        engine.runs().map(without).collect()
+    }
+
     /// Adds the blocks of one flight to the sums of [`Point::normals`].
     fn add_flight(
         &self,
