@@ -34,9 +34,9 @@ pub(super) enum Memory {
     /// `y[k] = y[k-1] + (1 - a) (x[k-1] - y[k-1]) + ramp (x[k] - x[k-1])`, `a = exp(-T/tau)`, `ramp = 1 - (1 - a) tau/T`.
     Lag { approach: f64, ramp: f64, last: Option<(f64, f64)> },
     /// The same where the time constant varies: the coefficients of a step are those of its end.
-    VaryingLag { steps: LagSteps<[f64; 2]>, last: Option<(f64, f64)> },
+    VaryingLag { step_s: f64, last: Option<(f64, f64)> },
     /// Derivative of that by a number, from those of `x` and of the time constant. The last `x`, `y`, `dx` and `dy`.
-    LagTangent { steps: LagSteps<[[f64; 2]; 2]>, last: Option<[f64; 4]> },
+    LagTangent { step_s: f64, last: Option<[f64; 4]> },
     /// `dy/dtau` of the recursion of a lag; `slopes` are those of `1 - a` and `ramp`. The last `x`, `y` and `dy/dtau`.
     LagByTime { approach: f64, ramp: f64, slopes: [f64; 2], last: Option<(f64, f64, f64)> },
     /// `y(t) = x(t - s)`: `whole` samples back, and `part` of the way to the one before.
@@ -52,6 +52,7 @@ pub(super) enum Memory {
 }
 
 /// `1 - a` and `ramp` of a lag.
+#[inline]
 fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
     if tau_s <= 0.0 {
         return [1.0, 1.0];
@@ -61,35 +62,15 @@ fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
 }
 
 /// These, and their derivatives by the time constant.
+#[inline]
 fn lag_slopes(tau_s: f64, step_s: f64) -> [[f64; 2]; 2] {
-    let coefficients = lag_coefficients(tau_s, step_s);
+    let [approach, ramp] = lag_coefficients(tau_s, step_s);
     if tau_s <= 0.0 {
-        return [coefficients, [0.0, -1.0 / step_s]];
+        return [[approach, ramp], [0.0, -1.0 / step_s]];
     }
-    let slope = -(-step_s / tau_s).exp() * step_s / (tau_s * tau_s);
-    [coefficients, [slope, -(coefficients[0] + tau_s * slope) / step_s]]
-}
-
-/// What a lag needs from step to step; it is worked out when the time constant changes.
-#[derive(Clone, Debug)]
-pub(super) struct LagSteps<T> {
-    step_s: f64,
-    tau_s: f64,
-    of: fn(f64, f64) -> T,
-    needs: T,
-}
-
-impl<T: Copy> LagSteps<T> {
-    fn new(step_s: f64, of: fn(f64, f64) -> T) -> Self {
-        Self { step_s, tau_s: 0.0, of, needs: of(0.0, step_s) }
-    }
-
-    fn at(&mut self, tau_s: f64) -> T {
-        if tau_s != self.tau_s {
-            (self.tau_s, self.needs) = (tau_s, (self.of)(tau_s, self.step_s));
-        }
-        self.needs
-    }
+    // da/dtau is a T/tau², and a is 1 - approach.
+    let slope = -(1.0 - approach) * step_s / (tau_s * tau_s);
+    [[approach, ramp], [slope, -(approach + tau_s * slope) / step_s]]
 }
 
 /// The latest samples of a signal, the newest at the back; before the first one it was at rest.
@@ -120,7 +101,7 @@ impl Memory {
             (_, Some(number)) => number,
             (Recall::History(History::Rate), None) => 0.0,
             (Recall::History(History::Lag), None) => {
-                return Self::VaryingLag { steps: LagSteps::new(step_s, lag_coefficients), last: None };
+                return Self::VaryingLag { step_s, last: None };
             }
             (Recall::LagTangent, None) => 0.0,
             _ => unreachable!("a time that varies is that of a lag"),
@@ -131,7 +112,7 @@ impl Memory {
                 let [approach, ramp] = lag_coefficients(number, step_s);
                 Self::Lag { approach, ramp, last: None }
             }
-            Recall::LagTangent => Self::LagTangent { steps: LagSteps::new(step_s, lag_slopes), last: None },
+            Recall::LagTangent => Self::LagTangent { step_s, last: None },
             Recall::LagByTime => {
                 let [[approach, ramp], slopes] = lag_slopes(number, step_s);
                 Self::LagByTime { approach, ramp, slopes, last: None }
@@ -168,18 +149,27 @@ impl Memory {
                     *last = Some((x, *out));
                 }
             }
-            Self::VaryingLag { steps, last } => {
+            Self::VaryingLag { step_s, last } => {
+                // Worked out where the time constant changes.
+                let (mut known, mut coefficients) = (0.0, lag_coefficients(0.0, *step_s));
                 for ((out, x), &tau_s) in samples.zip(number) {
-                    let [approach, ramp] = steps.at(tau_s);
+                    if tau_s != known {
+                        (known, coefficients) = (tau_s, lag_coefficients(tau_s, *step_s));
+                    }
+                    let [approach, ramp] = coefficients;
                     let (x_before, y_before) = last.unwrap_or((x, x));
                     *out = y_before + approach * (x_before - y_before) + ramp * (x - x_before);
                     *last = Some((x, *out));
                 }
             }
-            Self::LagTangent { steps, last } => {
+            Self::LagTangent { step_s, last } => {
                 let [of_signal, of_time] = tangents;
+                let (mut known, mut slopes) = (0.0, lag_slopes(0.0, *step_s));
                 for (((out, x), &tau_s), (&dx, &dtau)) in samples.zip(number).zip(of_signal.iter().zip(of_time)) {
-                    let [[approach, ramp], [of_approach, of_ramp]] = steps.at(tau_s);
+                    if tau_s != known {
+                        (known, slopes) = (tau_s, lag_slopes(tau_s, *step_s));
+                    }
+                    let [[approach, ramp], [of_approach, of_ramp]] = slopes;
                     let [x_before, y_before, dx_before, dy_before] = last.unwrap_or([x, x, dx, dx]);
                     let by_signal = dy_before + approach * (dx_before - dy_before) + ramp * (dx - dx_before);
                     *out = by_signal + dtau * (of_approach * (x_before - y_before) + of_ramp * (x - x_before));
