@@ -131,51 +131,10 @@ impl Model {
         if let Some(vehicle::Fault { field, found, expected }) = vehicle::fault(mass_kg, inertia, rotor_radius_m) {
             return Err(model.fault(field, found, expected));
         }
-        let vehicle = match model.text("vehicle")? {
-            None => Vehicle::default(),
-            Some(name) => Vehicle::ALL.into_iter().find(|vehicle| vehicle.name() == name).ok_or_else(|| {
-                let names = Vehicle::ALL.map(Vehicle::name);
-                model.fault("vehicle", format!("`{name}`{}", did_you_mean(name, names)), format!("one of `{}`", names.join("`, `")))
-            })?,
-        };
-        let mut effects = match model.text("baseline")? {
-            None => Vec::new(),
-            Some(PAPER) => baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
-            Some(other) => {
-                return Err(model.fault("baseline", format!("`{other}`{}", did_you_mean(other, [PAPER])), "`paper`, or none"));
-            }
-        };
-        let mut listed: Vec<String> = Vec::new();
-        for section in file.sections("effect", "effect")? {
-            let effect = read_effect(&section, mass_kg, rotor_radius_m)?;
-            if listed.contains(&effect.name) {
-                return Err(section.fault(
-                    "kind",
-                    format!("a second effect `{}`", effect.name),
-                    "effects with names of their own; set `name`",
-                ));
-            }
-            listed.push(effect.name.clone());
-            match effects.iter_mut().find(|known| known.name == effect.name) {
-                Some(known) if known.kind != effect.kind => {
-                    let found = format!("`{}`, the name of an effect of the baseline", effect.name);
-                    return Err(section.fault("name", found, "another name"));
-                }
-                Some(known) => *known = effect,
-                None => effects.push(effect),
-            }
-        }
+        let vehicle = read_vehicle(&model)?;
+        let effects = read_effects(&file, &model, (mass_kg, rotor_radius_m))?;
         if format < FORMAT {
             check_meaning(&file, &effects, format)?;
-        }
-        let mut data = ModelData::default();
-        if let Some(section) = file.section("data", "data")? {
-            section.allow(&["control_delay_s", "locked", "split"])?;
-            data = ModelData {
-                control_delay_s: section.number("control_delay_s")?.unwrap_or_default(),
-                locked: section.texts("locked")?,
-                split: section.text("split")?.map(str::parse).transpose()?.unwrap_or_default(),
-            };
         }
         let provenance = match file.section("provenance", "provenance")? {
             Some(section) => entries(section.table),
@@ -191,7 +150,7 @@ impl Model {
             assumed,
             effects,
             correlations: file.sections("correlation", "correlation")?.iter().map(read_correlation).collect::<Result<_>>()?,
-            data,
+            data: read_data(&file)?,
             provenance,
         };
         result.check_in(&path.display().to_string())?;
@@ -270,97 +229,167 @@ impl Model {
     }
 }
 
-fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Result<Effect> {
-    let missing = |key: &str| section.fault(key, "nothing", format!("`{key} = …` in this [[effect]]"));
-    let kind = section.text("kind")?.ok_or_else(|| missing("kind"))?;
-    let common = ["kind", "name", "enabled", "ci95", "added_by", "parameters", "flights"];
-    let mut effect = if kind == FORMULA_KIND {
-        section.allow(&[&common[..], &["channel", "changes", "formula", "coefficient", "unit"]].concat())?;
-        let name = section.text("name")?.ok_or_else(|| missing("name"))?;
-        let formula = section.text("formula")?.ok_or_else(|| missing("formula"))?;
-        let value = section.number("coefficient")?.unwrap_or_default();
-        let made = match (section.text("channel")?, section.text("changes")?) {
-            (Some(channel), None) => Effect::formula(name, channel_named(section, channel)?, formula, value),
-            (None, Some(signal)) => {
-                if !changeable(signal) || (signal_named(signal).is_none() && !standard_names().contains(&signal)) {
-                    let names = || SIGNALS.iter().map(|signal| signal.name).filter(|name| changeable(name));
-                    let found = format!("`{signal}`{}", did_you_mean(signal, names()));
-                    return Err(section.fault("changes", found, format!("one of `{}`", names().collect::<Vec<_>>().join("`, `"))));
-                }
-                Effect::change(name, signal, formula, value)
-            }
-            (None, None) => return Err(missing("channel")),
-            (Some(_), Some(_)) => {
-                let expected = "one of both: `channel` for an acceleration, `changes` for a signal";
-                return Err(section.fault("changes", "beside `channel`", expected));
-            }
-        };
-        let mut effect = made.map_err(|error| located(section, name, error))?;
-        if let (Some(unit), Some(coefficient)) = (section.text("unit")?, effect.coefficient_mut(FORMULA_COEFFICIENT)) {
-            coefficient.unit = unit.into();
+fn read_vehicle(model: &Section<'_>) -> Result<Vehicle> {
+    let Some(name) = model.text("vehicle")? else { return Ok(Vehicle::default()) };
+    Vehicle::ALL.into_iter().find(|vehicle| vehicle.name() == name).ok_or_else(|| {
+        let names = Vehicle::ALL.map(Vehicle::name);
+        model.fault("vehicle", format!("`{name}`{}", did_you_mean(name, names)), format!("one of `{}`", names.join("`, `")))
+    })
+}
+
+fn read_data(file: &Section<'_>) -> Result<ModelData> {
+    let Some(section) = file.section("data", "data")? else { return Ok(ModelData::default()) };
+    section.allow(&["control_delay_s", "locked", "split"])?;
+    Ok(ModelData {
+        control_delay_s: section.number("control_delay_s")?.unwrap_or_default(),
+        locked: section.texts("locked")?,
+        split: section.text("split")?.map(str::parse).transpose()?.unwrap_or_default(),
+    })
+}
+
+/// The effects of the baseline, if one is named, with those that the file lists in their places or behind them.
+fn read_effects(file: &Section<'_>, model: &Section<'_>, (mass_kg, rotor_radius_m): (f64, f64)) -> Result<Vec<Effect>> {
+    let mut effects = match model.text("baseline")? {
+        None => Vec::new(),
+        Some(PAPER) => baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
+        Some(other) => {
+            return Err(model.fault("baseline", format!("`{other}`{}", did_you_mean(other, [PAPER])), "`paper`, or none"));
         }
-        if let Some(parameters) = section.section("parameters", "effect.parameters")? {
-            for name in parameters.keys() {
-                let value = parameters.number(name)?.unwrap_or_default();
-                effect.parameters.push(Parameter { name: name.into(), value, unit: String::new(), fixed: true, ci95: None });
-            }
-        }
-        effect
-    } else {
-        let mut effect =
-            catalogue::definition(kind).map(|definition| definition.effect(mass_kg, rotor_radius_m)).ok_or_else(|| {
-                let known: Vec<&str> = catalogue::kinds().chain([FORMULA_KIND]).collect();
-                let hint = did_you_mean(kind, known.iter().copied());
-                let all = || format!("one of `{}`", known.join("`, `"));
-                let expected = if hint.is_empty() { all() } else { "an effect of `phyture effect list`, or `formula`".into() };
-                section.fault("kind", format!("`{kind}`{hint}"), expected)
-            })?;
-        section.allow(&[&common[..], &["coefficients"]].concat())?;
-        if let Some(name) = section.text("name")? {
-            effect.name = name.into();
-        }
-        if let Some(values) = section.section("coefficients", "effect.coefficients")? {
-            values.allow(&names(&effect))?;
-            for coefficient in &mut effect.coefficients {
-                coefficient.value = values.number(&coefficient.name)?.unwrap_or_default();
-            }
-        }
-        if let Some(values) = section.section("parameters", "effect.parameters")? {
-            values.allow(&effect.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>())?;
-            for parameter in &mut effect.parameters {
-                parameter.value = values.number(&parameter.name)?.unwrap_or(parameter.value);
-            }
-        }
-        effect
     };
-    if let Some(intervals) = section.section("ci95", "effect.ci95")? {
-        intervals.allow(&numbers(&effect))?;
-        let of_coefficients = effect.coefficients.iter_mut().map(|c| (&c.name, &mut c.ci95));
-        for (name, ci95) in of_coefficients.chain(effect.parameters.iter_mut().map(|p| (&p.name, &mut p.ci95))) {
-            *ci95 = intervals.numbers(name)?;
-            if let Some([low, high]) = ci95.filter(|interval| interval[0] > interval[1]) {
-                return Err(intervals.fault(name, format!("[{low}, {high}]"), "the lower end first"));
+    let mut listed: Vec<String> = Vec::new();
+    for section in file.sections("effect", "effect")? {
+        let effect = read_effect(&section, mass_kg, rotor_radius_m)?;
+        if listed.contains(&effect.name) {
+            let found = format!("a second effect `{}`", effect.name);
+            return Err(section.fault("kind", found, "effects with names of their own; set `name`"));
+        }
+        listed.push(effect.name.clone());
+        match effects.iter_mut().find(|known| known.name == effect.name) {
+            Some(known) if known.kind != effect.kind => {
+                let found = format!("`{}`, the name of an effect of the baseline", effect.name);
+                return Err(section.fault("name", found, "another name"));
             }
+            Some(known) => *known = effect,
+            None => effects.push(effect),
         }
     }
-    if let Some(flights) = section.section("flights", "effect.flights")? {
-        for flight in flights.keys() {
-            let Some(values) = flights.section(flight, "effect.flights")? else { continue };
-            let differing =
-                effect.coefficients.iter_mut().filter_map(|c| c.by_flight.as_mut().map(|by_flight| (&c.name, by_flight)));
-            let differing: Vec<_> = differing.collect();
-            values.allow(&differing.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>())?;
-            for (name, by_flight) in differing {
-                if let Some(value) = values.number(name)? {
-                    by_flight.insert(flight.to_owned(), value);
-                }
-            }
-        }
-    }
+    Ok(effects)
+}
+
+/// Keys of every effect.
+const COMMON_KEYS: [&str; 7] = ["kind", "name", "enabled", "ci95", "added_by", "parameters", "flights"];
+
+/// That a key of an effect is not there.
+fn missing(section: &Section<'_>, key: &str) -> Error {
+    section.fault(key, "nothing", format!("`{key} = …` in this [[effect]]"))
+}
+
+fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Result<Effect> {
+    let kind = section.text("kind")?.ok_or_else(|| missing(section, "kind"))?;
+    let mut effect = match kind {
+        FORMULA_KIND => read_formula(section)?,
+        _ => read_known(section, kind, mass_kg, rotor_radius_m)?,
+    };
+    read_intervals(section, &mut effect)?;
+    read_flights(section, &mut effect)?;
     effect.enabled = section.flag("enabled")?.unwrap_or(true);
     effect.added_by = section.text("added_by")?.map(str::to_owned);
     effect.check(&section.path.display().to_string()).map_err(|error| located(section, &effect.name, error))?;
     Ok(effect)
+}
+
+/// An effect that is a formula of the user's.
+fn read_formula(section: &Section<'_>) -> Result<Effect> {
+    section.allow(&[&COMMON_KEYS[..], &["channel", "changes", "formula", "coefficient", "unit"]].concat())?;
+    let name = section.text("name")?.ok_or_else(|| missing(section, "name"))?;
+    let formula = section.text("formula")?.ok_or_else(|| missing(section, "formula"))?;
+    let value = section.number("coefficient")?.unwrap_or_default();
+    let made = match (section.text("channel")?, section.text("changes")?) {
+        (Some(channel), None) => Effect::formula(name, channel_named(section, channel)?, formula, value),
+        (None, Some(signal)) => {
+            if !changeable(signal) || (signal_named(signal).is_none() && !standard_names().contains(&signal)) {
+                let names = || SIGNALS.iter().map(|signal| signal.name).filter(|name| changeable(name));
+                let found = format!("`{signal}`{}", did_you_mean(signal, names()));
+                return Err(section.fault("changes", found, format!("one of `{}`", names().collect::<Vec<_>>().join("`, `"))));
+            }
+            Effect::change(name, signal, formula, value)
+        }
+        (None, None) => return Err(missing(section, "channel")),
+        (Some(_), Some(_)) => {
+            let expected = "one of both: `channel` for an acceleration, `changes` for a signal";
+            return Err(section.fault("changes", "beside `channel`", expected));
+        }
+    };
+    let mut effect = made.map_err(|error| located(section, name, error))?;
+    if let (Some(unit), Some(coefficient)) = (section.text("unit")?, effect.coefficient_mut(FORMULA_COEFFICIENT)) {
+        coefficient.unit = unit.into();
+    }
+    if let Some(parameters) = section.section("parameters", "effect.parameters")? {
+        for name in parameters.keys() {
+            let value = parameters.number(name)?.unwrap_or_default();
+            effect.parameters.push(Parameter { name: name.into(), value, unit: String::new(), fixed: true, ci95: None });
+        }
+    }
+    Ok(effect)
+}
+
+/// An effect of the catalogue.
+fn read_known(section: &Section<'_>, kind: &str, mass_kg: f64, rotor_radius_m: f64) -> Result<Effect> {
+    let definition = catalogue::definition(kind).ok_or_else(|| {
+        let known: Vec<&str> = catalogue::kinds().chain([FORMULA_KIND]).collect();
+        let hint = did_you_mean(kind, known.iter().copied());
+        let all = || format!("one of `{}`", known.join("`, `"));
+        let expected = if hint.is_empty() { all() } else { "an effect of `phyture effect list`, or `formula`".into() };
+        section.fault("kind", format!("`{kind}`{hint}"), expected)
+    })?;
+    let mut effect = definition.effect(mass_kg, rotor_radius_m);
+    section.allow(&[&COMMON_KEYS[..], &["coefficients"]].concat())?;
+    if let Some(name) = section.text("name")? {
+        effect.name = name.into();
+    }
+    if let Some(values) = section.section("coefficients", "effect.coefficients")? {
+        values.allow(&names(&effect))?;
+        for coefficient in &mut effect.coefficients {
+            coefficient.value = values.number(&coefficient.name)?.unwrap_or_default();
+        }
+    }
+    if let Some(values) = section.section("parameters", "effect.parameters")? {
+        values.allow(&effect.parameters.iter().map(|parameter| parameter.name.as_str()).collect::<Vec<_>>())?;
+        for parameter in &mut effect.parameters {
+            parameter.value = values.number(&parameter.name)?.unwrap_or(parameter.value);
+        }
+    }
+    Ok(effect)
+}
+
+fn read_intervals(section: &Section<'_>, effect: &mut Effect) -> Result<()> {
+    let Some(intervals) = section.section("ci95", "effect.ci95")? else { return Ok(()) };
+    intervals.allow(&numbers(effect))?;
+    let of_coefficients = effect.coefficients.iter_mut().map(|c| (&c.name, &mut c.ci95));
+    for (name, ci95) in of_coefficients.chain(effect.parameters.iter_mut().map(|p| (&p.name, &mut p.ci95))) {
+        *ci95 = intervals.numbers(name)?;
+        if let Some([low, high]) = ci95.filter(|interval| interval[0] > interval[1]) {
+            return Err(intervals.fault(name, format!("[{low}, {high}]"), "the lower end first"));
+        }
+    }
+    Ok(())
+}
+
+/// Numbers that belong to a flight.
+fn read_flights(section: &Section<'_>, effect: &mut Effect) -> Result<()> {
+    let Some(flights) = section.section("flights", "effect.flights")? else { return Ok(()) };
+    for flight in flights.keys() {
+        let Some(values) = flights.section(flight, "effect.flights")? else { continue };
+        let own = effect.coefficients.iter_mut().filter_map(|c| c.by_flight.as_mut().map(|by_flight| (&c.name, by_flight)));
+        let own: Vec<_> = own.collect();
+        values.allow(&own.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>())?;
+        for (name, by_flight) in own {
+            if let Some(value) = values.number(name)? {
+                by_flight.insert(flight.to_owned(), value);
+            }
+        }
+    }
+    Ok(())
 }
 
 fn read_correlation(section: &Section<'_>) -> Result<Correlation> {

@@ -6,18 +6,22 @@
 //! 3. The first writer of each gradient sets, later ones add: no pass fills zeros.
 //! 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
 //!
-//! A plan holds no numbers; `session` replays it.
+//! Point 4 is in `plan/layout`, the steps are made in `plan/steps`. A plan holds no numbers; `session` replays it.
 
 use super::graph::{Graph, Source, Var};
-use super::op::{BUNDLE, Memory, Op, WEIGHT};
+use super::op::{BUNDLE, Op};
 use super::shape::Shape;
 use crate::error::{Error, Result};
 use large_weights::{Bundles, complement};
+use layout::Layout;
 use phyture_kernels::{Real, Write};
 use std::ops::Range;
 use std::sync::Arc;
+use steps::{Direction, Steps};
 
 mod large_weights;
+mod layout;
+mod steps;
 
 pub(crate) use large_weights::LargeWeight;
 
@@ -53,6 +57,12 @@ pub(crate) struct Piece {
     pub role: Role,
 }
 
+impl Piece {
+    fn new(range: Range<usize>, role: Role) -> Self {
+        Self { start: range.start, len: range.len(), role }
+    }
+}
+
 /// One call of one operation.
 pub(crate) struct Step<T> {
     pub op: Arc<dyn Op<T>>,
@@ -80,15 +90,6 @@ pub(crate) struct Kept {
     pub from: [Range<usize>; 2],
     /// Their places among what is kept of a sample.
     pub to: [Range<usize>; 2],
-}
-
-/// A stretch of the slab and the times in which it is in use, both ends included.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Buffer {
-    pub offset: usize,
-    pub len: usize,
-    pub first: usize,
-    pub last: usize,
 }
 
 /// What a session replays for each sample.
@@ -120,59 +121,7 @@ pub(crate) struct Plan<T> {
     /// Of the forward and of the backward list: runs of steps without a coupling but, perhaps, at their start.
     pub stretches: [Vec<Range<usize>>; 2],
     #[cfg(test)]
-    pub buffers: Vec<Buffer>,
-}
-
-/// Buffers while their lifetimes are being found; a value is referred to by its index.
-struct Lifetimes {
-    buffers: Vec<Buffer>,
-}
-
-impl Lifetimes {
-    fn open(&mut self, len: usize, at: usize) -> usize {
-        self.buffers.push(Buffer { offset: 0, len, first: at, last: at });
-        self.buffers.len() - 1
-    }
-
-    fn used(&mut self, buffer: usize, at: usize) {
-        let buffer = &mut self.buffers[buffer];
-        buffer.first = buffer.first.min(at);
-        buffer.last = buffer.last.max(at);
-    }
-
-    /// Greedy by size, first fit; returns the length of the slab.
-    fn place(&mut self, alignment: usize) -> usize {
-        let mut order: Vec<usize> = (0..self.buffers.len()).filter(|&index| self.buffers[index].len > 0).collect();
-        order.sort_by_key(|&index| (std::cmp::Reverse(self.buffers[index].len), self.buffers[index].first, index));
-        let mut placed: Vec<Buffer> = Vec::with_capacity(order.len());
-        let mut slab_len = 0;
-        for index in order {
-            let buffer = self.buffers[index];
-            let mut offset = 0;
-            // `placed` is sorted by offset, so one pass finds the first gap.
-            for other in placed.iter().filter(|other| other.first <= buffer.last && buffer.first <= other.last) {
-                if other.offset >= offset + buffer.len {
-                    break;
-                }
-                offset = offset.max((other.offset + other.len).next_multiple_of(alignment));
-            }
-            self.buffers[index].offset = offset;
-            let at = placed.partition_point(|other| other.offset <= offset);
-            placed.insert(at, self.buffers[index]);
-            slab_len = slab_len.max(offset + buffer.len);
-        }
-        slab_len
-    }
-
-    fn piece(&self, buffer: usize, role: Role) -> Piece {
-        let Buffer { offset, len, .. } = self.buffers[buffer];
-        Piece { start: offset, len, role }
-    }
-
-    fn range(&self, buffer: usize) -> Range<usize> {
-        let Buffer { offset, len, .. } = self.buffers[buffer];
-        offset..offset + len
-    }
+    pub buffers: Vec<layout::Buffer>,
 }
 
 impl<T: Real> Plan<T> {
@@ -202,6 +151,49 @@ impl<T: Real> Plan<T> {
     }
 
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
+        let orders = Orders::of(graph, loss, outputs)?;
+        let layout = Layout::of(graph, &orders, loss, outputs)?;
+        let bundles = Bundles::of(graph, &orders.forward, &orders.backward);
+        let mut large_weights = bundles.large_weights(graph);
+        let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
+        let mut steps = Steps::new(graph, &layout, &bundles, &summed);
+        let (forward, forward_packed) = steps.list(&orders.forward, Direction::Forward);
+        let (mut backward, backward_packed) = steps.list(&orders.backward, Direction::Backward);
+        let kept = steps.keep(&orders.backward, &mut backward, &mut large_weights);
+        let is_bundled = forward.iter().any(|step| step.bundled);
+        Ok(Self {
+            stretches: [&forward, &backward].map(|steps| stretches(steps)),
+            forward,
+            backward,
+            inputs: layout.inputs(graph),
+            outputs: outputs.iter().map(|var| layout.value(var.0)).collect(),
+            input_gradients: layout.input_gradients(graph),
+            loss: loss.map(|loss| (layout.value(loss.0).start, layout.gradient(loss.0).start)),
+            slab_len: layout.slab_len,
+            bundle: if is_bundled { BUNDLE } else { 1 },
+            packed_len: [forward_packed, backward_packed],
+            parameter_len: graph.parameter_count(),
+            unreached: steps.unreached(),
+            large_weights: large_weights.into_iter().map(|(_, weight)| weight).collect(),
+            kept_len: kept.len,
+            large_weight_scratch: kept.scratch,
+            #[cfg(test)]
+            buffers: layout.buffers,
+            summed,
+        })
+    }
+}
+
+/// Which operations run, in the order of the graph and back.
+struct Orders {
+    forward: Vec<usize>,
+    backward: Vec<usize>,
+    /// By node, whether its gradient is wanted.
+    backpropagated: Vec<bool>,
+}
+
+impl Orders {
+    fn of<T: Real>(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
         let nodes = &graph.nodes;
         for var in loss.iter().chain(outputs) {
             if !graph.node(*var).is_some_and(|node| matches!(node.source, Source::Op { .. })) {
@@ -210,184 +202,19 @@ impl<T: Real> Plan<T> {
             }
         }
         let needed = ancestors(graph, loss.iter().chain(outputs).map(|var| var.0));
-        let backward = loss.map_or(Ok(vec![false; nodes.len()]), |loss| paths(graph, loss))?;
+        let backpropagated = loss.map_or(Ok(vec![false; nodes.len()]), |loss| paths(graph, loss))?;
         let is_op = |node: usize| matches!(nodes[node].source, Source::Op { .. });
-        let forward_order: Vec<usize> = (0..nodes.len()).filter(|&node| needed[node] && is_op(node)).collect();
-        let backward_order: Vec<usize> = forward_order.iter().rev().copied().filter(|&node| backward[node]).collect();
-        let end = forward_order.len() + backward_order.len() + 1;
+        let forward: Vec<usize> = (0..nodes.len()).filter(|&node| needed[node] && is_op(node)).collect();
+        let backward = forward.iter().rev().copied().filter(|&node| backpropagated[node]).collect();
+        Ok(Self { forward, backward, backpropagated })
+    }
+}
 
-        // Lifetimes. Time 0 fills the inputs; each step takes one unit; `end` reads the results.
-        let mut lifetimes = Lifetimes { buffers: Vec::new() };
-        let mut values = vec![None; nodes.len()];
-        let mut gradients: Vec<Option<usize>> = vec![None; nodes.len()];
-        let mut workspaces = vec![None; nodes.len()];
-        let mut scratches = vec![[None; 2]; nodes.len()];
-        for &(_, var) in graph.inputs() {
-            values[var.0] = Some(lifetimes.open(nodes[var.0].shape.len(), 0));
-        }
-        for (at, &node) in forward_order.iter().enumerate() {
-            let at = at + 1;
-            let Source::Op { op, operands } = &nodes[node].source else { continue };
-            let memory: Memory = op.memory(&shapes_of(graph, operands));
-            values[node] = Some(lifetimes.open(nodes[node].shape.len(), at));
-            workspaces[node] = Some(lifetimes.open(memory.workspace, at));
-            scratches[node] = [Some(lifetimes.open(memory.forward_scratch, at)), None];
-            for buffer in operands.iter().filter_map(|var| values[var.0]) {
-                lifetimes.used(buffer, at);
-            }
-        }
-        let start_of_backward = forward_order.len() + 1;
-        if let Some(loss) = loss {
-            gradients[loss.0] = Some(lifetimes.open(1, start_of_backward));
-        }
-        for (at, &node) in backward_order.iter().enumerate() {
-            let at = start_of_backward + at;
-            let Source::Op { op, operands } = &nodes[node].source else { continue };
-            let Some(differentiable) = op.differentiable() else { continue };
-            let reads = differentiable.reads();
-            let memory: Memory = op.memory(&shapes_of(graph, operands));
-            scratches[node][1] = Some(lifetimes.open(memory.backward_scratch, at));
-            let read = operands.iter().zip(reads.operands).filter(|(_, read)| *read).filter_map(|(var, _)| values[var.0]);
-            let own = [workspaces[node], gradients[node], values[node].filter(|_| reads.result)];
-            for buffer in read.chain(own.into_iter().flatten()) {
-                lifetimes.used(buffer, at);
-            }
-            for (index, var) in operands.iter().enumerate() {
-                if backward[var.0] && differentiable.reaches(index) && !matches!(nodes[var.0].source, Source::Parameter(_)) {
-                    let buffer = *gradients[var.0].get_or_insert_with(|| lifetimes.open(nodes[var.0].shape.len(), at));
-                    lifetimes.used(buffer, at);
-                }
-            }
-        }
-        for buffer in outputs.iter().chain(&loss).filter_map(|var| values[var.0]) {
-            lifetimes.used(buffer, end);
-        }
-        let with_gradient = |var: &Var| matches!(nodes[var.0].source, Source::Input { gradient: true });
-        for buffer in graph.inputs().iter().filter(|(_, var)| with_gradient(var)).filter_map(|(_, var)| gradients[var.0]) {
-            lifetimes.used(buffer, end);
-        }
-        let slab_len = lifetimes.place(alignment::<T>());
-        if slab_len > LARGEST_SLAB {
-            let message = format!(
-                "one sample takes {slab_len} numbers of memory; at most {LARGEST_SLAB} are allowed: make history or width smaller"
-            );
-            return Err(Error::Shape { operation: "plan", message });
-        }
-
-        // Steps, now that every place is known.
-        let parameter_range = |node: usize| match nodes[node].source {
-            Source::Parameter(index) => graph.parameters().get(index).map(|parameter| parameter.range()),
-            _ => None,
-        };
-        let bundles = Bundles::of(graph, &forward_order, &backward_order);
-        let mut large_weights = bundles.large_weights(graph);
-        let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
-        let in_shard = |range: Range<usize>| {
-            let (stretch, place) = summed.iter().find(|(stretch, _)| stretch.contains(&range.start))?;
-            Some(place + range.start - stretch.start)
-        };
-        let step = |node: usize, backward: bool, written: &mut [bool], packed_len: &mut usize| -> Option<Step<T>> {
-            let Source::Op { op, operands } = &nodes[node].source else { return None };
-            let reads = if backward { Some(op.differentiable()?.reads()) } else { None };
-            let mut pieces = Vec::new();
-            let mut parameters = Vec::new();
-            let mut parameter_gradients = Vec::new();
-            for (index, &var) in operands.iter().enumerate() {
-                if reads.is_none_or(|reads| reads.operands[index]) {
-                    match parameter_range(var.0) {
-                        Some(range) => parameters.push((index, range)),
-                        None => pieces.push(lifetimes.piece(values[var.0]?, Role::X(index))),
-                    }
-                }
-                let parameter = parameter_range(var.0);
-                let wanted = backward && op.differentiable()?.reaches(index) && (parameter.is_some() || gradients[var.0].is_some());
-                if wanted {
-                    let write = if std::mem::replace(&mut written[var.0], true) { Write::Add } else { Write::Set };
-                    let role = Role::Dx(index, write);
-                    match parameter {
-                        Some(_) if bundles.weights.contains(&var.0) => {}
-                        Some(range) => {
-                            let len = range.len();
-                            parameter_gradients.push(Piece { start: in_shard(range)?, len, role });
-                        }
-                        None => pieces.push(lifetimes.piece(gradients[var.0]?, role)),
-                    }
-                }
-            }
-            pieces.push(lifetimes.piece(workspaces[node]?, Role::Workspace));
-            pieces.push(lifetimes.piece(scratches[node][usize::from(backward)]?, Role::Scratch));
-            if reads.is_none_or(|reads| reads.result) {
-                pieces.push(lifetimes.piece(values[node]?, Role::Y));
-            }
-            if backward {
-                pieces.push(lifetimes.piece(gradients[node]?, Role::Dy));
-            }
-            pieces.retain(|piece| piece.len > 0);
-            pieces.sort_by_key(|piece| piece.start);
-            parameter_gradients.sort_by_key(|piece| piece.start);
-            let (op, shapes) = (Arc::clone(op), shapes_of(graph, operands));
-            let memory: Memory = op.memory(&shapes);
-            let len = if backward { memory.backward_packed } else { memory.forward_packed };
-            let weight = operands.get(WEIGHT).and_then(|&var| parameter_range(var.0)).filter(|_| len > 0);
-            let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
-            *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
-            let bundled = bundles.nodes.contains(&node);
-            Some(Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, bundled, kept: None })
-        };
-        let mut written = vec![false; nodes.len()];
-        let mut packed_len = [0; 2];
-        let mut steps = |order: &[usize], backward: bool| -> Vec<Step<T>> {
-            let packed_len = &mut packed_len[usize::from(backward)];
-            order.iter().filter_map(|&node| step(node, backward, &mut written, packed_len)).collect()
-        };
-        let forward_steps = steps(&forward_order, false);
-        let mut backward_steps = steps(&backward_order, true);
-        let bundle = if forward_steps.iter().any(|step| step.bundled) { BUNDLE } else { 1 };
-        let (mut kept_len, mut large_weight_scratch) = (0, 0);
-        for (index, (&node, step)) in backward_order.iter().zip(&mut backward_steps).enumerate() {
-            let Source::Op { operands, .. } = &nodes[node].source else { continue };
-            let weight = operands.get(WEIGHT).filter(|_| step.bundled);
-            let weight = weight.and_then(|var| large_weights.iter_mut().find(|(node, _)| *node == var.0));
-            let (Some((_, weight)), Some(x), Some(dy)) = (weight, values[operands[0].0], gradients[node]) else { continue };
-            weight.steps.push(index);
-            let from = [x, dy].map(|buffer| lifetimes.range(buffer));
-            let middle = kept_len + from[0].len();
-            let end = middle + from[1].len();
-            step.kept = Some(Kept { from, to: [kept_len..middle, middle..end] });
-            kept_len = end;
-            let scratch = step.op.bundled(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
-            large_weight_scratch = large_weight_scratch.max(scratch);
-        }
-        // Every step borrows only buffers opened above.
-        debug_assert_eq!((forward_steps.len(), backward_steps.len()), (forward_order.len(), backward_order.len()));
-
-        let mut inputs: Vec<Piece> = (graph.inputs().iter().enumerate())
-            .filter_map(|(index, (_, var))| Some(lifetimes.piece(values[var.0]?, Role::X(index))))
-            .collect();
-        inputs.sort_by_key(|piece| piece.start);
-        let unreached = (0..nodes.len()).filter(|&node| !written[node]).filter_map(parameter_range).collect();
-        Ok(Self {
-            stretches: [&forward_steps, &backward_steps].map(|steps| stretches(steps)),
-            forward: forward_steps,
-            backward: backward_steps,
-            inputs,
-            outputs: outputs.iter().filter_map(|var| values[var.0]).map(|buffer| lifetimes.range(buffer)).collect(),
-            input_gradients: (graph.inputs().iter())
-                .map(|(_, var)| gradients[var.0].filter(|_| with_gradient(var)).map(|buffer| lifetimes.range(buffer)))
-                .collect(),
-            loss: loss.and_then(|loss| Some((lifetimes.range(values[loss.0]?).start, lifetimes.range(gradients[loss.0]?).start))),
-            slab_len,
-            bundle,
-            packed_len,
-            parameter_len: graph.parameter_count(),
-            summed,
-            large_weights: large_weights.into_iter().map(|(_, weight)| weight).collect(),
-            kept_len,
-            large_weight_scratch,
-            unreached,
-            #[cfg(test)]
-            buffers: lifetimes.buffers,
-        })
+/// An operation of the graph and its operands, by a node of one of the lists.
+fn operation<T: Real>(graph: &Graph<T>, node: usize) -> (&Arc<dyn Op<T>>, &[Var]) {
+    match &graph.nodes[node].source {
+        Source::Op { op, operands } => (op, operands),
+        Source::Input { .. } | Source::Parameter(_) => unreachable!("the lists hold operations alone"),
     }
 }
 
@@ -503,7 +330,7 @@ pub(crate) mod tests {
     }
 
     fn sound(plan: &Plan<f64>) -> Result<(), TestCaseError> {
-        let used: Vec<&Buffer> = plan.buffers.iter().filter(|buffer| buffer.len > 0).collect();
+        let used: Vec<&layout::Buffer> = plan.buffers.iter().filter(|buffer| buffer.len > 0).collect();
         for (index, a) in used.iter().enumerate() {
             prop_assert_eq!(a.offset % alignment::<f64>(), 0);
             prop_assert!(a.offset + a.len <= plan.slab_len);

@@ -8,6 +8,7 @@ use super::joint::Errors;
 use super::known::size_of;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};
+use crate::formula::Node;
 use crate::physics::{Columns, Model, Regressor, Wanted};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -125,42 +126,47 @@ fn is_known(model: &Model, effect: usize, index: usize, flight: &str) -> bool {
 /// What one flight says of its own numbers, by channel: `JᵀJ`, `Jᵀr` and `rᵀr`.
 type Sums = Vec<(DMatrix<f64>, DVector<f64>, f64)>;
 
-/// One step for all flights; by how much a number moved at most, in usual sizes.
-fn step(
-    flights: &[Flight],
-    spans: &[Span],
-    model: &mut Model,
-    (numbers, sizes): (&[(usize, usize)], &[f64]),
-    correlation: f64,
-) -> Result<f64> {
-    let mut columns = Columns::default();
-    let mut regressors: Vec<Regressor> = Vec::new();
-    for (place, &(effect, _)) in numbers.iter().enumerate() {
-        if place == 0 || numbers[place - 1].0 != effect {
-            let own = columns.regressors(model, Wanted { effect: Some(effect), ..Wanted::default() })?;
-            regressors.extend(own.into_iter().filter(|one| one.number.is_some_and(|number| numbers.contains(&(effect, number)))));
+/// A model's predictions and their derivatives by the numbers that each flight has for itself.
+struct OwnColumns {
+    columns: Columns,
+    /// Predictions of the six channels, then the derivatives.
+    nodes: Vec<Node>,
+    /// By channel: which number, and where its derivative stands in `nodes`.
+    by_channel: Vec<Vec<(usize, usize)>>,
+    numbers: usize,
+}
+
+impl OwnColumns {
+    fn of(model: &Model, numbers: &[(usize, usize)]) -> Result<Self> {
+        let mut columns = Columns::default();
+        let mut regressors: Vec<Regressor> = Vec::new();
+        for (place, &(effect, _)) in numbers.iter().enumerate() {
+            if place == 0 || numbers[place - 1].0 != effect {
+                let own = columns.regressors(model, Wanted { effect: Some(effect), ..Wanted::default() })?;
+                let is_own = |one: &Regressor| one.number.is_some_and(|number| numbers.contains(&(effect, number)));
+                regressors.extend(own.into_iter().filter(is_own));
+            }
         }
-    }
-    let mut nodes: Vec<_> = columns.predictions(model)?.to_vec();
-    nodes.extend(regressors.iter().map(|regressor| regressor.node));
-    let mut order: Vec<usize> = spans.iter().map(|span| span.flight).collect();
-    order.sort_unstable();
-    order.dedup();
-    let place = |one: &Regressor| numbers.iter().position(|number| Some(number.1) == one.number && number.0 == one.effect);
-    let by_channel: Vec<Vec<(usize, usize)>> = (0..6)
-        .map(|channel| {
+        let mut nodes: Vec<Node> = columns.predictions(model)?.to_vec();
+        let first = nodes.len();
+        nodes.extend(regressors.iter().map(|regressor| regressor.node));
+        let place = |one: &Regressor| numbers.iter().position(|number| Some(number.1) == one.number && number.0 == one.effect);
+        let of_channel = |channel: usize| {
             let own = regressors.iter().enumerate().filter(|(_, one)| one.channel == channel);
-            own.filter_map(|(column, one)| Some((place(one)?, 6 + column))).collect()
-        })
-        .collect();
-    let one = |&flight: &usize| -> Result<Sums> {
-        let log = &flights[flight];
-        let own: Vec<&Span> = spans.iter().filter(|span| span.flight == flight).collect();
-        let end = own.iter().map(|span| span.end).max().unwrap_or(0);
-        let empty = || (DMatrix::zeros(numbers.len(), numbers.len()), DVector::zeros(numbers.len()), 0.0);
+            own.filter_map(|(column, one)| Some((place(one)?, first + column))).collect()
+        };
+        let by_channel = (0..6).map(of_channel).collect();
+        Ok(Self { columns, nodes, by_channel, numbers: numbers.len() })
+    }
+
+    /// What some spans of one flight say.
+    fn sums(&self, log: &Flight, spans: &[&Span]) -> Result<Sums> {
+        let end = spans.iter().map(|span| span.end).max().unwrap_or(0);
+        let empty = || (DMatrix::zeros(self.numbers, self.numbers), DVector::zeros(self.numbers), 0.0);
         let mut sums: Sums = (0..6).map(|_| empty()).collect();
-        columns.evaluate(&nodes, log, end, &mut |range, values| {
-            for span in &own {
+        let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(left, right)| left * right).sum::<f64>();
+        self.columns.evaluate(&self.nodes, log, end, &mut |range, values| {
+            for span in spans {
                 let (start, end) = (span.start.max(range.start), span.end.min(range.end));
                 if start >= end {
                     continue;
@@ -170,20 +176,37 @@ fn step(
                     let measured = &log.column(Column::TARGETS[channel])[start..end];
                     let predicted = &values.column(channel)[part.clone()];
                     let rest: Vec<f64> = measured.iter().zip(predicted).map(|(measured, value)| measured - value).collect();
-                    let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(left, right)| left * right).sum::<f64>();
                     *square += dot(&rest, &rest);
-                    for &(i, left) in &by_channel[channel] {
+                    for &(i, left) in &self.by_channel[channel] {
                         let left = &values.column(left)[part.clone()];
                         side[i] += dot(left, &rest);
-                        by_channel[channel]
-                            .iter()
-                            .for_each(|&(j, right)| matrix[(i, j)] += dot(left, &values.column(right)[part.clone()]));
+                        for &(j, right) in &self.by_channel[channel] {
+                            matrix[(i, j)] += dot(left, &values.column(right)[part.clone()]);
+                        }
                     }
                 }
             }
             Ok(())
         })?;
         Ok(sums)
+    }
+}
+
+/// One step for all flights; by how much a number moved at most, in usual sizes.
+fn step(
+    flights: &[Flight],
+    spans: &[Span],
+    model: &mut Model,
+    (numbers, sizes): (&[(usize, usize)], &[f64]),
+    correlation: f64,
+) -> Result<f64> {
+    let columns = OwnColumns::of(model, numbers)?;
+    let mut order: Vec<usize> = spans.iter().map(|span| span.flight).collect();
+    order.sort_unstable();
+    order.dedup();
+    let one = |&flight: &usize| {
+        let own: Vec<&Span> = spans.iter().filter(|span| span.flight == flight).collect();
+        columns.sums(&flights[flight], &own)
     };
     #[cfg(feature = "rayon")]
     let found: Vec<Sums> = {
@@ -197,26 +220,10 @@ fn step(
     let mut moved = 0.0_f64;
     for (&flight, sums) in order.iter().zip(&found) {
         let name = &flights[flight].name;
-        let now = DVector::from_iterator(
-            numbers.len(),
-            numbers.iter().map(|&(effect, index)| model.effects[effect].coefficients[index].in_flight(name)),
-        );
-        let (mut matrix, mut side) = (DMatrix::zeros(numbers.len(), numbers.len()), DVector::zeros(numbers.len()));
-        for ((own, right, _), mse) in sums.iter().zip(&mse) {
-            matrix += own / mse.max(f64::MIN_POSITIVE);
-            side += right / mse.max(f64::MIN_POSITIVE);
-        }
-        for (place, size) in sizes.iter().enumerate() {
-            let precision = correlation / (size * size);
-            matrix[(place, place)] += precision;
-            side[place] -= precision * now[place];
-        }
+        let value = |&(effect, index): &(usize, usize)| model.effects[effect].coefficients[index].in_flight(name);
+        let now = DVector::from_iterator(numbers.len(), numbers.iter().map(value));
         // A flight without any error says nothing that a computer can hold.
-        let Some(change) =
-            Cholesky::new(matrix).map(|factor| factor.solve(&side)).filter(|change| change.iter().all(|c| c.is_finite()))
-        else {
-            continue;
-        };
+        let Some(change) = change(sums, &mse, &now, sizes, correlation) else { continue };
         for (place, &(effect, index)) in numbers.iter().enumerate() {
             moved = moved.max(change[place].abs() / sizes[place]);
             if let Some(values) = &mut model.effects[effect].coefficients[index].by_flight {
@@ -225,6 +232,22 @@ fn step(
         }
     }
     Ok(moved)
+}
+
+/// By how much the numbers of a flight change, channels weighted by the inverse of their error, each number held near zero by its usual size;
+/// `None` where the equations have no finite solution.
+fn change(sums: &Sums, mse: &[f64], now: &DVector<f64>, sizes: &[f64], correlation: f64) -> Option<DVector<f64>> {
+    let (mut matrix, mut side) = (DMatrix::zeros(now.len(), now.len()), DVector::zeros(now.len()));
+    for ((own, right, _), mse) in sums.iter().zip(mse) {
+        matrix += own / mse.max(f64::MIN_POSITIVE);
+        side += right / mse.max(f64::MIN_POSITIVE);
+    }
+    for (place, size) in sizes.iter().enumerate() {
+        let precision = correlation / (size * size);
+        matrix[(place, place)] += precision;
+        side[place] -= precision * now[place];
+    }
+    Cholesky::new(matrix).map(|factor| factor.solve(&side)).filter(|change| change.iter().all(|number| number.is_finite()))
 }
 
 /// Squared errors of a model's predictions, by channel and block.
