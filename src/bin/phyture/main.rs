@@ -4,6 +4,7 @@
 
 mod arguments;
 mod commands;
+mod context;
 mod folder;
 mod notes;
 mod output;
@@ -20,7 +21,7 @@ const INTERRUPTED: u8 = 130;
 
 fn main() -> ExitCode {
     quiet_behind_the_border();
-    let arguments = match arguments::Arguments::try_parse() {
+    let arguments = match commands::Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error) => return usage(&error),
     };

@@ -1,8 +1,8 @@
 //! `benchmark`: the runs of the paper's tables, and the tables of finished runs.
 
 use super::compare::write_page;
-use super::{Context, data_sha256, interruption};
-use crate::arguments::{Data, Plans};
+use crate::arguments::{Data, count};
+use crate::context::{Context, data_sha256, interruption};
 use crate::output::Progress;
 use phyture::disk::{Existing, Target};
 use phyture::flight::DataSet;
@@ -23,28 +23,6 @@ use std::process::ExitCode;
 use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-
-/// What was asked for.
-pub struct Wanted<'a> {
-    /// Model file.
-    pub model: Option<&'a Path>,
-    /// Folder of the benchmark.
-    pub output: &'a Path,
-    /// Tables; all if empty.
-    pub tables: &'a [TableId],
-    /// Rows; all if empty.
-    pub methods: &'a [String],
-    /// Seeds in place of the plan's.
-    pub seeds: Option<usize>,
-    /// Which budget.
-    pub plan: Plans,
-    /// Training configuration in place of the plan's.
-    pub config: Option<&'a Path>,
-    /// Which runs of how many parts.
-    pub shard: Option<Shard>,
-    /// Go on in a folder that holds runs.
-    pub resume: bool,
-}
 
 /// A part of a plan, written `2/8`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -67,6 +45,81 @@ impl FromStr for Shard {
     }
 }
 
+/// Most tasks of a job array.
+const MOST_SHARDS: usize = 10_000;
+
+/// The paper's tables: every method, on the same splits, with several seeds
+#[derive(clap::Args)]
+#[command(
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Examples:\n  phyture benchmark flights -o bench --plan hour --table 1\n  phyture benchmark flights -o bench --plan hour --table 1 --resume   # after a kill\n  phyture benchmark flights -o bench --shard 2/8                       # one part of eight\n  phyture benchmark flights -o bench --emit slurm --shards 20 > array.sh\n  phyture benchmark collect bench"
+)]
+pub struct Args {
+    /// Finished runs to tables.
+    #[command(subcommand)]
+    pub command: Option<Action>,
+    /// Flights.
+    #[command(flatten)]
+    pub data: Option<Data>,
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
+    /// Folder of the benchmark
+    #[arg(short, long, required = true)]
+    pub output: Option<PathBuf>,
+    /// Table of the paper, 1 to 6, or `robustness`; repeatable [default: all]
+    #[arg(long, value_name = "TABLE")]
+    pub table: Vec<TableId>,
+    /// Row of the tables by identifier, such as `timesnet`; repeatable [default: all]
+    #[arg(long, value_name = "METHOD")]
+    pub method: Vec<String>,
+    /// Seeds of each network, at most 1000 [default: the plan's]
+    #[arg(long, allow_negative_numbers = true, value_parser = count(1..=Settings::MOST_SEEDS))]
+    pub seeds: Option<usize>,
+    /// Budget: the paper's (days), an hour's for table 1, or one that only shows that it works
+    #[arg(long, value_enum, default_value_t = Plans::Paper)]
+    pub plan: Plans,
+    /// Training configuration (TOML) in place of the plan's: sizes of Phy-Ture, inputs, epochs, strides
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Make one part of the plan: every N-th run, from the I-th
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
+    /// Go on in a folder that holds runs of this plan
+    #[arg(long)]
+    pub resume: bool,
+    /// Run nothing; print the script of a job array for this batch system, one task a shard, `--threads` processors each
+    #[arg(long, value_name = "SYSTEM", value_parser = ["slurm"], conflicts_with = "shard")]
+    pub emit: Option<String>,
+    /// Tasks of the job array
+    #[arg(long, default_value_t = 10, requires = "emit", allow_negative_numbers = true, value_parser = count(1..=MOST_SHARDS))]
+    pub shards: usize,
+}
+
+/// What to do with a benchmark's folder.
+#[derive(clap::Subcommand)]
+pub enum Action {
+    /// The tables of all runs that are done
+    Collect {
+        /// Folder of the benchmark
+        folder: PathBuf,
+        /// Folders of the same plan whose runs are taken over first
+        from: Vec<PathBuf>,
+    },
+}
+
+/// How much of the paper's experiment is done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Plans {
+    /// The paper's sizes, 100 epochs, 10 seeds.
+    Paper,
+    /// Table 1 in an hour on two cores.
+    Hour,
+    /// A few minutes; the figures mean nothing.
+    Quick,
+}
+
 /// What `--json` writes after runs.
 #[derive(Serialize)]
 struct Output<'a> {
@@ -77,13 +130,28 @@ struct Output<'a> {
     seconds: f64,
 }
 
+/// Makes runs, prints the script of a job array, or collects.
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    if let Some(Action::Collect { folder, from }) = &wanted.command {
+        return collect(context, folder, from);
+    }
+    let (Some(data), Some(output)) = (&wanted.data, &wanted.output) else {
+        let (place, field) = ("command line".into(), "DATA, --output".into());
+        return Err(Error::Config { place, field, found: "nothing".into(), expected: "flights and a folder".into() });
+    };
+    match wanted.emit {
+        Some(_) => emit(context, output, wanted.shards),
+        None => make(context, data, output, wanted),
+    }
+}
+
 /// Makes the runs that are not done yet.
-pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
+fn make(context: &Context, data: &Data, output: &Path, wanted: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
-    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model, data)?);
+    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model.as_deref(), data)?);
     let set = context.flights(data, settings.phyture()?.history)?;
     let plan = plan(&set, data, settings, &model, wanted)?;
-    let folder = Folder::create(wanted.output)?;
+    let folder = Folder::create(output)?;
     open(&folder, &plan, wanted)?;
     context.say(format!("\n{}", plan.settings.budget(plan.step_s)));
     let runs = match wanted.shard {
@@ -123,13 +191,13 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
 }
 
 /// The budget: a preset, or a training configuration with the preset's seeds and strides.
-fn settings(context: &Context, wanted: &Wanted) -> Result<Settings> {
+fn settings(context: &Context, wanted: &Args) -> Result<Settings> {
     let mut settings = match wanted.plan {
         Plans::Paper => Settings::paper(),
         Plans::Hour => Settings::hour(),
         Plans::Quick => Settings::quick(),
     };
-    if let Some(path) = wanted.config {
+    if let Some(path) = &wanted.config {
         settings.training = TrainConfig::read(path)?;
     }
     settings.seeds = wanted.seeds.unwrap_or(settings.seeds);
@@ -138,11 +206,11 @@ fn settings(context: &Context, wanted: &Wanted) -> Result<Settings> {
     Ok(settings)
 }
 
-fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &Wanted) -> Result<Plan> {
+fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &Args) -> Result<Plan> {
     let folds = class_folds(&set.manoeuvres(), settings.folds);
-    let all = TableId::ALL.into_iter().filter(|table| wanted.tables.is_empty() || wanted.tables.contains(table));
+    let all = TableId::ALL.into_iter().filter(|table| wanted.table.is_empty() || wanted.table.contains(table));
     let possible = |table: &TableId| *table != TableId::Paper(3) || folds.len() > 1;
-    if wanted.tables.contains(&TableId::Paper(3)) && folds.len() < 2 {
+    if wanted.table.contains(&TableId::Paper(3)) && folds.len() < 2 {
         return Err(Error::Undetermined("table 3 holds manoeuvre classes out, and these flights are of one class".into()));
     }
     let plan = Plan {
@@ -154,14 +222,14 @@ fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &
         folds: if folds.len() > 1 { folds } else { Vec::new() },
         settings,
         version: env!("CARGO_PKG_VERSION").into(),
-        methods: wanted.methods.into(),
+        methods: wanted.method.clone(),
     };
     plan.check()?;
     Ok(plan)
 }
 
 /// Puts the plan into the folder. One that holds another plan is refused, and one that holds this plan is gone on with only when asked.
-fn open(folder: &Folder, plan: &Plan, wanted: &Wanted) -> Result<()> {
+fn open(folder: &Folder, plan: &Plan, wanted: &Args) -> Result<()> {
     let _held = folder.hold_plan()?;
     if !folder.plan_file().exists() {
         return folder.write_plan(plan);
@@ -319,7 +387,7 @@ fn duration(seconds: f64) -> String {
 const NOT_OF_A_TASK: [&str; 4] = ["--emit", "--shards", "--threads", "--json"];
 
 /// Prints the script of a job array whose tasks are what this command line asks for.
-pub fn emit(context: &Context, output: &Path, shards: usize) -> Result<ExitCode> {
+fn emit(context: &Context, output: &Path, shards: usize) -> Result<ExitCode> {
     let program = std::env::current_exe().map_err(Error::io("phyture"))?;
     let mut arguments = Vec::new();
     let mut given = std::env::args().skip(1);
@@ -341,7 +409,7 @@ pub fn emit(context: &Context, output: &Path, shards: usize) -> Result<ExitCode>
 }
 
 /// Takes over the runs of other folders and writes the tables of all runs that are done.
-pub fn collect(context: &Context, folder: &Path, from: &[PathBuf]) -> Result<ExitCode> {
+fn collect(context: &Context, folder: &Path, from: &[PathBuf]) -> Result<ExitCode> {
     if !folder.join("plan.json").exists() {
         let (place, field) = (folder.display().to_string(), "plan.json".into());
         return Err(Error::Config { place, field, found: "nothing".into(), expected: "the folder of a benchmark".into() });

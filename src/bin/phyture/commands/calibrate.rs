@@ -1,7 +1,7 @@
 //! `calibrate`: least squares of the model's coefficients on the training part, and a model file to go on with.
 
-use super::Context;
 use crate::arguments::{Data, Division};
+use crate::context::Context;
 use phyture::critique::wrap::wrapped;
 use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet};
@@ -9,7 +9,7 @@ use phyture::physics::{Calibration, Effect, Entry, Model, calibrate};
 use phyture::{Error, Result};
 use serde::Serialize;
 use serde_json::{Map, Value};
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// What `--json` writes.
@@ -20,8 +20,27 @@ struct Output {
     rmse: Map<String, Value>,
 }
 
-/// Calibrates `model` on the training part and writes it to `output`.
-pub fn run(context: &Context, data: &Data, model: Option<&Path>, output: &Path, division: &Division) -> Result<ExitCode> {
+/// Least squares of the model's coefficients on the training part
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  phyture calibrate flights -m n9.toml -o n9-calibrated.toml")]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
+    /// Calibrated model file to write
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// What trains and what tests.
+    #[command(flatten)]
+    pub division: Division,
+}
+
+/// Calibrates a model on the training part and writes it.
+pub fn run(context: &Context, Args { data, model, output, division }: &Args) -> Result<ExitCode> {
+    let model = model.as_deref();
     let target = context.new_file(output, model.as_slice())?;
     let set = context.flights(data, 1)?;
     let model = context.model(model, data)?;

@@ -1,21 +1,40 @@
 //! `check`: conventions, timing and excitation of a data set, and the description that mends what is at fault.
 
-use super::{CHECK_FAILED, Context};
+use super::CHECK_FAILED;
 use crate::arguments::Data;
+use crate::context::Context;
 use phyture::Result;
 use phyture::critique::check::{CheckReport, Suggestion, check};
 use phyture::critique::wrap::wrapped;
 use phyture::disk::{Target, write_atomically};
 use phyture::flight::DataSet;
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Conventions, timing and excitation of a data set; exit code 3 on a convention fault
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture check flights --json check.json\n  phyture check flights --suggest flights/dataset.toml"
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file [default: DATA/model.toml if there is one]
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
+    /// Write a dataset.toml that mends what is at fault, on top of the one in force; where it takes the name of that one, the old one is kept
+    /// beside it
+    #[arg(long, value_name = "FILE")]
+    pub suggest: Option<PathBuf>,
+}
+
 /// Checks and prints; exit code 3 on a convention fault, after the report and what was asked for are written.
-pub fn run(context: &Context, data: &Data, model: Option<&Path>, suggest: Option<&Path>) -> Result<ExitCode> {
+pub fn run(context: &Context, Args { data, model, suggest }: &Args) -> Result<ExitCode> {
     let in_force = data.dataset.clone().unwrap_or_else(|| data.data.join("dataset.toml"));
-    let target = suggest.map(|path| context.new_file(path, &[&in_force])).transpose()?;
+    let target = suggest.as_deref().map(|path| context.new_file(path, &[&in_force])).transpose()?;
     let set = context.flights(data, 1)?;
-    let model = context.model_if_any(model, data)?;
+    let model = context.model_if_any(model.as_deref(), data)?;
     let report = check(&set, model.as_ref());
     // The notes on the data have been said, and folded.
     context.say(format!("\n{}", CheckReport { notes: Vec::new(), ..report.clone() }));

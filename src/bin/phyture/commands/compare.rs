@@ -1,8 +1,9 @@
 //! `compare`: measured against predicted for every model and network given, beside honest yardsticks.
 
+use super::explainable;
 use super::predict::read_network;
-use super::{Context, data_sha256, explainable};
-use crate::arguments::{Data, Division};
+use crate::arguments::{Data, Division, STRIDES, count};
+use crate::context::{Context, data_sha256};
 use phyture::critique::diagnose::{Met, met};
 use phyture::critique::shares::{self, shares};
 use phyture::critique::table::ordinal;
@@ -23,32 +24,51 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-/// What was asked for.
-pub struct Wanted<'a> {
-    /// Model files.
-    pub models: &'a [PathBuf],
-    /// Run folders.
-    pub networks: &'a [PathBuf],
-    /// Folder for the page.
-    pub report: Option<&'a Path>,
-    /// Samples between windows.
+/// Measured against predicted for each model given, per channel, manoeuvre and regime
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture compare flights -m n9-calibrated.toml -n run --report report\n  phyture compare flights -m n9-calibrated.toml --explainable floor     # simulated flights: with the floor"
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file; repeatable
+    #[arg(short, long, required_unless_present = "network")]
+    pub model: Vec<PathBuf>,
+    /// Trained network: a run folder; repeatable
+    #[arg(short, long)]
+    pub network: Vec<PathBuf>,
+    /// Folder for the page comparison.html
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Samples between evaluated windows [default: 1, or what lets the networks take about a minute]
+    #[arg(long, allow_negative_numbers = true, value_parser = count(STRIDES))]
     pub stride: Option<usize>,
-    /// Every flight, not the test part.
+    /// Evaluate every flight, also those that were trained on
+    #[arg(long)]
     pub all: bool,
-    /// Lags of a ridge regression beside the models.
+    /// Add a ridge regression on so many lags (1 to 157), fitted on the training part, as a further row
+    #[arg(long, value_name = "LAGS", allow_negative_numbers = true, value_parser = count(1..=LinearConfig::MOST_LAGS))]
     pub ridge: Option<usize>,
-    /// How far the networks' predictions move with the intervals of their models' coefficients.
+    /// Show how far each network's prediction moves with the intervals of its model's coefficients
+    #[arg(long, requires = "network")]
     pub uncertainty: bool,
-    /// Folder of the explainable part of the flights.
-    pub explainable: Option<&'a Path>,
+    /// Explainable part of simulated flights, as `simulate --explainable` writes it: adds the floor that no model can go below
+    #[arg(long, value_name = "DIR")]
+    pub explainable: Option<PathBuf>,
+    /// What trains and what tests.
+    #[command(flatten)]
+    pub division: Division,
 }
 
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
-pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division) -> Result<ExitCode> {
-    let page = wanted.report.map(|folder| context.new_page(folder, "comparison.html")).transpose()?;
-    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
-    let networks = wanted.networks.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
-    let models = wanted.models.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    let Args { data, division, explainable: truth, .. } = wanted;
+    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, "comparison.html")).transpose()?;
+    truth.as_deref().map_or(Ok(()), |folder| explainable::apart(data, folder))?;
+    let networks = wanted.network.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
+    let models = wanted.model.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
     let set = context.flights(data, history)?;
     let of_networks = networks.iter().map(|(_, hybrid)| &hybrid.description().model);
@@ -88,7 +108,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted, division: &Division)
         uncertainty: wanted.uncertainty,
     };
     let mut result = contest.run(context, &set, &split)?;
-    if let Some(folder) = wanted.explainable {
+    if let Some(folder) = truth {
         result.set_floor(&set, &explainable::read(data, folder)?)?;
     }
     context.say(format!("\n{}", result.comparison));

@@ -7,7 +7,8 @@
 use super::compare::{Contest, write_page};
 use super::diagnose;
 use super::train::Task;
-use super::{CHECK_FAILED, Context, calibrate, interruption, simulate::starting_model};
+use super::{CHECK_FAILED, calibrate, simulate::starting_model};
+use crate::context::{Context, interruption};
 use phyture::Result;
 use phyture::critique::Comparison;
 use phyture::critique::check::check;
@@ -20,7 +21,7 @@ use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate_with_explainable};
 use phyture::train::{RunFolder, TrainConfig};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -71,13 +72,25 @@ impl Scale {
     }
 }
 
+/// The whole story on built-in data: hidden effects found, added, the rest learned, judged on flights that nothing saw
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  phyture demo --out demo\n  phyture demo --quick        # two minutes, a smaller network")]
+pub struct Args {
+    /// Folder for data, models and the report
+    #[arg(long, default_value = "phyture-demo")]
+    pub out: PathBuf,
+    /// A smaller data set and a shorter training
+    #[arg(long)]
+    pub quick: bool,
+}
+
 /// Tells the story and writes data, models, network and page into `out`.
-pub fn run(context: &Context, out: &Path, quick: bool) -> Result<ExitCode> {
+pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
     let interrupted = interruption()?;
     let folder = context.new_folder(out)?;
     let page = context.new_page(out, "report.html")?;
-    let Scale { minutes, config } = Scale::new(quick, context.seed());
+    let Scale { minutes, config } = Scale::new(*quick, context.seed());
 
     context.say("1. Flights of the built-in truth helicopter, with hidden effects");
     let mut simulation = Simulation { minutes, seed: context.seed(), level: Level::TWO, ..Simulation::baseline() };

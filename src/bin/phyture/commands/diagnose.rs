@@ -2,8 +2,9 @@
 
 use super::compare::{DATA_NOTE, write_page};
 use super::predict::read_network;
-use super::{CHECK_FAILED, Context, data_sha256, explainable};
-use crate::arguments::{Data, Division};
+use super::{CHECK_FAILED, explainable};
+use crate::arguments::{Data, Division, count};
+use crate::context::{Context, data_sha256};
 use phyture::critique::check;
 use phyture::critique::diagnose::{self, Amended, Diagnosis, LoopText, Options, Outcome, Verdict, calibrated, searched};
 use phyture::critique::floor_of_spans;
@@ -155,18 +156,41 @@ fn prepare(
     Ok(Some((set, split, sha)))
 }
 
-/// What `diagnose` was asked for.
-pub struct Wanted<'a> {
-    /// Model file.
-    pub model: Option<&'a Path>,
-    /// Run folder: search what its network learned.
-    pub of_network: Option<&'a Path>,
-    /// Folder for the page.
-    pub report: Option<&'a Path>,
-    /// Most effects to name, one after the other; as many as there are without it.
+/// Effects that a search names, at most.
+const MOST_EFFECTS: usize = 100;
+
+/// Which physical effect is missing, and how sure that is; exit code 3 on a convention fault
+///
+/// Effects that are found are one list, the largest first, each with what of the error on flights that no search has seen would come
+/// back if it alone were taken away.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture diagnose flights -m n9.toml --report report --json diagnosis.json\n  phyture diagnose flights -m n9.toml --explainable floor     # simulated flights: how much could be removed at all"
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]; effects switched off in it are tried too
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
+    /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
+    #[arg(long, value_name = "RUN")]
+    pub of_network: Option<PathBuf>,
+    /// Folder for the page diagnosis.html
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Stop after so many effects, one found after the other; without it, where much is missing, all effects that apply are fitted at once
+    /// and the needless left out
+    #[arg(long, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
     pub max_effects: Option<usize>,
-    /// Folder of the explainable part of the flights.
-    pub explainable: Option<&'a Path>,
+    /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
+    /// has seen, and how much of what lies above it the effects remove
+    #[arg(long, value_name = "DIR", conflicts_with = "of_network")]
+    pub explainable: Option<PathBuf>,
+    /// What is searched and what only confirms.
+    #[command(flatten)]
+    pub division: Division,
 }
 
 /// The explainable part of the flights, where there is one and something is kept to judge on.
@@ -175,14 +199,16 @@ fn read_explainable(data: &Data, folder: Option<&Path>, split: &Split) -> Result
 }
 
 /// `diagnose`.
-pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Division) -> Result<ExitCode> {
-    let hybrid = wanted.of_network.map(read_network).transpose()?;
-    let model = match (&hybrid, wanted.model) {
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    let Args { data, division, explainable: truth, .. } = wanted;
+    let truth = truth.as_deref();
+    let hybrid = wanted.of_network.as_deref().map(read_network).transpose()?;
+    let model = match (&hybrid, wanted.model.as_deref()) {
         (Some(hybrid), None) => hybrid.description().model.clone(),
         (_, model) => context.model(model, data)?,
     };
-    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
-    let target = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
+    let target = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
     let mut paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
     let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
@@ -207,7 +233,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted<'_>, division: &Divis
         set = target.set;
     }
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
-    let explainable = read_explainable(data, wanted.explainable, &split)?;
+    let explainable = read_explainable(data, truth, &split)?;
     let task = Task { set: &set, split: &split, data_sha256, options, explainable };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", told(context, &outcome.diagnosis)));
@@ -315,31 +341,50 @@ fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
     append_lines(ledger, &lines)
 }
 
-/// What `loop` was asked for.
-pub struct Loop<'a> {
-    /// Model file.
-    pub model: Option<&'a Path>,
-    /// Model file to write.
-    pub output: &'a Path,
-    /// Folder for the page.
-    pub report: Option<&'a Path>,
-    /// Folder of the explainable part of the flights.
-    pub explainable: Option<&'a Path>,
+/// Diagnose, add, calibrate, until nothing worthwhile is left; appends to a ledger beside the model
+///
+/// All effects that were added are one list, the largest first; the errors before and after, by channel, are the last table. Every round by
+/// itself is in the JSON, in the page and, with --verbose, in the text.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture loop flights -m n9.toml -o n9-amended.toml --report report\n  phyture loop flights -m n9.toml -o n9-amended.toml --explainable floor     # simulated flights"
+)]
+pub struct LoopArgs {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
+    /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Folder for the page diagnosis.html
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
+    /// has seen, and how much of what lies above it the effects remove
+    #[arg(long, value_name = "DIR")]
+    pub explainable: Option<PathBuf>,
+    /// What is searched and what only confirms.
+    #[command(flatten)]
+    pub division: Division,
 }
 
 /// `loop`.
-pub fn run_loop(context: &Context, data: &Data, wanted: &Loop<'_>, division: &Division) -> Result<ExitCode> {
-    let output = wanted.output;
-    let target = context.new_file(output, wanted.model.as_slice())?;
-    let page = wanted.report.map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    wanted.explainable.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
-    let model = context.model(wanted.model, data)?;
+pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
+    let LoopArgs { data, output, division, .. } = wanted;
+    let (model, truth) = (wanted.model.as_deref(), wanted.explainable.as_deref());
+    let target = context.new_file(output, model.as_slice())?;
+    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
+    let model = context.model(model, data)?;
     let mut paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
     let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
-    let explainable = read_explainable(data, wanted.explainable, &split)?;
+    let explainable = read_explainable(data, truth, &split)?;
     let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
     let ledger = output.with_extension("ledger.jsonl");
     let before = calibrated(&model, &set.flights, &split)?;

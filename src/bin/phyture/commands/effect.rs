@@ -1,7 +1,6 @@
 //! `effect list`, `effect signals`, `effect show` and `effect add`: the catalogue for a person, and the way of an effect into a model file.
 
-use super::Context;
-use crate::arguments::EffectCommand;
+use crate::context::Context;
 use phyture::flight::Column;
 use phyture::formula::{Formula, Shared, shared};
 use phyture::physics::catalogue::{definition, definitions};
@@ -16,13 +15,49 @@ use std::process::ExitCode;
 /// What puts an effect into a model file here.
 const ADDED_BY: &str = "effect add";
 
+/// The catalogue of physical effects; add one to a model
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture effect list\n  phyture effect show ground_effect\n  phyture effect add ground_effect -m n9.toml -o n9-ground.toml"
+)]
+pub struct Args {
+    /// What to do with it.
+    #[command(subcommand)]
+    pub command: Action,
+}
+
+/// What to do with the catalogue.
+#[derive(clap::Subcommand)]
+pub enum Action {
+    /// Every effect in a line
+    List,
+    /// The signals that effects read and change, which formulas of your own may read and change too
+    Signals,
+    /// All that is known about one effect
+    Show {
+        /// Effect
+        effect: String,
+    },
+    /// Put an effect with coefficients 0 into a model file, to be calibrated
+    Add {
+        /// Effect
+        effect: String,
+        /// Model file
+        #[arg(short, long)]
+        model: PathBuf,
+        /// Model file to write
+        #[arg(short, long)]
+        output: PathBuf,
+    },
+}
+
 /// Does what was asked for.
-pub fn run(context: &Context, command: &EffectCommand) -> Result<ExitCode> {
+pub fn run(context: &Context, Args { command }: &Args) -> Result<ExitCode> {
     match command {
-        EffectCommand::List => list(context),
-        EffectCommand::Signals => signals(context),
-        EffectCommand::Show { effect } => show(context, effect),
-        EffectCommand::Add { effect, model, output } => add(context, effect, model, output),
+        Action::List => list(context),
+        Action::Signals => signals(context),
+        Action::Show { effect } => show(context, effect),
+        Action::Add { effect, model, output } => add(context, effect, model, output),
     }
 }
 

@@ -1,6 +1,6 @@
 //! `formula`: the language of formulas, and what one formula is read as.
 
-use super::Context;
+use crate::context::Context;
 use phyture::Result;
 use phyture::formula::{Formula, functions};
 use phyture::physics::standard_names;
@@ -21,7 +21,7 @@ const OPERATORS: [(&str, &str); 5] = [
 const STEP_S: f64 = 0.01;
 
 /// The language as a text of at most 100 columns.
-pub fn grammar() -> String {
+fn grammar() -> String {
     let mut text = String::from("Operators, loosest first:\n");
     let row = |text: &mut String, (form, meaning): (&str, &str)| {
         // Writing to a String does not fail.
@@ -44,8 +44,18 @@ pub fn grammar() -> String {
     text
 }
 
+/// The language of formulas: its operators, functions and names; or what a formula of yours is read as
+#[derive(clap::Args)]
+#[command(
+    after_help = grammar()
+)]
+pub struct Args {
+    /// Formula to read
+    pub formula: Option<String>,
+}
+
 /// Prints the language, or what `formula` is read as.
-pub fn run(context: &Context, formula: Option<&str>) -> Result<ExitCode> {
+pub fn run(context: &Context, Args { formula }: &Args) -> Result<ExitCode> {
     let Some(text) = formula else {
         context.say(grammar());
         context.json(&json!({ "functions": functions().map(|(form, meaning)| json!({ "form": form, "meaning": meaning })).collect::<Vec<_>>(), "names": standard_names() }))?;

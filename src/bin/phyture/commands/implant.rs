@@ -1,8 +1,8 @@
 //! `implant`: a known effect in recorded flights, with the truth written beside them.
 
 use super::effect::find;
-use super::{Context, data_sha256};
 use crate::arguments::Data;
+use crate::context::{Context, data_sha256};
 use phyture::disk::write_atomically;
 use phyture::flight::{Column, DataSet, Span, write};
 use phyture::physics::{Effect, Model, calibrate, implant, spread_over_flights, typical};
@@ -16,25 +16,46 @@ use std::process::ExitCode;
 /// Name of an effect that was given as a formula.
 const IMPLANTED: &str = "implanted";
 
-/// What was asked for.
-pub struct Wanted<'a> {
-    /// An effect of the catalogue.
-    pub effect: Option<&'a str>,
-    /// Or a formula, `channel = formula`.
-    pub formula: Option<&'a str>,
-    /// Times its usual size.
+/// A factor.
+fn finite(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().map_err(|error| error.to_string())?;
+    if number.is_finite() { Ok(number) } else { Err("expected a finite number".into()) }
+}
+
+/// Add a known effect to recorded flights, so that the truth is known under real noise
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture implant flights implanted --effect ground_effect --scale 2 -m n9-calibrated.toml\n  phyture implant flights implanted --effect rotor_droop --size k=-0.2 --size tau_s=0.5\n  phyture implant flights implanted --formula \"wx_dot = 1.5*sin(3*height)\""
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Folder to write
+    pub dir: PathBuf,
+    /// Effect of the catalogue
+    #[arg(long, required_unless_present = "formula", conflicts_with = "formula")]
+    pub effect: Option<String>,
+    /// Something else: `channel = formula`
+    #[arg(long, value_name = "FORMULA")]
+    pub formula: Option<String>,
+    /// Times its usual size
+    #[arg(long, default_value_t = 1.0, allow_negative_numbers = true, value_parser = finite)]
     pub scale: f64,
-    /// Values in place of the usual ones, `name=value`.
-    pub size: &'a [String],
-    /// Calibrated model.
-    pub model: Option<&'a Path>,
+    /// A coefficient or parameter in place of the usual one; repeatable
+    #[arg(long, value_name = "NAME=VALUE", conflicts_with = "formula")]
+    pub size: Vec<String>,
+    /// Calibrated model file [default: DATA/model.toml or the paper's baseline, calibrated on the flights]
+    #[arg(short, long)]
+    pub model: Option<PathBuf>,
 }
 
 /// Implants, writes the flights and `truth.json`.
-pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Result<ExitCode> {
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    let Args { data, dir: folder, .. } = wanted;
     let set = context.flights(data, 1)?;
     refuse_recorded(&set, &data.data, folder)?;
-    let model = match wanted.model {
+    let model = match &wanted.model {
         Some(path) => {
             let model = Model::read(path)?;
             model.check_flights(&set.flights)?;
@@ -48,8 +69,8 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
             calibrate(&model, &set.flights, &spans)?.0
         }
     };
-    let effect = match (wanted.effect, wanted.formula) {
-        (Some(id), _) => sized(typical(find(id)?, wanted.scale, &model), wanted.size)?,
+    let effect = match (wanted.effect.as_deref(), wanted.formula.as_deref()) {
+        (Some(id), _) => sized(typical(find(id)?, wanted.scale, &model), &wanted.size)?,
         (None, Some(formula)) => of_formula(formula, wanted.scale)?,
         (None, None) => return Err(fault("--effect", "nothing".into(), "--effect EFFECT or --formula \"channel = formula\"")),
     };
@@ -59,7 +80,7 @@ pub fn run(context: &Context, data: &Data, folder: &Path, wanted: &Wanted) -> Re
     write::data_set_csv(folder, &changed.flights)?;
     let rms = rms(&set, &changed);
     let truth = json!({
-        "effect": wanted.effect.unwrap_or(IMPLANTED),
+        "effect": wanted.effect.as_deref().unwrap_or(IMPLANTED),
         "scale": wanted.scale,
         "formulas": effect.to_string().lines().collect::<Vec<_>>(),
         "coefficients": effect.coefficients,

@@ -1,28 +1,41 @@
 //! `completions` and `man`: what a shell and `man` know of the command line, made from the command line itself.
 
-use super::Context;
-use crate::arguments::Arguments;
-use clap::CommandFactory;
+use crate::context::Context;
 use phyture::{Error, Result};
 use std::io::Write;
-use std::path::Path;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 const NAME: &str = "phyture";
 
-/// Prints the completions of a shell.
-pub fn completions(shell: clap_complete::Shell) -> ExitCode {
+/// Completions for a shell, to standard output
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  phyture completions bash > ~/.local/share/bash-completion/completions/phyture")]
+pub struct CompletionsArgs {
+    /// Shell
+    pub shell: clap_complete::Shell,
+}
+
+/// Manual pages, one a command
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  phyture man ~/.local/share/man/man1")]
+pub struct Args {
+    /// Folder to write them to
+    pub dir: PathBuf,
+}
+
+/// Prints the completions of a shell for `command`.
+pub fn completions(args: &CompletionsArgs, mut command: clap::Command) -> ExitCode {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut Arguments::command(), NAME, &mut script);
+    clap_complete::generate(args.shell, &mut command, NAME, &mut script);
     // A closed pipe (`phyture completions bash | head`) is no error.
     let _ = std::io::stdout().write_all(&script);
     ExitCode::SUCCESS
 }
 
-/// Writes `phyture.1` and a page for each command into `folder`.
-pub fn pages(context: &Context, folder: &Path) -> Result<ExitCode> {
+/// Writes the page of `command` and one for each of its own.
+pub fn run(context: &Context, Args { dir: folder }: &Args, mut command: clap::Command) -> Result<ExitCode> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-    let mut command = Arguments::command();
     command.build();
     let subcommands = command.get_subcommands().filter(|command| command.get_name() != "help").cloned().collect::<Vec<_>>();
     let mut written = 0;

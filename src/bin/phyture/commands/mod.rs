@@ -1,4 +1,4 @@
-//! One file a command; here the dispatch and what several commands share: reading flights, models and splits.
+//! The commands, one file each; here their list and the dispatch.
 
 mod benchmark;
 mod calibrate;
@@ -16,28 +16,53 @@ mod predict;
 mod simulate;
 mod train;
 
-use crate::folder::NewFolder;
-pub use benchmark::Shard;
-pub use formula::grammar;
-
-use crate::arguments::{Arguments, BenchmarkCommand, Command, Common, Data, Division};
-use crate::{notes, output};
-use phyture::critique::check::check;
-use phyture::critique::wrap::wrapped;
-use phyture::disk::{Existing, Target};
-use phyture::flight::read::{ReadOptions, data_set};
-use phyture::flight::split::{BENCHMARK_SEED, Split};
-use phyture::flight::{DataSet, Flight};
-use phyture::physics::Model;
-use phyture::tape::Threads;
-use phyture::{Error, Result};
-use std::path::Path;
+use crate::arguments::Common;
+use crate::context::Context;
+use crate::output;
+use clap::{CommandFactory, Parser, Subcommand};
+use phyture::Result;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Name of the model file that lies beside flights.
-const MODEL_FILE: &str = "model.toml";
+/// Where to begin, and what a script has to know.
+const HELP: &str = "\
+Start with: phyture demo
+
+Exit codes: 0 done; 2 bad usage or bad input; 3 a check failed (its report is written); 130 interrupted (state saved).
+With --json a failure is JSON too: { \"schema\": 1, \"error\": { \"kind\", \"message\" }, \"exit_code\" }.";
+
+/// Calibrate a first-principles model of an unmanned helicopter on recorded flights, see where it fails, and learn the rest.
+#[derive(Parser)]
+#[command(version, about, max_term_width = 110, after_help = HELP)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+    /// Options of every command.
+    #[command(flatten)]
+    pub common: Common,
+}
+
+/// The commands. What is said of each stands where its options are.
+#[derive(Subcommand)]
+pub enum Command {
+    Demo(demo::Args),
+    Simulate(simulate::Args),
+    Check(check::Args),
+    Calibrate(calibrate::Args),
+    Compare(compare::Args),
+    Diagnose(diagnose::Args),
+    Loop(diagnose::LoopArgs),
+    #[command(mut_arg("data", |data| data.required(false).required_unless_present("print_config")))]
+    Train(train::Args),
+    Predict(predict::Args),
+    Effect(effect::Args),
+    Implant(implant::Args),
+    Benchmark(benchmark::Args),
+    Formula(formula::Args),
+    Completions(manual::CompletionsArgs),
+    Man(manual::Args),
+    Parity(parity::Args),
+}
 
 /// Exit code of a check that failed.
 const CHECK_FAILED: u8 = 3;
@@ -50,325 +75,21 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         output::be_quiet();
     }
     match &arguments.command {
-        Command::Demo { out, quick } => demo::run(&context, out, *quick),
-        Command::Simulate { dir, minutes, hide, baseline, like, layout, level, noise, wind, explainable } => {
-            let (like, level, explainable) = (like.as_deref(), level.as_deref(), explainable.as_deref());
-            let (minutes, baseline, noise, wind) = (*minutes, *baseline, *noise, *wind);
-            let wanted = simulate::Wanted { minutes, hide, baseline, like, layout, level, noise, wind, explainable };
-            simulate::run(&context, dir, &wanted)
-        }
-        Command::Check { data, model, suggest } => check::run(&context, data, model.as_deref(), suggest.as_deref()),
-        Command::Calibrate { data, model, output, division } => calibrate::run(&context, data, model.as_deref(), output, division),
-        Command::Compare { data, model, network, report, stride, all, ridge, uncertainty, explainable, division } => {
-            let wanted = compare::Wanted {
-                models: model,
-                networks: network,
-                report: report.as_deref(),
-                stride: *stride,
-                all: *all,
-                ridge: *ridge,
-                uncertainty: *uncertainty,
-                explainable: explainable.as_deref(),
-            };
-            compare::run(&context, data, &wanted, division)
-        }
-        Command::Train { data, model, output, config, paper, epochs, print_config, resume, division } => {
-            let settings = train::Settings { config: config.as_deref(), paper: *paper, epochs: *epochs };
-            match (data, model, output) {
-                _ if *print_config => train::print_config(&context, &settings),
-                (Some(data), Some(model), Some(output)) => {
-                    train::run(&context, data, &train::Wanted { model, output, settings, resume: *resume }, division)
-                }
-                _ => Err(Error::Config {
-                    place: "command line".into(),
-                    field: "DATA".into(),
-                    found: "nothing".into(),
-                    expected: "the flights to train on: phyture train DATA -m MODEL -o RUN".into(),
-                }),
-            }
-        }
-        Command::Predict { data, model, network, output, stride } => {
-            let (model, network) = (model.as_deref(), network.as_deref());
-            predict::run(&context, data, &predict::Wanted { model, network, output, stride: *stride })
-        }
-        Command::Diagnose { data, model, of_network, report, max_effects, explainable, division } => {
-            let (model, of_network, report) = (model.as_deref(), of_network.as_deref(), report.as_deref());
-            let (max_effects, explainable) = (*max_effects, explainable.as_deref());
-            diagnose::run(&context, data, &diagnose::Wanted { model, of_network, report, max_effects, explainable }, division)
-        }
-        Command::Loop { data, model, output, report, explainable, division } => {
-            let (model, report, explainable) = (model.as_deref(), report.as_deref(), explainable.as_deref());
-            diagnose::run_loop(&context, data, &diagnose::Loop { model, output, report, explainable }, division)
-        }
-        Command::Effect { command } => effect::run(&context, command),
-        Command::Implant { data, dir, effect, formula, scale, size, model } => {
-            let (effect, formula, model) = (effect.as_deref(), formula.as_deref(), model.as_deref());
-            implant::run(&context, data, dir, &implant::Wanted { effect, formula, scale: *scale, size, model })
-        }
-        Command::Benchmark { command: Some(BenchmarkCommand::Collect { folder, from }), .. } => {
-            benchmark::collect(&context, folder, from)
-        }
-        Command::Benchmark { data, model, output, table, method, seeds, plan, config, shard, resume, emit, shards, .. } => {
-            let (Some(data), Some(output)) = (data, output) else {
-                let (place, field) = ("command line".into(), "DATA, --output".into());
-                return Err(Error::Config { place, field, found: "nothing".into(), expected: "flights and a folder".into() });
-            };
-            let wanted = benchmark::Wanted {
-                model: model.as_deref(),
-                output,
-                tables: table,
-                methods: method,
-                seeds: *seeds,
-                plan: *plan,
-                config: config.as_deref(),
-                shard: *shard,
-                resume: *resume,
-            };
-            match emit {
-                Some(_) => benchmark::emit(&context, output, *shards),
-                None => benchmark::run(&context, data, &wanted),
-            }
-        }
-        Command::Formula { formula } => formula::run(&context, formula.as_deref()),
-        Command::Completions { shell } => Ok(manual::completions(*shell)),
-        Command::Man { dir } => manual::pages(&context, dir),
-        Command::Parity { file } => parity::run(&context, file),
+        Command::Demo(args) => demo::run(&context, args),
+        Command::Simulate(args) => simulate::run(&context, args),
+        Command::Check(args) => check::run(&context, args),
+        Command::Calibrate(args) => calibrate::run(&context, args),
+        Command::Compare(args) => compare::run(&context, args),
+        Command::Diagnose(args) => diagnose::run(&context, args),
+        Command::Loop(args) => diagnose::run_loop(&context, args),
+        Command::Train(args) => train::run(&context, args),
+        Command::Predict(args) => predict::run(&context, args),
+        Command::Effect(args) => effect::run(&context, args),
+        Command::Implant(args) => implant::run(&context, args),
+        Command::Benchmark(args) => benchmark::run(&context, args),
+        Command::Formula(args) => formula::run(&context, args),
+        Command::Completions(args) => Ok(manual::completions(args, Arguments::command())),
+        Command::Man(args) => manual::run(&context, args, Arguments::command()),
+        Command::Parity(args) => parity::run(&context, args),
     }
-}
-
-/// The options of every command, and the ways of speaking that follow from them.
-pub struct Context<'a> {
-    common: &'a Common,
-    /// Holds the file of the machine-readable result.
-    _json: Option<Target>,
-}
-
-impl<'a> Context<'a> {
-    /// Looks at once whether the machine-readable result can be written.
-    fn new(common: &'a Common) -> Result<Self> {
-        let file = common.json.as_deref().filter(|path| *path != Path::new("-"));
-        let existing = if common.force { Existing::Replace } else { Existing::Keep };
-        Ok(Self { common, _json: file.map(|path| Target::file(path, existing, &[])).transpose()? })
-    }
-
-    /// What becomes of something that exists.
-    pub fn existing(&self) -> Existing {
-        if self.common.force { Existing::Replace } else { Existing::Keep }
-    }
-
-    /// A file that is going to be written, looked at before the work; `read` are the files that the work starts from.
-    pub fn new_file(&self, path: &Path, read: &[&Path]) -> Result<Target> {
-        Target::file(path, self.existing(), read)
-    }
-
-    /// A page that is going to be written into a folder, which is made if it is not there.
-    pub fn new_page(&self, folder: &Path, name: &str) -> Result<Target> {
-        std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
-        self.new_file(&folder.join(name), &[])
-    }
-
-    /// A folder that is going to be filled: new, or empty, or to be written over.
-    pub fn new_folder(&self, folder: &Path) -> Result<NewFolder> {
-        NewFolder::open(folder, self.existing())
-    }
-
-    /// The path of a file, to be written now. Where the file that was read has this name, it is kept beside with the date.
-    pub fn ready<'t>(&self, target: &'t Target) -> Result<&'t Path> {
-        let (path, kept) = target.ready()?;
-        if let Some(kept) = kept {
-            self.say(format!("the file that was there is kept as {}", kept.display()));
-        }
-        Ok(path)
-    }
-
-    /// Text for a person; nothing with `--quiet`.
-    pub fn say(&self, text: impl std::fmt::Display) {
-        if !self.common.quiet {
-            output::say(self.common.json.as_deref(), text);
-        }
-    }
-
-    /// What was asked for as text (a script, a list), also with `--quiet`.
-    pub fn print(&self, text: impl std::fmt::Display) {
-        output::say(self.common.json.as_deref(), text);
-    }
-
-    /// What must not be missed, on standard error.
-    pub fn warn(&self, text: &str) {
-        output::warn(text);
-    }
-
-    /// Whether everything is to be said.
-    pub fn is_verbose(&self) -> bool {
-        self.common.verbose
-    }
-
-    /// The machine-readable result.
-    pub fn json(&self, value: &impl serde::Serialize) -> Result<()> {
-        output::json(self.common.json.as_deref(), value)
-    }
-
-    /// Threads of a session; 0 is all cores.
-    pub fn threads(&self) -> Threads {
-        Threads(self.common.threads.unwrap_or(0))
-    }
-
-    /// The seed, or the paper's.
-    pub fn seed(&self) -> u64 {
-        self.common.seed.unwrap_or(BENCHMARK_SEED)
-    }
-
-    fn limit_threads(&self) {
-        if let Some(threads) = self.common.threads.filter(|threads| *threads > 0) {
-            // It can be built once in a process; this is the once.
-            let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
-        }
-    }
-
-    /// Reads the flights, and says what the reader has to say.
-    pub fn flights(&self, data: &Data, history: usize) -> Result<DataSet> {
-        let options = ReadOptions { minimum_rows: history, split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone() };
-        let set = without(data_set(&data.data, &options)?, data)?;
-        self.say(format!(
-            "{}: {} flights, {} manoeuvre classes, {:.0} s at {:.0} Hz",
-            data.data.display(),
-            set.flights.len(),
-            set.manoeuvres().len(),
-            set.duration_s(),
-            1.0 / set.flights.first().map_or(f64::NAN, |flight| flight.step_s)
-        ));
-        let notes = if self.is_verbose() { set.notes.clone() } else { notes::folded(&set.notes) };
-        notes.iter().for_each(|note| self.say(wrapped("  note: ", note)));
-        Ok(set)
-    }
-
-    /// The model of a file; without one that of a `model.toml` beside the flights, which is said; without that the paper's baseline
-    /// for the vehicle of the paper, which is a warning, as the vehicle is a guess.
-    pub fn model(&self, path: Option<&Path>, data: &Data) -> Result<Model> {
-        if let Some(model) = self.model_if_any(path, data)? {
-            return Ok(model);
-        }
-        let model = Model::from_toml("[model]\nbaseline = \"paper\"\n", Path::new("paper"))?;
-        self.warn(&format!(
-            "no model was given and {} has no {MODEL_FILE}: the paper's baseline and vehicle are assumed ({}). For another vehicle write its \
-             mass_kg, inertia and rotor_radius_m, vehicle and baseline = \"paper\" under [model] into a file and give it with -m FILE",
-            data.data.display(),
-            model.vehicle_text()
-        ));
-        Ok(model)
-    }
-
-    /// As [`Context::model`], but nothing is assumed where there is no file.
-    pub fn model_if_any(&self, path: Option<&Path>, data: &Data) -> Result<Option<Model>> {
-        if let Some(path) = path {
-            let model = Model::read(path)?;
-            self.tell_assumed(&model, path);
-            return Ok(Some(model));
-        }
-        // Beside a single log, or in the folder itself; a folder above may hold the model of something else.
-        let folder = if data.data.is_dir() { Some(data.data.as_path()) } else { data.data.parent() };
-        let Some(found) = folder.map(|folder| folder.join(MODEL_FILE)).filter(|found| found.is_file()) else { return Ok(None) };
-        let model = Model::read(&found)?;
-        self.say(wrapped("model: ", &format!("{} (`{}`, {})", found.display(), model.name, model.vehicle_text())));
-        self.tell_assumed(&model, &found);
-        Ok(Some(model))
-    }
-
-    fn tell_assumed(&self, model: &Model, path: &Path) {
-        if !model.assumed.is_nothing() {
-            let keys = [
-                ("mass_kg", model.assumed.mass),
-                ("inertia", model.assumed.inertia),
-                ("rotor_radius_m", model.assumed.rotor_radius),
-            ];
-            let missing: Vec<&str> = keys.into_iter().filter(|entry| entry.1).map(|entry| entry.0).collect();
-            self.warn(&format!(
-                "{} does not give {}: the paper's vehicle is assumed there ({})",
-                path.display(),
-                missing.join(", "),
-                model.vehicle_text()
-            ));
-        }
-    }
-
-    /// Divides the flights as the command line and the model file say.
-    pub fn split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
-        model.check_flights(flights)?;
-        let mut locked = model.data.locked.clone();
-        locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
-        let protocol = division.split.clone().unwrap_or_else(|| model.data.split.clone());
-        if division.split.is_some() && !locked.is_empty() {
-            return Err(Error::Config {
-                place: "command line".into(),
-                field: "--split".into(),
-                found: format!("`{protocol}` with locked flights ({})", locked.join(", ")),
-                expected: "one or the other: locked flights are the test part and all others train".into(),
-            });
-        }
-        let of_the_line = |found: &str| division.lock.iter().any(|name| found.starts_with(&format!("`{name}`")));
-        Split::new(flights, &locked, &protocol, self.seed()).map_err(|error| match error {
-            Error::Config { found, expected, field, .. } if field == "data.locked" && of_the_line(&found) => {
-                Error::Config { place: "command line".into(), field: "--lock".into(), found, expected }
-            }
-            other => other,
-        })
-    }
-
-    /// Divides the flights for a search. Where nothing is locked and no split is asked for, every fifth flight confirms and no search
-    /// sees it; of fewer than ten flights the last fifth of each.
-    pub fn search_split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
-        if model.data.locked.is_empty() && division.lock.is_empty() && division.split.is_none() {
-            model.check_flights(flights)?;
-            return Ok(Split::for_search(flights, self.seed()));
-        }
-        self.split(flights, model, division)
-    }
-}
-
-/// SHA-256 of the names and contents of the files that a data set was read from, the description in force among them.
-pub fn data_sha256(set: &DataSet) -> String {
-    set.source.sha256.clone()
-}
-
-/// A flag that Ctrl-C (and a polite kill) raises. Installed once.
-pub fn interruption() -> Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
-    ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))
-        .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
-    Ok(flag)
-}
-/// The word for all flights of which `check` says that they are read otherwise than the rest.
-const SUSPECTS: &str = "suspects";
-/// Times that what is left is checked again: beside the worst the next may not have shown.
-const MOST_CHECKS: usize = 3;
-
-/// The flights without those that were asked to be left out.
-fn without(mut set: DataSet, data: &Data) -> Result<DataSet> {
-    let names: Vec<String> = data.leave_out.iter().filter(|name| *name != SUSPECTS).cloned().collect();
-    set.leave_out(&names, "as --leave-out says").map_err(|error| match error {
-        Error::Config { found, expected, .. } => {
-            Error::Config { place: "command line".into(), field: "--leave-out".into(), found, expected }
-        }
-        other => other,
-    })?;
-    if data.leave_out.iter().any(|name| name == SUSPECTS) {
-        for _ in 0..MOST_CHECKS {
-            let suspects = check(&set, None).suspects();
-            if suspects.is_empty() {
-                break;
-            }
-            set.leave_out(&suspects, "as suspects")?;
-        }
-    }
-    if set.flights.is_empty() {
-        let expected = "at least one flight that is left".to_owned();
-        return Err(Error::Config {
-            place: "command line".into(),
-            field: "--leave-out".into(),
-            found: data.leave_out.join(" "),
-            expected,
-        });
-    }
-    Ok(set)
 }

@@ -1,7 +1,7 @@
 //! `predict`: the accelerations that a hybrid or a model predicts, as CSV or Parquet.
 
-use super::Context;
-use crate::arguments::Data;
+use crate::arguments::{Data, STRIDES, count};
+use crate::context::Context;
 use crate::output::Progress;
 use phyture::flight::windows::windows;
 use phyture::flight::write::{self, Values};
@@ -13,15 +13,26 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// What was asked for.
-pub struct Wanted<'a> {
-    /// Model file: what predicts without a network; with one, to be the one that it was trained on.
-    pub model: Option<&'a Path>,
-    /// Run folder or network file.
-    pub network: Option<&'a Path>,
-    /// File to write.
-    pub output: &'a Path,
-    /// Samples between predictions.
+/// Predictions for every sample: of a network, where there is a full history; or of a model alone
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture predict flights -n run -o predictions.parquet\n  phyture predict flights -m n9-calibrated.toml -o physics.csv     # physics alone"
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file: predicts alone without -n; with -n it has to be the run's own, which is taken where it is left out
+    #[arg(short, long, required_unless_present = "network")]
+    pub model: Option<PathBuf>,
+    /// Run folder
+    #[arg(short, long)]
+    pub network: Option<PathBuf>,
+    /// File to write: .csv or .parquet
+    #[arg(short, long)]
+    pub output: PathBuf,
+    /// Samples between predictions
+    #[arg(long, default_value_t = 1, allow_negative_numbers = true, value_parser = count(STRIDES))]
     pub stride: usize,
 }
 
@@ -70,9 +81,9 @@ enum Predictor {
 }
 
 impl Predictor {
-    fn new(wanted: &Wanted) -> Result<Self> {
-        let model = wanted.model.map(Model::read).transpose()?;
-        let Some(network) = wanted.network else {
+    fn new(wanted: &Args) -> Result<Self> {
+        let model = wanted.model.as_ref().map(Model::read).transpose()?;
+        let Some(network) = &wanted.network else {
             return model.map(Self::Physics).ok_or_else(|| Error::Config {
                 place: "command line".into(),
                 field: "--model, --network".into(),
@@ -81,7 +92,7 @@ impl Predictor {
             });
         };
         let hybrid = read_network(network)?;
-        match (wanted.model, model) {
+        match (&wanted.model, model) {
             (Some(path), Some(model)) if model.effects != hybrid.description().model.effects => Err(Error::Config {
                 place: path.display().to_string(),
                 field: "effect".into(),
@@ -131,12 +142,12 @@ impl Predictor {
 }
 
 /// Predicts and writes one table: flight, manoeuvre, t, measured and predicted accelerations.
-pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> {
-    let format = Format::of(wanted.output)?;
-    let target = context.new_file(wanted.output, &[])?;
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    let format = Format::of(&wanted.output)?;
+    let target = context.new_file(&wanted.output, &[])?;
     let predictor = Predictor::new(wanted)?;
     let history = predictor.history();
-    let set = context.flights(data, history)?;
+    let set = context.flights(&wanted.data, history)?;
     predictor.model().check_flights(&set.flights)?;
     let whole = |flight: usize| Span { flight, start: 0, end: set.flights[flight].len() };
     let all = windows(&(0..set.flights.len()).map(whole).collect::<Vec<_>>(), history, wanted.stride);
@@ -152,7 +163,7 @@ pub fn run(context: &Context, data: &Data, wanted: &Wanted) -> Result<ExitCode> 
     write(context.ready(&target)?, format, &set, &all, &predicted)?;
     let of = predictor.name();
     context.say(format!("{} predictions of the {of} written to {}", all.len(), wanted.output.display()));
-    context.json(&Output { predictions: wanted.output.into(), of, rows: all.len(), flights: set.flights.len() })?;
+    context.json(&Output { predictions: wanted.output.clone(), of, rows: all.len(), flights: set.flights.len() })?;
     Ok(ExitCode::SUCCESS)
 }
 
