@@ -27,5 +27,6 @@ pub mod student;
 pub mod suggest;
 pub mod tape;
 pub mod train;
+pub mod workflow;
 
 pub use error::{Error, Result};

@@ -49,6 +49,42 @@ fn say_peak(_: &mut Criterion) {
     println!("multiply-add peak at level {level}: {:.1} GFLOP/s", peak::f32_gflops(level));
 }
 
+/// Strides of a and b, by row and by column of each.
+type Strides = [isize; 4];
+
+fn matrixmultiply_product(
+    [m, k, n]: [usize; 3],
+    (a, b): (&'static [f32], &'static [f32]),
+    [row_a, column_a, row_b, column_b]: Strides,
+) -> Contender<'static> {
+    let mut c = vec![0.0_f32; m * n];
+    let product = move || {
+        let (a, b, to) = (a.as_ptr(), b.as_ptr(), c.as_mut_ptr());
+        // SAFETY: a, b and c hold m·k, k·n and m·n numbers, and the strides are those of their layouts.
+        unsafe { matrixmultiply::sgemm(m, k, n, 1.0, a, row_a, column_a, b, row_b, column_b, 0.0, to, n.cast_signed(), 1) };
+        black_box(&mut c);
+    };
+    ("matrixmultiply", Box::new(product))
+}
+
+fn gemm_product(
+    [m, k, n]: [usize; 3],
+    (a, b): (&'static [f32], &'static [f32]),
+    [row_a, column_a, row_b, column_b]: Strides,
+) -> Contender<'static> {
+    let mut c = vec![0.0_f32; m * n];
+    let product = move || {
+        let (a, b, to, row_c) = (a.as_ptr(), b.as_ptr(), c.as_mut_ptr(), n.cast_signed());
+        let alone = gemm::Parallelism::None;
+        // SAFETY: as above; c is overwritten, not read.
+        unsafe {
+            gemm::gemm(m, n, k, to, 1, row_c, false, a, column_a, row_a, b, column_b, row_b, 0.0, 1.0, false, false, false, alone);
+        }
+        black_box(&mut c);
+    };
+    ("gemm", Box::new(product))
+}
+
 fn products(criterion: &mut Criterion) {
     for (m, k, n) in [(1000, 64, 64), (500, 320, 64), (1000, 16, 64), (64, 1000, 64)] {
         let (a, b) = (&*numbers(1, m * k).leak(), &*numbers(2, k * n).leak());
@@ -66,69 +102,13 @@ fn products(criterion: &mut Criterion) {
                 Box::new(move || form(level, a_view, b_view, RowsMut::packed(black_box(&mut c), m, n), Write::Set, &mut scratch))
             });
             // Element (i, p) of a and (p, j) of b, by their distances.
-            let (stride_a, stride_b) =
-                if name == "gemm_atb" { ((1, m), (n, 1)) } else { ((k, 1), if name == "gemm_abt" { (1, k) } else { (n, 1) }) };
-            let mut c = vec![0.0_f32; m * n];
-            rows.push((
-                "matrixmultiply",
-                Box::new(move || {
-                    let (row_a, column_a, row_b, column_b) =
-                        (stride_a.0 as isize, stride_a.1 as isize, stride_b.0 as isize, stride_b.1 as isize);
-                    // SAFETY: a, b and c hold m·k, k·n and m·n numbers, and the strides are those of their layouts.
-                    unsafe {
-                        matrixmultiply::sgemm(
-                            m,
-                            k,
-                            n,
-                            1.0,
-                            a.as_ptr(),
-                            row_a,
-                            column_a,
-                            b.as_ptr(),
-                            row_b,
-                            column_b,
-                            0.0,
-                            c.as_mut_ptr(),
-                            n as isize,
-                            1,
-                        );
-                    }
-                    black_box(&mut c);
-                }),
-            ));
-            let mut c = vec![0.0_f32; m * n];
-            rows.push((
-                "gemm",
-                Box::new(move || {
-                    let [row_a, column_a, row_b, column_b] =
-                        [stride_a.0, stride_a.1, stride_b.0, stride_b.1].map(usize::cast_signed);
-                    // SAFETY: as above; c is overwritten, not read.
-                    unsafe {
-                        gemm::gemm(
-                            m,
-                            n,
-                            k,
-                            c.as_mut_ptr(),
-                            1,
-                            n.cast_signed(),
-                            false,
-                            a.as_ptr(),
-                            column_a,
-                            row_a,
-                            b.as_ptr(),
-                            column_b,
-                            row_b,
-                            0.0,
-                            1.0,
-                            false,
-                            false,
-                            false,
-                            gemm::Parallelism::None,
-                        );
-                    }
-                    black_box(&mut c);
-                }),
-            ));
+            let strides = match name {
+                "gemm_atb" => [1, m, n, 1],
+                "gemm_abt" => [k, 1, 1, k],
+                _ => [k, 1, n, 1],
+            };
+            rows.push(matrixmultiply_product([m, k, n], (a, b), strides.map(usize::cast_signed)));
+            rows.push(gemm_product([m, k, n], (a, b), strides.map(usize::cast_signed)));
             if name == "gemm_ab" {
                 let mut c = vec![0.0_f32; m * n];
                 rows.push((

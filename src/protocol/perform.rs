@@ -17,7 +17,8 @@ use crate::hybrid::{Hybrid, Scale};
 use crate::nn::Init;
 use crate::physics::{Model, calibrate};
 use crate::tape::Threads;
-use crate::train::{self, Job, RunFolder, State, TrainConfig, Trainer};
+use crate::train::{RunFolder, State, TrainConfig};
+use crate::workflow::{Begun, Ended, Event, Training};
 use phyture_kernels::random::Stream;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -204,25 +205,39 @@ impl<'a> Experiment<'a> {
         working: &Path,
         go_on: GoOn<'_>,
     ) -> Result<Trained> {
-        let job = Job::new(self.flights, split, model, config)?;
         let folder = RunFolder::create(working)?;
         // The key has everything in it that the data of a run depend on.
-        let identity = self.plan.key(run)?;
-        let data = u64::from_str_radix(&identity, 16).unwrap_or_default();
+        let data = u64::from_str_radix(&self.plan.key(run)?, 16).expect("a key is sixteen hexadecimal digits");
         let state = self.resumed(run, config, data, &folder, working)?;
-        let network = job.description.network(config.standardise_loss)?;
-        let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, self.threads)?;
-        let steps = trainer.steps();
-        let ended = folder.train(config, data, &mut trainer, &mut |report| go_on(report.step.step as f64 / steps.max(1) as f64))?;
-        if ended == train::Outcome::Stopped {
-            return Err(Error::Interrupted {
-                saved: format!("the run `{run}` goes on from step {} of {steps}", trainer.state().step),
-            });
+        let training = Training {
+            flights: self.flights,
+            split,
+            model,
+            config,
+            data,
+            folder: &folder,
+            with_losses: false,
+            threads: self.threads,
+        };
+        let mut steps = 1;
+        let ended = training.run(state, &mut |event| {
+            Ok(match event {
+                Event::Begins(begun) => {
+                    steps = begun.steps.max(1);
+                    true
+                }
+                Event::Step(report) => go_on(report.step.step as f64 / steps as f64),
+            })
+        })?;
+        match ended {
+            Ended::Trained(trained) => {
+                let Begun { parameters, windows, steps, .. } = trained.begun;
+                Ok(Trained { hybrid: trained.hybrid, parameters, windows, steps })
+            }
+            Ended::Stopped { done, steps } => {
+                Err(Error::Interrupted { saved: format!("the run `{run}` goes on from step {done} of {steps}") })
+            }
         }
-        let (parameters, windows) = (network.graph().parameter_count(), job.windows.len());
-        let weights = trainer.state().parameters.clone();
-        drop(trainer);
-        Ok(Trained { hybrid: job.hybrid(self.flights, weights, self.threads)?, parameters, windows, steps })
     }
 
     /// The state in which an interrupted run was left, if there is one. A checkpoint that cannot be gone on with is kept beside the run's

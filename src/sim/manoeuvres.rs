@@ -102,8 +102,25 @@ pub(super) fn script(class: &str, seconds: f64, random: &mut Random) -> Vec<Segm
 /// Appends one instance of the class's manoeuvre, with its entry and recovery.
 fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
     let home = start_height(class);
+    match class {
+        "hover" | "hover_low" | "vertical_sweeps" | "orientation_sweeps" | "pirouettes" | "control_steps" | "descents" => {
+            about_hover(class, home, random, segments)
+        }
+        "forward_sideways_flight" | "stop_and_go" | "turn_demos1" | "figure_eights" | "dodging_demos" => {
+            travelling(class, home, random, segments)
+        }
+        "loops" | "flips" | "rolls" | "stall_turns" | "inverted_flight" | "chaos" => aerobatic(class, home, random, segments),
+        _ => freestyle(class, home, random, segments),
+    }
+}
+
+fn spread(random: &mut Random, value: f64) -> f64 {
+    value * random.between(0.75, 1.25)
+}
+
+/// Near a place: hover, sweeps, turns on the spot, single sticks, descents.
+fn about_hover(class: &str, home: f64, random: &mut Random, segments: &mut Vec<Segment>) {
     let mut fly = |seconds: f64, height: f64, goal: Goal| segments.push(Segment { seconds, height, goal });
-    let spread = |random: &mut Random, value: f64| value * random.between(0.75, 1.25);
     match class {
         // Heights evenly spread in their logarithm, so that the ground is felt in half of them.
         "hover" => fly(random.between(3.0, 6.0), 0.8 * random.between(0.0, 8.0_f64.ln()).exp(), path(0.0, 0.0, 0.0)),
@@ -123,28 +140,6 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             let (bank, pitch) = [(bank, 0.0), (0.0, pitch), (bank, pitch)][random.below(3)];
             fly(6.0, home, Goal::Lean { bank, pitch, period: random.between(1.6, 2.8) });
             fly(2.0, home, path(0.0, 0.0, random.between(-0.8, 0.8)));
-        }
-        "forward_sideways_flight" => {
-            let (ahead, right) = [(14.0, 0.0), (-7.0, 0.0), (0.0, 8.0), (0.0, -8.0), (9.0, 6.0)][random.below(5)];
-            let pace = random.between(0.4, 1.15);
-            fly(random.between(4.0, 7.0), random.between(15.0, 45.0), path(pace * ahead, pace * right, 0.0));
-            fly(1.5, home, path(0.3 * ahead, 0.3 * right, random.sign() * random.between(0.3, 0.9)));
-        }
-        "stop_and_go" => {
-            fly(random.between(2.5, 4.0), home, path(spread(random, 11.0), 0.0, 0.0));
-            fly(random.between(1.5, 3.0), home, path(0.0, 0.0, random.between(-0.7, 0.7)));
-        }
-        "turn_demos1" => fly(spread(random, 5.0), home, path(spread(random, 9.0), 0.0, random.sign() * random.between(0.3, 0.8))),
-        "figure_eights" => {
-            let (pace, turn) = (spread(random, 9.0), random.between(0.6, 0.85));
-            let height = random.between(20.0, 50.0);
-            fly(TAU / turn, height, path(pace, 0.0, turn));
-            fly(TAU / turn, height, path(pace, 0.0, -turn));
-        }
-        "dodging_demos" => {
-            let side = random.sign() * random.between(5.0, 9.0);
-            fly(random.between(0.9, 1.6), home, path(random.between(0.0, 6.0), side, 0.0));
-            fly(random.between(0.9, 1.6), home, path(random.between(0.0, 6.0), -side, random.between(-0.5, 0.5)));
         }
         "pirouettes" => {
             let nose_turn = random.sign() * random.between(1.2, 4.0);
@@ -180,6 +175,44 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             fly(random.between(5.0, 8.0), random.between(1.0, 2.2), path(0.0, 0.0, 0.0));
             fly(6.5, home, climb(random.between(4.0, 5.5), ahead));
         }
+        _ => unreachable!("{class} is no manoeuvre of this kind"),
+    }
+}
+
+/// From place to place, upright.
+fn travelling(class: &str, home: f64, random: &mut Random, segments: &mut Vec<Segment>) {
+    let mut fly = |seconds: f64, height: f64, goal: Goal| segments.push(Segment { seconds, height, goal });
+    match class {
+        "forward_sideways_flight" => {
+            let (ahead, right) = [(14.0, 0.0), (-7.0, 0.0), (0.0, 8.0), (0.0, -8.0), (9.0, 6.0)][random.below(5)];
+            let pace = random.between(0.4, 1.15);
+            fly(random.between(4.0, 7.0), random.between(15.0, 45.0), path(pace * ahead, pace * right, 0.0));
+            fly(1.5, home, path(0.3 * ahead, 0.3 * right, random.sign() * random.between(0.3, 0.9)));
+        }
+        "stop_and_go" => {
+            fly(random.between(2.5, 4.0), home, path(spread(random, 11.0), 0.0, 0.0));
+            fly(random.between(1.5, 3.0), home, path(0.0, 0.0, random.between(-0.7, 0.7)));
+        }
+        "turn_demos1" => fly(spread(random, 5.0), home, path(spread(random, 9.0), 0.0, random.sign() * random.between(0.3, 0.8))),
+        "figure_eights" => {
+            let (pace, turn) = (spread(random, 9.0), random.between(0.6, 0.85));
+            let height = random.between(20.0, 50.0);
+            fly(TAU / turn, height, path(pace, 0.0, turn));
+            fly(TAU / turn, height, path(pace, 0.0, -turn));
+        }
+        "dodging_demos" => {
+            let side = random.sign() * random.between(5.0, 9.0);
+            fly(random.between(0.9, 1.6), home, path(random.between(0.0, 6.0), side, 0.0));
+            fly(random.between(0.9, 1.6), home, path(random.between(0.0, 6.0), -side, random.between(-0.5, 0.5)));
+        }
+        _ => unreachable!("{class} is no manoeuvre of this kind"),
+    }
+}
+
+/// Far from upright.
+fn aerobatic(class: &str, home: f64, random: &mut Random, segments: &mut Vec<Segment>) {
+    let mut fly = |seconds: f64, height: f64, goal: Goal| segments.push(Segment { seconds, height, goal });
+    match class {
         "loops" => {
             fly(3.0, home, path(12.0, 0.0, random.between(-0.3, 0.3)));
             let rate = random.between(2.2, 3.0) * if random.uniform() < 0.7 { 1.0 } else { -1.0 };
@@ -225,6 +258,22 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
             fly(PI / half.abs(), home, rates([half, 0.0, 0.0], 0.0, 1.6));
             fly(2.5, home, path(0.0, 0.0, 0.0));
         }
+        // Tumbling about all axes with the collective following the tilt, and a catch after each.
+        "chaos" => {
+            for _ in 0..1 + random.below(3) {
+                let spin = [random.between(-4.5, 4.5), random.between(-4.5, 4.5), random.between(-3.0, 3.0)];
+                fly(random.between(0.5, 1.2), home, rates(spin, 0.0, 1.7));
+            }
+            fly(random.between(1.5, 2.5), home, path(random.between(-5.0, 5.0), random.between(-5.0, 5.0), 0.0));
+        }
+        _ => unreachable!("{class} is no manoeuvre of this kind"),
+    }
+}
+
+/// A mixture, and the ingredients of it at their height.
+fn freestyle(class: &str, home: f64, random: &mut Random, segments: &mut Vec<Segment>) {
+    let mut fly = |seconds: f64, height: f64, goal: Goal| segments.push(Segment { seconds, height, goal });
+    match class {
         "freestyle_gentle" => match random.below(4) {
             0 => one("figure_eights", random, segments),
             1 => one("pirouettes_high", random, segments),
@@ -240,14 +289,6 @@ fn one(class: &str, random: &mut Random, segments: &mut Vec<Segment>) {
         "freestyle_aggressive" => {
             let kinds = ["loops", "flips", "rolls", "stall_turns", "inverted_flight", "dodging_high", "pirouettes_high"];
             one(kinds[random.below(kinds.len())], random, segments);
-        }
-        // Tumbling about all axes with the collective following the tilt, and a catch after each.
-        "chaos" => {
-            for _ in 0..1 + random.below(3) {
-                let spin = [random.between(-4.5, 4.5), random.between(-4.5, 4.5), random.between(-3.0, 3.0)];
-                fly(random.between(0.5, 1.2), home, rates(spin, 0.0, 1.7));
-            }
-            fly(random.between(1.5, 2.5), home, path(random.between(-5.0, 5.0), random.between(-5.0, 5.0), 0.0));
         }
         // Ingredients of the freestyle classes at their height.
         "pirouettes_high" => {

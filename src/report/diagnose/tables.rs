@@ -380,16 +380,12 @@ pub(super) fn provenance(report: &DiagnoseReport<'_>) -> Result<Vec<Part>> {
     add("flights", report.flights.len().to_string());
     add("searched", format!("{:.0} s", seconds(report.searched)));
     add("kept from the search", format!("{:.0} s", seconds(report.locked)));
-    if let Some(diagnosis) = report.diagnoses.last() {
-        add("data, SHA-256", diagnosis.data_sha256.clone());
-        add("phyture", diagnosis.version.clone());
-        if let Some(method) = &diagnosis.method {
-            add("seed of the search", method.seed.to_string());
-            add("blocks", format!("{} of {:.1} s", method.blocks, method.block_s));
-            add("residual taken as correlated over", format!("{} s", method.correlation_s));
-            add("largest p-value", format!("{:.5} ({} effects in play)", method.largest_p_value, method.effects_in_play));
-            add("smallest share of a channel's error", format!("{:.1} %", 100.0 * method.smallest_fall));
-        }
+    if let Some(method) = report.diagnoses.last().and_then(|diagnosis| diagnosis.method.as_ref()) {
+        add("seed of the search", method.seed.to_string());
+        add("blocks", format!("{} of {:.1} s", method.blocks, method.block_s));
+        add("residual taken as correlated over", format!("{} s", method.correlation_s));
+        add("largest p-value", format!("{:.5} ({} effects in play)", method.largest_p_value, method.effects_in_play));
+        add("smallest share of a channel's error", format!("{:.1} %", 100.0 * method.smallest_fall));
     }
     let time: f64 = report.diagnoses.iter().map(|diagnosis| diagnosis.seconds).sum();
     add("time of the search", format!("{time:.1} s"));

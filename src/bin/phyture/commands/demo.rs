@@ -4,9 +4,9 @@
 //! locked away; the paper's baseline calibrated on the rest; what is missing found, added, calibrated; the residual network trained on
 //! the baseline and on the amended model; everything judged on the locked flights.
 
-use super::compare::{Contest, write_page};
+use super::compare::write_page;
 use super::diagnose;
-use super::train::Task;
+use super::train::{Told, digest};
 use super::{CHECK_FAILED, calibrate, simulate::starting_model};
 use crate::context::{Context, interruption};
 use phyture::Result;
@@ -14,15 +14,18 @@ use phyture::critique::Comparison;
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
 use phyture::flight::split::{Protocol, Split};
-use phyture::flight::write;
+use phyture::flight::{DataSet, write};
+use phyture::hybrid::Hybrid;
 use phyture::nn::PhyTureConfig;
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate_with_explainable};
 use phyture::train::{RunFolder, TrainConfig};
+use phyture::workflow::{Contest, SearchTask, Training};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 /// Classes that neither calibration nor training sees: one gentle, one aerobatic.
@@ -84,6 +87,57 @@ pub struct Args {
     pub quick: bool,
 }
 
+/// The flights of the truth, what a model could explain of them, and what they hide, in words.
+struct Flown {
+    set: DataSet,
+    explainable: DataSet,
+    hidden: String,
+}
+
+/// Simulates the flights and writes them.
+fn fly(context: &Context, out: &Path, minutes: f64) -> Result<Flown> {
+    context.say("1. Flights of the built-in truth helicopter, with hidden effects");
+    let mut simulation = Simulation { minutes, seed: context.seed(), level: Level::TWO, ..Simulation::baseline() };
+    for (id, scale) in HIDDEN {
+        simulation = simulation.hide(id, scale)?;
+    }
+    let (set, explainable) = simulate_with_explainable(&simulation)?;
+    write::data_set_csv(&out.join("flights"), &set.flights)?;
+    let hidden = HIDDEN.map(|(id, scale)| format!("{id} x {scale}")).join(", ");
+    context.say(format!(
+        "   {} flights of {} classes, {:.0} s; hidden: {hidden}; locked: {}",
+        set.flights.len(),
+        set.manoeuvres().len(),
+        set.duration_s(),
+        LOCKED.join(", ")
+    ));
+    Ok(Flown { set, explainable, hidden })
+}
+
+/// What both networks are trained with.
+struct Settings<'a> {
+    out: &'a Path,
+    set: &'a DataSet,
+    split: &'a Split,
+    config: &'a TrainConfig,
+}
+
+/// Trains the network on a model, in a run folder of this name.
+fn trained(context: &Context, settings: &Settings, model: &Model, name: &str, interrupted: &AtomicBool) -> Result<Hybrid> {
+    let folder = RunFolder::create(settings.out.join(name))?;
+    let training = Training {
+        flights: &settings.set.flights,
+        split: settings.split,
+        model,
+        config: settings.config,
+        data: digest(name),
+        folder: &folder,
+        with_losses: true,
+        threads: context.threads(),
+    };
+    Told { training, resume: false, interrupted }.hybrid(context)
+}
+
 /// Tells the story and writes data, models, network and page into `out`.
 pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
@@ -92,22 +146,7 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     let page = context.new_page(out, "report.html")?;
     let Scale { minutes, config } = Scale::new(*quick, context.seed());
 
-    context.say("1. Flights of the built-in truth helicopter, with hidden effects");
-    let mut simulation = Simulation { minutes, seed: context.seed(), level: Level::TWO, ..Simulation::baseline() };
-    for (id, scale) in HIDDEN {
-        simulation = simulation.hide(id, scale)?;
-    }
-    let (set, explainable) = simulate_with_explainable(&simulation)?;
-    write::data_set_csv(&out.join("flights"), &set.flights)?;
-    let hidden: Vec<String> = HIDDEN.iter().map(|(id, scale)| format!("{id} x {scale}")).collect();
-    context.say(format!(
-        "   {} flights of {} classes, {:.0} s; hidden: {}; locked: {}",
-        set.flights.len(),
-        set.manoeuvres().len(),
-        set.duration_s(),
-        hidden.join(", "),
-        LOCKED.join(", ")
-    ));
+    let Flown { set, explainable, hidden } = fly(context, out, minutes)?;
 
     context.say("\n2. Conventions and timing of the data");
     let report = check(&set, None);
@@ -127,7 +166,7 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     context.say("\n4. What is missing? Found, added, calibrated, until nothing worthwhile is left");
     let options = Options { seed: context.seed(), ..Options::default() };
     let calm = Some(explainable.flights.clone());
-    let search = diagnose::Task { set: &set, split: &split, data_sha256: String::new(), options, explainable: calm };
+    let search = SearchTask { set: &set, split: &split, data_sha256: String::new(), options, explainable: calm };
     let ledger = out.join("amended.ledger.jsonl");
     let found = diagnose::amend(context, &search, &model, &ledger)?;
     found.model.write(out.join("amended.toml"))?;
@@ -135,35 +174,32 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     let Amended { rounds, model: amended } = found;
 
     context.say("\n5. The residual network, trained on the baseline and on the amended model");
-    let train = |model: &Model, name: &str| {
-        let folder = RunFolder::create(out.join(name))?;
-        Task { set: &set, split: &split, model, config: &config, identity: name, folder: &folder }.hybrid(context, &interrupted)
-    };
+    let of = Settings { out, set: &set, split: &split, config: &config };
+    let train = |model: &Model, name: &str| trained(context, &of, model, name, &interrupted);
     let (on_baseline, on_amended) = (train(&model, "run")?, train(&amended, "run-amended")?);
 
     context.say("\n6. Measured against predicted on the locked flights, which nothing saw");
-    let history = config.network.history();
+    let models = [("baseline".into(), model.clone()), ("amended".into(), amended.clone())];
+    let networks = [("baseline + network".into(), on_baseline), ("amended + network".into(), on_amended)];
     let contest = Contest {
-        models: &[("baseline".into(), model.clone()), ("amended".into(), amended.clone())],
-        networks: &[("baseline + network".into(), on_baseline), ("amended + network".into(), on_amended)],
+        models: &models,
+        networks: &networks,
         ridge: None,
-        history,
+        history: config.network.history(),
         stride: 5,
         uncertainty: false,
+        seed: context.seed(),
+        threads: context.threads(),
     };
-    let mut judged = contest.run(context, &set, &split)?;
+    let mut judged = contest.run(&set, &split)?;
     judged.set_floor(&set, &explainable.flights)?;
     context.say(format!("\n{}", judged.comparison));
     let provenance = [
-        (
-            "data".to_owned(),
-            format!("built-in truth helicopter, seed {}, {minutes} min; hidden: {}", context.seed(), hidden.join(", ")),
-        ),
+        ("data".to_owned(), format!("built-in truth helicopter, seed {}, {minutes} min; hidden: {hidden}", context.seed())),
         ("locked".to_owned(), LOCKED.join(", ")),
     ];
-    // One page: what was missing, then the network, then where everything stands.
     let title = "Hidden effects found, added, and the rest learned".to_owned();
-    let mut whole = diagnose_page(&DiagnoseReport {
+    let told = DiagnoseReport {
         title: &title,
         diagnoses: &rounds,
         together: Some(&together),
@@ -173,7 +209,9 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
         before: &model,
         after: &amended,
         provenance: &provenance,
-    })?;
+    };
+    // One page: what was missing, then the network, then where everything stands.
+    let mut whole = diagnose_page(&told)?;
     let compared = judged.page(&set, &provenance)?;
     whole.summary.extend(compared.summary);
     whole.sections.extend(compared.sections);

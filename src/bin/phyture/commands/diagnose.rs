@@ -1,98 +1,54 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
-use super::compare::{DATA_NOTE, write_page};
+use super::compare::write_page;
 use super::predict::read_network;
 use super::{CHECK_FAILED, explainable};
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, data_sha256};
+use phyture::Result;
 use phyture::critique::check;
-use phyture::critique::diagnose::{self, Amended, Diagnosis, LoopText, Options, Outcome, Verdict, calibrated, searched};
-use phyture::critique::floor_of_spans;
+use phyture::critique::diagnose::{Amended, Diagnosis, LoopText, Options, calibrated, searched};
 use phyture::critique::wrap::wrapped;
-use phyture::disk::{Target, append_lines};
+use phyture::disk::Target;
 use phyture::flight::split::{Part, Split};
-use phyture::flight::{DataSet, Flight, Span};
-use phyture::hybrid::network_target;
+use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
-use phyture::{Error, Result};
+use phyture::workflow::{SearchTask, append_to_ledger, convention_fault, network_search, provenance};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Most windows of a network with a short history that are evaluated when its output is searched; a long one costs ten times as much.
-const MOST_WINDOWS: usize = 100_000;
-/// A history of at most this many rows is short.
-const SHORT_HISTORY: usize = 256;
-
-/// Flights, and what may be searched of them.
-pub struct Task<'a> {
-    /// Flights.
-    pub set: &'a DataSet,
-    /// What is searched and what only confirms.
-    pub split: &'a Split,
-    /// Hash of the files.
-    pub data_sha256: String,
-    /// How to search.
-    pub options: Options,
-    /// The explainable part of the flights, where it is known.
-    pub explainable: Option<Vec<Flight>>,
-}
-
-impl Task<'_> {
-    /// Searches once.
-    pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
-        let (searched, locked) = (searched(self.split), &self.split.test);
-        let mut outcome = diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options)?;
-        self.label(&mut outcome.diagnosis)?;
-        diagnose::weigh(&mut outcome.diagnosis, &self.set.flights, &outcome.model, self.split)?;
-        Ok(outcome)
-    }
-
-    /// Notes what the search does not know: the hash of the files and the floor.
-    fn label(&self, diagnosis: &mut Diagnosis) -> Result<()> {
-        diagnosis.data_sha256.clone_from(&self.data_sha256);
-        if let (Some(locked), Some(explainable)) = (&mut diagnosis.locked, &self.explainable) {
-            locked.set_floor(floor_of_spans(&self.set.flights, &locked.spans, explainable)?);
-        }
-        Ok(())
-    }
-}
-
-/// The verdict where the log is not what the program takes it for.
-fn convention_fault(summary: String, data_sha256: String) -> Diagnosis {
-    Diagnosis { data_sha256, ..Diagnosis::nothing(Verdict::ConventionFault, summary) }
-}
-
-/// A folder for a page and what stands in it besides the diagnosis.
-struct Paper<'a> {
+/// The page of a diagnosis: where it goes, and what stands in it besides.
+struct DiagnosisPage<'a> {
     title: String,
     target: &'a Target,
+    command: &'static str,
+    model: String,
+    seed: u64,
+    /// Known once the flights are read.
     provenance: Vec<(String, String)>,
 }
 
-/// The page of `diagnose` and of `loop`.
+/// Its name, for `diagnose` and `loop`.
 const PAGE: &str = "diagnosis.html";
 
-impl<'a> Paper<'a> {
-    fn new(context: &Context, command: &str, data: &Data, model: &Model, target: &'a Target) -> Self {
-        let provenance = [
-            ("command", command.to_owned()),
-            ("data", data.data.display().to_string()),
-            ("model", model.name.clone()),
-            ("seed", context.seed().to_string()),
-        ];
+impl<'a> DiagnosisPage<'a> {
+    fn new(context: &Context, command: &'static str, data: &Data, model: &Model, target: &'a Target) -> Self {
         let name = data.data.file_name().unwrap_or(data.data.as_os_str()).to_string_lossy();
         Self {
             title: format!("Which physics is missing: {} on {name}", model.name),
             target,
-            provenance: provenance.map(|(what, value)| (what.to_owned(), value)).into(),
+            provenance: Vec::new(),
+            command,
+            seed: context.seed(),
+            model: model.name.clone(),
         }
     }
 
-    /// Notes of the reader, each a line of provenance.
-    fn note(&mut self, notes: &[String]) {
-        self.provenance.extend(notes.iter().map(|note| (DATA_NOTE.to_owned(), note.clone())));
+    /// Notes where the flights come from.
+    fn note(&mut self, data: &Data, set: &DataSet) {
+        self.provenance = provenance(self.command, &data.data, set, &[&self.model], self.seed);
     }
 
     /// Writes the page: of one diagnosis, or of the rounds of a loop and those together.
@@ -129,24 +85,19 @@ fn prepare(
     data: &Data,
     model: &Model,
     division: &Division,
-    paper: &mut Option<Paper<'_>>,
+    page: &mut Option<DiagnosisPage<'_>>,
 ) -> Result<Option<(DataSet, Split, String)>> {
     let set = context.flights(data, 1)?;
-    paper.iter_mut().for_each(|paper| paper.note(&set.notes));
+    page.iter_mut().for_each(|page| page.note(data, &set));
     let sha = data_sha256(&set);
     let report = check::check(&set, Some(model));
     if report.fault {
         // The notes on the data have been said, and folded.
         context.say(format!("\n{}", check::CheckReport { notes: Vec::new(), ..report.clone() }));
-        let faults = report.findings.iter().filter(|finding| finding.verdict == check::Verdict::Fault);
-        let notes = faults.map(|finding| match &finding.set {
-            Some(set) => format!("{}; set {set}", finding.message),
-            None => finding.message.clone(),
-        });
-        let diagnosis = Diagnosis { notes: notes.collect(), ..convention_fault(report.summary.clone(), sha) };
-        if let Some(paper) = &paper {
+        let diagnosis = convention_fault(&report, sha);
+        if let Some(page) = &page {
             let split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
-            paper.write(context, [std::slice::from_ref(&diagnosis), &[]], &set.flights, &split, [model, model])?;
+            page.write(context, [std::slice::from_ref(&diagnosis), &[]], &set.flights, &split, [model, model])?;
         }
         context.json(&diagnosis)?;
         return Ok(None);
@@ -171,7 +122,7 @@ pub struct Args {
     /// Flights.
     #[command(flatten)]
     pub data: Data,
-    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]; effects switched off in it are tried too
+    /// Model file [default: DATA/model.toml if there is one, or the page's baseline and vehicle]; effects switched off in it are tried too
     #[arg(short, long)]
     pub model: Option<PathBuf>,
     /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
@@ -209,38 +160,28 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     };
     truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let target = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    let mut paper = target.as_ref().map(|target| Paper::new(context, "diagnose", data, &model, target));
-    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
+    let mut page = target.as_ref().map(|target| DiagnosisPage::new(context, "diagnose", data, &model, target));
+    let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut page)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     if let Some(hybrid) = hybrid {
-        let samples: usize = set.flights.iter().map(Flight::len).sum();
-        let affordable = if hybrid.description().config.history() <= SHORT_HISTORY { MOST_WINDOWS } else { MOST_WINDOWS / 10 };
-        let stride = samples.div_ceil(affordable).max(1);
+        let found = network_search(&hybrid, &set, &split, context.threads())?;
         context.say(format!(
-            "searching what the network learned, in place of the measured accelerations: every {stride}{} sample",
-            if stride == 1 { "st" } else { "th" }
+            "searching what the network learned, in place of the measured accelerations: every {}{} sample",
+            found.stride,
+            if found.stride == 1 { "st" } else { "th" }
         ));
-        let whole: Vec<Span> =
-            set.flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() }).collect();
-        let target = network_target(&hybrid, &set.flights, &whole, stride, context.threads())?;
-        split = Split {
-            training: target.spans(&split.training),
-            validation: target.spans(&split.validation),
-            test: target.spans(&split.test),
-            tested: split.tested,
-        };
-        set = target.set;
+        (set, split) = (found.set, found.split);
     }
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
     let explainable = read_explainable(data, truth, &split)?;
-    let task = Task { set: &set, split: &split, data_sha256, options, explainable };
+    let task = SearchTask { set: &set, split: &split, data_sha256, options, explainable };
     let outcome = task.diagnose(&model)?;
     context.say(format!("\n{}", told(context, &outcome.diagnosis)));
-    if let Some(paper) = paper {
+    if let Some(page) = page {
         let before = calibrated(&model, &set.flights, &split)?;
         let after = if outcome.diagnosis.accepted.is_empty() { &before } else { &outcome.model };
-        paper.write(context, [std::slice::from_ref(&outcome.diagnosis), &[]], &set.flights, &split, [&before, after])?;
+        page.write(context, [std::slice::from_ref(&outcome.diagnosis), &[]], &set.flights, &split, [&before, after])?;
     }
     context.json(&outcome.diagnosis)?;
     Ok(ExitCode::SUCCESS)
@@ -249,21 +190,6 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
 /// A diagnosis as text: in short, or with every effect that was tried.
 fn told(context: &Context, diagnosis: &Diagnosis) -> String {
     if context.is_verbose() { format!("{diagnosis:#}") } else { diagnosis.to_string() }
-}
-
-/// One line of the ledger.
-#[derive(Serialize)]
-struct LedgerLine<'a> {
-    round: usize,
-    effect: &'a str,
-    coefficients: &'a [phyture::critique::diagnose::Number],
-    parameters: &'a [phyture::critique::diagnose::ParameterValue],
-    selection_frequency: f64,
-    indistinguishable: &'a [String],
-    p_value: f64,
-    rmse_locked: Option<phyture::critique::PerChannel>,
-    data_sha256: &'a str,
-    version: &'a str,
 }
 
 /// What `loop --json` writes.
@@ -279,16 +205,15 @@ struct LoopOutput {
 
 /// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger. A round by itself is told only in the verbose
 /// text; what all found is the caller's to tell (see [`told_together`]).
-pub fn amend(context: &Context, task: &Task<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
-    diagnose::amend(&task.set.flights, model, task.split, &task.options, &mut |round, diagnosis| {
-        task.label(diagnosis)?;
+pub fn amend(context: &Context, task: &SearchTask<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
+    task.amend(model, &mut |round, diagnosis| {
         if context.is_verbose() {
             context.say(format!("\nRound {round}\n{diagnosis:#}"));
         } else {
             context.say(progress(diagnosis));
         }
         if diagnosis.is_confirmed() {
-            append(ledger, round, diagnosis)?;
+            append_to_ledger(ledger, round, diagnosis)?;
         }
         Ok(())
     })
@@ -307,38 +232,12 @@ fn progress(diagnosis: &Diagnosis) -> String {
 
 /// The rounds of a loop as one diagnosis, which is told: all effects as one list, and what they did to the errors. `before` is the model as
 /// it was given, calibrated.
-pub fn told_together(context: &Context, task: &Task<'_>, before: &Model, amended: &Amended) -> Result<Diagnosis> {
-    let mut together = diagnose::together(&task.set.flights, before, amended, task.split)?;
-    task.label(&mut together)?;
+pub fn told_together(context: &Context, task: &SearchTask<'_>, before: &Model, amended: &Amended) -> Result<Diagnosis> {
+    let together = task.together(before, amended)?;
     let text = LoopText(&together);
     let text = if context.is_verbose() { format!("{text:#}") } else { text.to_string() };
     context.say(format!("\n{}", text.trim_end()));
     Ok(together)
-}
-
-/// Adds lines at the end of the ledger and never changes what is there. A round that a killed run has written stands in it once.
-fn append(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
-    let mut lines = Vec::new();
-    for step in &diagnosis.steps {
-        let line = LedgerLine {
-            round,
-            effect: &step.effect,
-            coefficients: &step.coefficients,
-            parameters: &step.parameters,
-            selection_frequency: step.selection_frequency,
-            indistinguishable: &step.indistinguishable,
-            p_value: step.p_value,
-            rmse_locked: diagnosis
-                .locked
-                .as_ref()
-                .and_then(|locked| locked.waterfall.iter().find(|bar| bar.added.contains(&step.effect)))
-                .map(|bar| bar.rmse),
-            data_sha256: &diagnosis.data_sha256,
-            version: &diagnosis.version,
-        };
-        lines.push(serde_json::to_string(&line).map_err(|error| Error::Undetermined(error.to_string()))?);
-    }
-    append_lines(ledger, &lines)
 }
 
 /// Diagnose, add, calibrate, until nothing worthwhile is left; appends to a ledger beside the model
@@ -353,7 +252,7 @@ pub struct LoopArgs {
     /// Flights.
     #[command(flatten)]
     pub data: Data,
-    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
+    /// Model file [default: DATA/model.toml if there is one, or the page's baseline and vehicle]
     #[arg(short, long)]
     pub model: Option<PathBuf>,
     /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
@@ -376,16 +275,16 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     let LoopArgs { data, output, division, .. } = wanted;
     let (model, truth) = (wanted.model.as_deref(), wanted.explainable.as_deref());
     let target = context.new_file(output, model.as_slice())?;
-    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    let page_file = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
     truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let model = context.model(model, data)?;
-    let mut paper = page.as_ref().map(|page| Paper::new(context, "loop", data, &model, page));
-    let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut paper)? else {
+    let mut page = page_file.as_ref().map(|page_file| DiagnosisPage::new(context, "loop", data, &model, page_file));
+    let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut page)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
     let options = Options { seed: context.seed(), ..Options::default() };
     let explainable = read_explainable(data, truth, &split)?;
-    let task = Task { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
+    let task = SearchTask { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
     let ledger = output.with_extension("ledger.jsonl");
     let before = calibrated(&model, &set.flights, &split)?;
     let mut amended = amend(context, &task, &model, &ledger)?;
@@ -400,10 +299,10 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     if let Some(ledger) = &ledger {
         context.say(wrapped("ledger: ", &written(ledger, &amended.rounds)));
     }
-    if let Some(paper) = paper {
+    if let Some(page) = page {
         let after = if amended.rounds.iter().any(Diagnosis::is_confirmed) { &amended.model } else { &before };
         let told = [amended.rounds.as_slice(), std::slice::from_ref(&together)];
-        paper.write(context, told, &set.flights, &split, [&before, after])?;
+        page.write(context, told, &set.flights, &split, [&before, after])?;
     }
     context.json(&LoopOutput { rounds: amended.rounds, together, model: output.into(), ledger })?;
     Ok(ExitCode::SUCCESS)
@@ -429,7 +328,7 @@ fn written(ledger: &Path, rounds: &[Diagnosis]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use phyture::critique::diagnose::{Locked, Step};
+    use phyture::critique::diagnose::{Locked, Step, Verdict};
 
     fn round(effects: &[&str], confirmed: bool) -> Diagnosis {
         let step = |effect: &&str| Step { effect: (*effect).into(), channels: vec!["vx_dot".into()], ..Step::default() };

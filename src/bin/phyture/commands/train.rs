@@ -3,11 +3,11 @@
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, data_sha256, interruption};
 use crate::output::Progress;
-use phyture::flight::split::Split;
-use phyture::flight::{Column, DataSet};
+use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
-use phyture::train::{Job, Outcome, Report, RunFolder, TrainConfig, Trainer};
+use phyture::train::{Report, RunFolder, TrainConfig};
+use phyture::workflow::{Begun, Ended, Event, Trained, Training};
 use phyture::{Error, Result};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -118,8 +118,17 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let split = context.split(&set.flights, &model, &wanted.division)?;
     let identity = format!("{}\n{}\n{split:?}", data_sha256(&set), model.to_toml()?);
     let interrupted = interruption()?;
-    let task = Task { set: &set, split: &split, model: &model, config: &config, identity: &identity, folder: &folder };
-    let output = task.run(context, wanted.resume, &interrupted)?;
+    let training = Training {
+        flights: &set.flights,
+        split: &split,
+        model: &model,
+        config: &config,
+        data: digest(&identity),
+        folder: &folder,
+        with_losses: true,
+        threads: context.threads(),
+    };
+    let output = Told { training, resume: wanted.resume, interrupted: &interrupted }.run(context)?;
     context.json(&output)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -157,99 +166,105 @@ impl std::fmt::Display for Epoch {
     }
 }
 
-/// A training run, whoever asked for it.
-pub struct Task<'a> {
-    /// Flights.
-    pub set: &'a DataSet,
-    /// What trains.
-    pub split: &'a Split,
-    /// The calibrated model.
-    pub model: &'a Model,
-    /// Settings.
-    pub config: &'a TrainConfig,
-    /// Tells one set of training data from another when a run is resumed.
-    pub identity: &'a str,
-    /// Run folder.
-    pub folder: &'a RunFolder,
+/// A training run, as it is told.
+pub struct Told<'a> {
+    /// What is done.
+    pub training: Training<'a>,
+    /// Go on from the checkpoint.
+    pub resume: bool,
+    /// Raised by Ctrl-C.
+    pub interrupted: &'a AtomicBool,
 }
 
-impl Task<'_> {
-    /// Trains to the end and reads back the hybrid.
-    pub fn hybrid(&self, context: &Context, interrupted: &AtomicBool) -> Result<Hybrid> {
-        Hybrid::read(&self.run(context, false, interrupted)?.network)
+/// What tells one set of training data from another, as a number.
+pub fn digest(identity: &str) -> u64 {
+    let digest = Sha256::digest(identity.as_bytes());
+    u64::from_le_bytes(*digest.first_chunk().expect("it has 32 bytes"))
+}
+
+impl Told<'_> {
+    /// Trains to the end, writes the network and reads back the hybrid.
+    pub fn hybrid(&self, context: &Context) -> Result<Hybrid> {
+        Hybrid::read(&self.run(context)?.network)
     }
 
-    fn run(&self, context: &Context, resume: bool, interrupted: &AtomicBool) -> Result<Output> {
-        let Task { set, split, model, config, identity, folder } = *self;
+    fn run(&self, context: &Context) -> Result<Output> {
+        let Training { config, folder, data, .. } = self.training;
         let begun = Instant::now();
-        let job = Job::new(&set.flights, split, model, config)?;
-        let digest = Sha256::digest(identity.as_bytes());
-        let digest = digest.first_chunk().map_or(0, |bytes| u64::from_le_bytes(*bytes));
-        let state = resume.then(|| folder.resume(config, digest)).transpose()?;
-        let network = job.description.network(config.standardise_loss)?;
-        let trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, context.threads())?;
-        let mut trainer = trainer.with_validation(&job.validation);
-        context.say(format!(
-            "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs; {}",
-            network.graph().parameter_count(),
-            job.windows.len(),
-            config.network.history(),
-            trainer.steps(),
-            config.batch,
-            config.epochs,
-            match job.validation.len() {
-                0 => "this split has no validation part".to_owned(),
-                windows => format!("{windows} windows validate"),
-            }
-        ));
-        if !resume {
-            // Only now does the old run go, if there is one: everything that the new one needs has been read.
-            folder.clear()?;
-        }
-        let mut progress = Progress::new("training", trainer.steps(), trainer.state().step);
+        let state = self.resume.then(|| folder.resume(config, data)).transpose()?;
         let mut epoch = Epoch::default();
-        let outcome = folder.train(config, digest, &mut trainer, &mut |report| {
-            epoch.take(report);
-            progress.at(report.step.step, || format!("{epoch}  rate {:.2e}", report.step.rate));
-            !interrupted.load(Ordering::Relaxed)
+        let mut progress = None;
+        let ended = self.training.run(state, &mut |event| {
+            match event {
+                Event::Begins(begun) => {
+                    say_begun(context, config, &begun);
+                    if !self.resume {
+                        // Only now does the old run go, if there is one: everything that the new one needs has been read.
+                        folder.clear()?;
+                    }
+                    progress = Some(Progress::new("training", begun.steps, begun.done));
+                }
+                Event::Step(report) => {
+                    epoch.take(report);
+                    let progress = progress.as_mut().expect("a run begins before its steps");
+                    progress.at(report.step.step, || format!("{epoch}  rate {:.2e}", report.step.rate));
+                }
+            }
+            Ok(!self.interrupted.load(Ordering::Relaxed))
         })?;
         drop(progress);
-        if outcome == Outcome::Stopped {
-            let saved = format!(
-                "saved after step {} of {} in {}; go on with --resume",
-                trainer.state().step,
-                trainer.steps(),
-                folder.checkpoint().display()
-            );
-            return Err(Error::Interrupted { saved });
+        match ended {
+            Ended::Trained(trained) => write(context, folder, &trained, epoch.loss(), begun),
+            Ended::Stopped { done, steps } => {
+                let saved = format!("saved after step {done} of {steps} in {}; go on with --resume", folder.checkpoint().display());
+                Err(Error::Interrupted { saved })
+            }
         }
-        let (training_loss, validation_loss) = (trainer.training_loss()?, trainer.validation_loss()?);
-        let (steps, windows, kept) = (trainer.steps(), job.windows.len(), job.gate_windows.len());
-        let validation_windows = job.validation.len();
-        let parameters = trainer.state().parameters.clone();
-        let hybrid = job.hybrid(&set.flights, parameters, context.threads())?;
-        if kept > 0 {
-            let factors = Column::TARGETS.iter().zip(hybrid.description().gate);
-            let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
-            context.say(format!("gate, from {kept} windows kept from training: {}", shown.join("  ")));
-        }
-        hybrid.write(&folder.network())?;
-        let validation = validation_loss.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
-        context.say(format!(
-            "trained in {:.0} s: {}, training loss {training_loss:.4}, validation loss {validation}",
-            begun.elapsed().as_secs_f64(),
-            folder.network().display()
-        ));
-        Ok(Output {
-            network: folder.network(),
-            parameters: network.graph().parameter_count(),
-            windows,
-            steps,
-            training_loss,
-            validation_loss,
-            validation_windows,
-            last_epoch_loss: epoch.loss(),
-            seconds: begun.elapsed().as_secs_f64(),
-        })
     }
+}
+
+fn say_begun(context: &Context, config: &TrainConfig, begun: &Begun) {
+    context.say(format!(
+        "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs; {}",
+        begun.parameters,
+        begun.windows,
+        config.network.history(),
+        begun.steps,
+        config.batch,
+        config.epochs,
+        match begun.validation_windows {
+            0 => "this split has no validation part".to_owned(),
+            windows => format!("{windows} windows validate"),
+        }
+    ));
+}
+
+/// Writes the network and says what came of it.
+fn write(context: &Context, folder: &RunFolder, trained: &Trained, last_epoch_loss: Option<f64>, begun: Instant) -> Result<Output> {
+    let Trained { hybrid, begun: Begun { parameters, windows, validation_windows, steps, .. }, gate_windows, losses } = trained;
+    let losses = losses.expect("they were asked for");
+    if *gate_windows > 0 {
+        let factors = Column::TARGETS.iter().zip(hybrid.description().gate);
+        let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
+        context.say(format!("gate, from {gate_windows} windows kept from training: {}", shown.join("  ")));
+    }
+    hybrid.write(&folder.network())?;
+    let validation = losses.validation.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
+    let seconds = begun.elapsed().as_secs_f64();
+    context.say(format!(
+        "trained in {seconds:.0} s: {}, training loss {:.4}, validation loss {validation}",
+        folder.network().display(),
+        losses.training
+    ));
+    Ok(Output {
+        network: folder.network(),
+        parameters: *parameters,
+        windows: *windows,
+        steps: *steps,
+        training_loss: losses.training,
+        validation_loss: losses.validation,
+        validation_windows: *validation_windows,
+        last_epoch_loss,
+        seconds,
+    })
 }
