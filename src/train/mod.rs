@@ -11,8 +11,10 @@ pub mod schedule;
 #[cfg(feature = "files")]
 mod text;
 pub mod trainer;
+mod training;
 
 pub use config::TrainConfig;
 pub use job::Job;
 pub use run::{Outcome, Report, RunFolder};
 pub use trainer::{State, StepReport, Trainer};
+pub use training::{Begun, Ended, Event, Losses, Trained, Training};

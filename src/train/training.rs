@@ -1,13 +1,13 @@
 //! One training run, from flights and a calibrated model to a hybrid, whoever asked for it: with checkpoints, stopped and gone on with as the
-//! caller wants. Configuration, schedule and checkpoints are those of `train`.
+//! caller wants. What trains step by step is the trainer.
 
+use super::{Job, Outcome, Report, RunFolder, State, TrainConfig, Trainer};
 use crate::error::Result;
 use crate::flight::Flight;
 use crate::flight::split::Split;
 use crate::hybrid::Hybrid;
 use crate::physics::Model;
 use crate::tape::Threads;
-use crate::train::{Job, Outcome, Report, RunFolder, State, TrainConfig, Trainer};
 
 /// A training run.
 #[derive(Clone, Copy)]
