@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Many effects missing at once: simulates, runs `phyture loop`, and prints the rows of the README's table "Tested with much missing at once".
+"""Many effects missing at once: simulates, runs `phyture loop`, and prints the rows of the table "Tested with much missing at once" of docs/results.md.
 
     cargo build --release --features cli
     python3 benches/many_effects.py target/release/phyture OUT [SEED...]

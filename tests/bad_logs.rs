@@ -1,4 +1,5 @@
 //! Flights of the simulator with one thing wrong each: what `check` says, and the `dataset.toml` that it suggests, with which nothing is at fault.
+#![cfg(feature = "files")]
 
 use phyture::Error;
 use phyture::critique::check::{Verdict, check};

@@ -1,4 +1,4 @@
-//! The numbers that decide, each with its reason. Chosen on development data (README, "How it was tested"), never on data that are
+//! The numbers that decide, each with its reason. Chosen on development data (docs/results.md, "Tested on data with a hidden effect"), never on data that are
 //! reported.
 
 /// Length of a block, s: ten times the time over which gusts and manoeuvres of a small helicopter keep a residual correlated.

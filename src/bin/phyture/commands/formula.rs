@@ -3,7 +3,7 @@
 use crate::context::Context;
 use phyture::Result;
 use phyture::formula::{Formula, functions};
-use phyture::physics::standard_names;
+use phyture::physics::{signal_named, standard_names};
 use serde_json::json;
 use std::fmt::Write;
 use std::process::ExitCode;
@@ -54,6 +54,11 @@ pub struct Args {
     pub formula: Option<String>,
 }
 
+/// Whether a log or the model gives a value of this name.
+fn is_known(name: &str) -> bool {
+    standard_names().contains(&name) || signal_named(name).is_some()
+}
+
 /// Prints the language, or what `formula` is read as.
 pub fn run(context: &Context, Args { formula }: &Args) -> Result<ExitCode> {
     let Some(text) = formula else {
@@ -63,9 +68,9 @@ pub fn run(context: &Context, Args { formula }: &Args) -> Result<ExitCode> {
     };
     let formula = Formula::parse(text)?;
     // Names that no log has of itself may be parameters; whether the times of lags and delays are numbers is seen when it is bound.
-    formula.stream_with(STEP_S, &|name| (!standard_names().contains(&name)).then_some(1.0))?;
+    formula.stream_with(STEP_S, &|name| (!is_known(name)).then_some(1.0))?;
     context.say(&formula);
-    let (known, own): (Vec<&str>, Vec<&str>) = formula.names().into_iter().partition(|name| standard_names().contains(name));
+    let (known, own): (Vec<&str>, Vec<&str>) = formula.names().into_iter().partition(|name| is_known(name));
     if !known.is_empty() {
         context.say(format!("reads {}", known.join(", ")));
     }
