@@ -122,7 +122,7 @@ pub struct Args {
     /// Flights.
     #[command(flatten)]
     pub data: Data,
-    /// Model file [default: DATA/model.toml if there is one, or the page's baseline and vehicle]; effects switched off in it are tried too
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]; effects switched off in it are tried too
     #[arg(short, long)]
     pub model: Option<PathBuf>,
     /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
@@ -252,7 +252,7 @@ pub struct LoopArgs {
     /// Flights.
     #[command(flatten)]
     pub data: Data,
-    /// Model file [default: DATA/model.toml if there is one, or the page's baseline and vehicle]
+    /// Model file [default: DATA/model.toml if there is one, or the paper's baseline and vehicle]
     #[arg(short, long)]
     pub model: Option<PathBuf>,
     /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
