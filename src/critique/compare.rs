@@ -3,100 +3,18 @@
 //! Takes predictions as numbers, whoever made them; which windows and which channels are worth judging is the caller's
 //! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
 
+use super::channels::{Intervals, PerChannel};
 use super::contest::{self, Best, Difference, RowSums};
+use super::predictions::{Row, check_row, measured, variation};
 use super::regime::Regime;
 use super::shares::Shares;
 use super::uncertainty::Uncertainty;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::flight::split::Part;
-use crate::flight::{Column, Flight, Targets, Window};
+use crate::flight::{Flight, Targets, Window};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// The predictions of one model.
-#[derive(Clone, Debug)]
-pub struct Row {
-    /// Name of the model.
-    pub name: String,
-    /// Predicted accelerations in the order of [`Column::TARGETS`], one entry a window, in the order of the windows.
-    pub predicted: Vec<[f64; 6]>,
-}
-
-/// A number for each channel, and their arithmetic mean. `None` (JSON `null`) where there is nothing to compute it from.
-///
-/// The mean mixes m/s² and rad/s² as the paper's tables do: it ranks models on one data set and means nothing else.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PerChannel {
-    /// d(vx)/dt, m/s² for an error.
-    pub vx_dot: Option<f64>,
-    /// d(vy)/dt, m/s².
-    pub vy_dot: Option<f64>,
-    /// d(vz)/dt, m/s².
-    pub vz_dot: Option<f64>,
-    /// d(wx)/dt, rad/s².
-    pub wx_dot: Option<f64>,
-    /// d(wy)/dt, rad/s².
-    pub wy_dot: Option<f64>,
-    /// d(wz)/dt, rad/s².
-    pub wz_dot: Option<f64>,
-    /// Arithmetic mean of the six, absent if one of them is.
-    pub mean: Option<f64>,
-}
-
-impl PerChannel {
-    /// From values in the order of [`Column::TARGETS`]. Values that are not finite become `None`.
-    pub fn new(values: [Option<f64>; 6]) -> Self {
-        let [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot] = values.map(|value| value.filter(|value| value.is_finite()));
-        let all: Option<Vec<f64>> = [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot].into_iter().collect();
-        let mean = all.map(|values| values.iter().sum::<f64>() / values.len() as f64);
-        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot, mean }
-    }
-
-    /// The six values in the order of [`Column::TARGETS`].
-    pub const fn channels(&self) -> [Option<f64>; 6] {
-        [self.vx_dot, self.vy_dot, self.vz_dot, self.wx_dot, self.wy_dot, self.wz_dot]
-    }
-}
-
-/// A 95 % interval for each channel, from the scatter between blocks of ten seconds; `None` with fewer than two blocks.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Intervals {
-    /// d(vx)/dt, m/s².
-    pub vx_dot: Option<[f64; 2]>,
-    /// d(vy)/dt, m/s².
-    pub vy_dot: Option<[f64; 2]>,
-    /// d(vz)/dt, m/s².
-    pub vz_dot: Option<[f64; 2]>,
-    /// d(wx)/dt, rad/s².
-    pub wx_dot: Option<[f64; 2]>,
-    /// d(wy)/dt, rad/s².
-    pub wy_dot: Option<[f64; 2]>,
-    /// d(wz)/dt, rad/s².
-    pub wz_dot: Option<[f64; 2]>,
-    /// Of the mean of the six, where it was asked for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mean: Option<[f64; 2]>,
-}
-
-impl Intervals {
-    pub(super) fn new(values: [Option<[f64; 2]>; 6]) -> Self {
-        let finite = |interval: &[f64; 2]| interval.iter().all(|bound| bound.is_finite());
-        let [vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot] = values.map(|value| value.filter(finite));
-        Self { vx_dot, vy_dot, vz_dot, wx_dot, wy_dot, wz_dot, mean: None }
-    }
-
-    /// The same with an interval of the mean.
-    pub(super) fn with_mean(mut self, mean: Option<[f64; 2]>) -> Self {
-        self.mean = mean.filter(|bounds| bounds.iter().all(|bound| bound.is_finite()));
-        self
-    }
-
-    /// The six intervals in the order of [`Column::TARGETS`].
-    pub const fn channels(&self) -> [Option<[f64; 2]>; 6] {
-        [self.vx_dot, self.vy_dot, self.vz_dot, self.wx_dot, self.wy_dot, self.wz_dot]
-    }
-}
 
 /// Error over a part of the windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -253,43 +171,6 @@ fn errors(row: &Row, measured: &[[f64; 6]]) -> Vec<[f64; 6]> {
     measured.iter().zip(&row.predicted).map(|(y, p)| std::array::from_fn(|channel| y[channel] - p[channel])).collect()
 }
 
-/// The measured accelerations at the last row of each window, in the order of [`Column::TARGETS`].
-///
-/// # Errors
-/// [`Error::Shape`] if a window lies outside its flight.
-pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f64; 6]>> {
-    let target = |window: &Window| {
-        let flight = flights.get(window.flight)?;
-        (window.last < flight.len()).then(|| Column::TARGETS.map(|column| flight.column(column)[window.last]))
-    };
-    let fault = |window: &Window| Error::Shape {
-        operation: "compare",
-        message: format!("a window ends at row {} of flight {}, which is not there", window.last, window.flight),
-    };
-    windows.iter().map(|window| target(window).ok_or_else(|| fault(window))).collect()
-}
-
-/// Standard deviation of the measured accelerations over the windows, m/s² and rad/s²: what makes errors of different channels
-/// comparable. `None` for a channel that does not vary.
-///
-/// # Errors
-/// [`Error::Shape`] if a window lies outside its flight.
-pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<PerChannel> {
-    let measured = measured(flights, windows)?;
-    let one = |channel| Some((variation(&measured, channel)? / measured.len() as f64).sqrt());
-    Ok(PerChannel::new(std::array::from_fn(one)))
-}
-
-/// Refuses a row that has not one prediction a window.
-pub(super) fn check_row(row: &Row, windows: &[Window]) -> Result<()> {
-    if row.predicted.len() == windows.len() {
-        return Ok(());
-    }
-    let message =
-        format!("`{}` has {} predictions for {} windows; one each is needed", row.name, row.predicted.len(), windows.len());
-    Err(Error::Shape { operation: "compare", message })
-}
-
 /// To which block, manoeuvre and regime each window belongs.
 struct Groups {
     blocks: Blocks,
@@ -389,15 +270,6 @@ fn model_error(row: &Row, errors: &[[f64; 6]], measured: &[[f64; 6]], groups: &G
     }
 }
 
-/// Σ (y − ȳ)² of one channel; `None` if the channel is constant up to rounding, or there is nothing.
-pub(super) fn variation(measured: &[[f64; 6]], channel: usize) -> Option<f64> {
-    let count = measured.len() as f64;
-    let mean = measured.iter().map(|y| y[channel]).sum::<f64>() / count;
-    let total: f64 = measured.iter().map(|y| (y[channel] - mean).powi(2)).sum();
-    let rounding = count * (count * f64::EPSILON * mean.abs()).powi(2);
-    (total > rounding).then_some(total)
-}
-
 /// Files of earlier versions state no stride.
 const fn one() -> usize {
     1
@@ -410,6 +282,8 @@ fn is_zero(count: &usize) -> bool {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
+    use crate::error::Error;
+    use crate::flight::Column;
     use phyture_kernels::Tolerance;
     use proptest::prelude::*;
 

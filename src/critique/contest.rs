@@ -1,7 +1,7 @@
 //! Which of several models is best, and is that more than chance? Differences of errors are paired: every model is judged on the same
 //! blocks of ten seconds, so a hard block is no scatter of the difference. No prediction is made and nothing printed here.
 
-use super::compare::{Intervals, PerChannel};
+use super::channels::{Intervals, PerChannel};
 use crate::blocks::{BlockMean, BlockSum};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,6 +1,6 @@
 //! The floor: what no model can remove of the error, where the explainable part of the flights is known, as it is of simulated ones.
 
-use super::PerChannel;
+use super::channels::PerChannel;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Span, Window};
 

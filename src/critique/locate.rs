@@ -3,7 +3,7 @@
 //! Descriptions for a person to look at. Nothing here is a test of a hypothesis: which physical effect explains the residual,
 //! and how sure that is, is asked elsewhere, on flights not looked at here.
 
-use super::compare::{Row, check_row, measured, variation};
+use super::predictions::{Row, check_row, measured, variation};
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span, Window};

@@ -1,11 +1,14 @@
 //! The critique: where a model fails against the measurements, and by how much.
 
+pub mod channels;
 pub mod check;
 pub mod compare;
 pub mod contest;
 pub mod diagnose;
+pub mod digits;
 mod floor;
 pub mod locate;
+pub mod predictions;
 pub mod regime;
 pub mod residual_views;
 pub mod shares;
@@ -15,9 +18,11 @@ pub mod unknown;
 pub mod wrap;
 pub mod yardstick;
 
-pub use compare::{Comparison, ModelError, PartError, PerChannel, Row, compare, paired};
+pub use channels::{Intervals, PerChannel};
+pub use compare::{Comparison, ModelError, PartError, compare, paired};
 pub use contest::{Best, Difference};
 pub use floor::{floor, floor_of_spans};
+pub use predictions::Row;
 pub use regime::Regime;
 pub use shares::{Shares, shares};
 pub use uncertainty::{Uncertainty, uncertainty};

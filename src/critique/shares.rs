@@ -9,8 +9,9 @@
 //! gusts, and physics that the network did not learn: it bounds the noise from above and is not the noise.
 
 use super::Row;
-use super::compare::{PerChannel, check_row, measured, variation};
-use super::table::{aligned, significant};
+use super::channels::PerChannel;
+use super::digits::{aligned, significant};
+use super::predictions::{check_row, measured, variation};
 use super::wrap::wrapped;
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;

@@ -4,8 +4,8 @@
 //! Totals use the correlations that the model keeps: where two coefficients are known well only together (thrust and its bias at a nearly
 //! constant collective), both move the prediction far and their sum does not. The uncertainty of the network's own weights is no part of it.
 
-use super::compare::PerChannel;
-use super::table::{Kind, aligned};
+use super::channels::PerChannel;
+use super::digits::{Kind, aligned};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Window};
 use crate::hybrid::Hybrid;

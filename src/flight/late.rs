@@ -6,9 +6,6 @@ use super::convert::Columns;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-/// Largest time by which a stream can be late or early, s.
-pub(super) const LARGEST_S: f64 = 1.0;
-
 /// Moves columns that come late by so many seconds (early, if negative) to where they belong, to the nearest sample. Returns the rows that then
 /// have a value of every stream; what stands in the others is the nearest there is.
 pub(super) fn in_step(columns: &mut Columns, late: &BTreeMap<Column, f64>, step_s: f64, rows: usize) -> Range<usize> {

@@ -3,7 +3,6 @@
 //! Names, endings and kinds of nodes are looked at; no log is opened. Only plain files are logs: pipes and devices are never opened,
 //! and a symbolic link that leads back to the folder itself is not followed.
 
-use super::read::DESCRIPTION;
 use super::schema::{Manoeuvre, Schema};
 use super::stanford;
 use super::table::fault;
@@ -38,6 +37,8 @@ struct Unread {
 }
 
 const KINDS: &str = "a .csv or .parquet file, or a folder of them";
+
+pub(super) const DESCRIPTION: &str = "dataset.toml";
 
 /// Files that this program writes beside flights and that are no news to anybody.
 const COMPANIONS: [&str; 3] = [DESCRIPTION, "model.toml", "truth.json"];

@@ -5,7 +5,7 @@
 //! filled in, or mended on the description's word is said in [`DataSet::notes`]. What was read is recorded in [`DataSet::source`].
 
 use super::assemble::{Assembled, Cuts, assemble, gather};
-use super::listing::{Listing, Log, check_unique, ending, list};
+use super::listing::{DESCRIPTION, Listing, Log, check_unique, ending, list};
 use super::schema::Schema;
 use super::source::Read;
 use super::table::{fault, read_csv};
@@ -30,8 +30,6 @@ pub struct ReadOptions {
 
 /// Columns that a data set holds in memory, bytes; four hours of flight at 100 Hz.
 const LARGEST_HELD: usize = 256 << 20;
-
-pub(super) const DESCRIPTION: &str = "dataset.toml";
 
 /// Reads a data set. `path` is a folder `DATA/<manoeuvre>/<flight>.csv`, a folder of logs (one class, named after it), a single
 /// log, or a folder in the Stanford layout (one folder a flight, or class folders of these). Parquet is read beside CSV with the

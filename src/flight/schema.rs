@@ -26,13 +26,15 @@
 
 use super::attitude::{Axes, QuaternionOrder};
 use super::bounds::RATES_HZ;
-use super::late::LARGEST_S;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use toml::{Table, Value};
+
+/// Largest time by which a stream can be late or early, s.
+const LATEST_S: f64 = 1.0;
 
 /// Components the file's velocity is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -300,9 +302,9 @@ fn times(mut keys: Keys) -> Result<BTreeMap<Column, f64>> {
                 let columns: &[&'static str] = if single { &[word] } else { group.columns };
                 let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
                 // Time and quaternions are no canonical columns; `finish` refuses them.
-                let Some(late_s) = (if columns.is_empty() { None } else { keys.number(word, -LARGEST_S)? }) else { continue };
-                if late_s > LARGEST_S {
-                    return Err(keys.fault(word, late_s.to_string(), format!("a time from -{LARGEST_S} to {LARGEST_S} s")));
+                let Some(late_s) = (if columns.is_empty() { None } else { keys.number(word, -LATEST_S)? }) else { continue };
+                if late_s > LATEST_S {
+                    return Err(keys.fault(word, late_s.to_string(), format!("a time from -{LATEST_S} to {LATEST_S} s")));
                 }
                 late.extend(columns.into_iter().map(|column| (column, late_s)));
             }

@@ -4,7 +4,7 @@
 use super::figures::{self, LineData};
 use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
 use crate::critique::PerChannel;
-use crate::critique::table::{DIGITS, significant};
+use crate::critique::digits::{DIGITS, significant};
 use crate::flight::Column;
 use crate::protocol::table::{self, Finished, TableRow};
 use crate::protocol::text::{basis, cell, is_best, row_name};

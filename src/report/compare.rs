@@ -4,10 +4,12 @@
 
 use super::figures::{self, BinnedPanel, LineData, PANELS};
 use super::page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, data_notes};
-use crate::critique::compare::{Intervals, deviation};
+use crate::critique::channels::Intervals;
+use crate::critique::digits::{Kind, significant};
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
+use crate::critique::predictions::deviation;
 use crate::critique::shares::bars;
-use crate::critique::table::{FLOOR, Kind, LEGEND, MEASURES, OWN_FROM_FIRST_HALF, significant};
+use crate::critique::table::{FLOOR, LEGEND, MEASURES, OWN_FROM_FIRST_HALF};
 use crate::critique::{Comparison, ModelError, PartError, PerChannel, Regime, Row, Shares, Uncertainty, paired};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Targets, Window};

@@ -12,7 +12,7 @@ use super::own::Halves;
 use super::report::{Bar, Diagnosis, Locked, Status, Step, Verdict, Worth};
 use super::sentences;
 use crate::blocks::{BlockMean, BlockSum};
-use crate::critique::compare::PerChannel;
+use crate::critique::channels::PerChannel;
 use crate::critique::shares::Share;
 use crate::error::{Error, Result};
 use crate::flight::split::Split;

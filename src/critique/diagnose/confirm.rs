@@ -5,7 +5,7 @@ use super::own::{Halves, Judgement, judged_errors};
 use super::report::{Bar, Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
 use crate::blocks::{BlockMean, BlockSum};
-use crate::critique::compare::PerChannel;
+use crate::critique::channels::PerChannel;
 use crate::critique::shares::Share;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};

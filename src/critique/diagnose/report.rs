@@ -1,6 +1,6 @@
 //! What a diagnosis holds, as data and as JSON. Its sentences are in `sentences`, its layout for a terminal in `text`; no measuring here.
 
-use crate::critique::compare::PerChannel;
+use crate::critique::channels::PerChannel;
 use crate::critique::shares::Share;
 use crate::flight::Span;
 use crate::physics::SignFinding;

@@ -343,7 +343,7 @@ pub fn forbidden(held: &[String]) -> String {
 mod tests {
     use super::super::report::{FailureChannel, Locked};
     use super::*;
-    use crate::critique::compare::PerChannel;
+    use crate::critique::channels::PerChannel;
 
     const FALLS: [f64; 3] = [0.36, 0.24, 0.46];
     const GROWS: [f64; 3] = [-0.083, -0.199, -0.044];

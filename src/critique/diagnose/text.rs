@@ -5,7 +5,7 @@ use super::describe::STABLE;
 use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Worth};
 use super::sentences::{self, percent};
 use super::signs::number_remark;
-use crate::critique::compare::PerChannel;
+use crate::critique::channels::PerChannel;
 use crate::critique::table::OWN_FROM_FIRST_HALF;
 use crate::critique::wrap::{clipped, wrapped};
 use crate::flight::Column;

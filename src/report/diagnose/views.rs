@@ -6,12 +6,12 @@ use super::super::compare::{CompareReport, channel_columns, channel_panels, erro
 use super::super::figures::{self, BinnedPanel, LineData, PANELS, with_unit};
 use super::super::page::{Cell, Map, MapCell, Part, Table};
 use super::DiagnoseReport;
-use crate::critique::compare::deviation;
+use crate::critique::digits::significant;
 use crate::critique::locate::{Dependence, Variable, dependences, stretches};
+use crate::critique::predictions::deviation;
 use crate::critique::residual_views::{
     Region, StickCorrelation, autocorrelation, informative_pair, regions, spectrum, stick_correlations, surface,
 };
-use crate::critique::table::significant;
 use crate::critique::unknown::{ROWS_MAX, ResidualTable};
 use crate::critique::{Row, compare};
 use crate::error::{Error, Result};

@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, axis_name, set_x, set_y};
 use super::{Figure, figure, round};
-use crate::critique::table::significant;
+use crate::critique::digits::significant;
 use crate::report::colour;
 use crate::report::page::escape;
 use plotly::common::{DashType, Line, Marker, Mode, Orientation, TextAnchor};
