@@ -47,6 +47,8 @@ mod taint;
 mod timing;
 #[cfg(feature = "files")]
 mod units;
+#[cfg(feature = "files")]
+mod values;
 pub mod windows;
 #[cfg(feature = "files")]
 pub mod write;

@@ -5,7 +5,7 @@
 use super::guard::guarded;
 use super::source::Read;
 use super::table::{RawTable, check_header, fault};
-use super::write::{Table, Values};
+use super::values::{Table, Values};
 use crate::error::{Error, Result};
 use parquet::basic::{Compression, ConvertedType, Repetition, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};

@@ -12,27 +12,7 @@ use std::io::{self, Write};
 use std::path::{Component, Path, PathBuf};
 
 pub use super::stanford::write as stanford;
-
-/// Values of one column of a table.
-#[derive(Clone, Copy, Debug)]
-pub enum Values<'a> {
-    /// Numbers.
-    Numbers(&'a [f64]),
-    /// Text, such as the name of the flight a row belongs to.
-    Text(&'a [String]),
-}
-
-impl Values<'_> {
-    fn len(&self) -> usize {
-        match self {
-            Self::Numbers(values) => values.len(),
-            Self::Text(values) => values.len(),
-        }
-    }
-}
-
-/// A table: columns of one length, by name, in the order of the header.
-pub type Table<'a> = [(&'a str, Values<'a>)];
+pub use super::values::{Table, Values};
 
 /// Writes a table as CSV: one header line, `\n` line ends, text quoted where it needs to be.
 ///

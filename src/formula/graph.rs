@@ -1,8 +1,7 @@
 //! Formulas put together into one graph in which equal parts are one node, whoever wrote them: a model is a chain of formulas that
 //! read each other, and many models that differ in little share the rest. Derivatives are in `derivative`, evaluation in `machine`.
 
-use super::memory::MAX_DELAY_S;
-use super::operation::{History, Operation};
+use super::operation::{History, MAX_DELAY_S, Operation};
 use super::{Formula, Instruction};
 use crate::error::{Error, Result};
 use std::collections::HashMap;

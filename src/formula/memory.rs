@@ -18,9 +18,6 @@ impl History {
     }
 }
 
-/// Longest delay, s: bounds the memory a formula can ask for.
-pub(super) const MAX_DELAY_S: f64 = 60.0;
-
 /// Samples that a delay keeps beyond those it needs, so that it forgets seldom.
 const SPARE: usize = 512;
 

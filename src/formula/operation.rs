@@ -31,6 +31,9 @@ pub(super) enum Operation {
     Clamp,
 }
 
+/// Longest delay, s: bounds the memory a formula can ask for.
+pub(super) const MAX_DELAY_S: f64 = 60.0;
+
 /// An operation that remembers earlier samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum History {

@@ -1,74 +1,21 @@
-//! Which network: Phy-Ture with its variants, or one of the peers it is compared with; and what all of them have in common.
+//! Which network: Phy-Ture with its variants, or one of the peers it is compared with.
 //!
 //! In a file a network is a table of its sizes with a `kind`; without one it is Phy-Ture, as in files from before there were
 //! peers. What the sizes mean is in the file of each network, how its graph is judged in `network`.
 
 use super::config::PhyTureConfig;
+use super::configuration::Configuration;
 use super::layers::Recorder;
 use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, InformerConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::tape::Var;
 use phyture_kernels::Real;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
-/// Channels of P and of the prediction: three linear and three angular accelerations (eqs. 11 and 16).
-pub(crate) const ACCELERATIONS: usize = 6;
-
-/// Bounds of any size, far above every sensible one: a hostile file cannot ask for a graph or a slab that exhausts the machine.
-pub(crate) const LARGEST_HISTORY: usize = 100_000;
-pub(crate) const LARGEST_WIDTH: usize = 4096;
-pub(crate) const LARGEST_KERNEL: usize = 255;
-
 /// Key in a file that tells the networks apart.
 const KIND: &str = "kind";
-
-/// What a network's sizes have to say about it.
-pub(crate) trait Configuration {
-    /// As it stands in tables.
-    fn name(&self) -> &'static str;
-
-    /// H, samples of the history.
-    fn history(&self) -> usize;
-
-    /// Channels of S.
-    fn state_channels(&self) -> usize;
-
-    /// Channels of P.
-    fn physics_channels(&self) -> usize {
-        ACCELERATIONS
-    }
-
-    /// Channels predicted.
-    fn outputs(&self) -> usize {
-        ACCELERATIONS
-    }
-
-    /// Rows predicted.
-    fn horizon(&self) -> usize {
-        1
-    }
-
-    /// Whether the output is the residual, to which the baseline is added, or the acceleration itself.
-    fn predicts_residual(&self) -> bool {
-        false
-    }
-
-    /// Whether P reaches the output.
-    fn reads_physics(&self) -> bool {
-        false
-    }
-
-    /// Whether training draws random numbers.
-    fn is_random(&self) -> bool;
-
-    /// Checks each field and how they fit together.
-    fn check(&self) -> Result<()>;
-
-    /// Records the network: S `[H, state_channels]` and P `[H, physics_channels]` to `[horizon, outputs]` at unit scale.
-    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> Result<Var>;
-}
 
 /// A network and its sizes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -241,26 +188,6 @@ impl<'de> Deserialize<'de> for Architecture {
 impl Architecture {
     /// Kinds as they stand in files.
     pub const KINDS: [&'static str; 8] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer", "timesnet", "informer"];
-}
-
-/// Checks that sizes lie in 1 to their largest value, and numbers in their range.
-pub(crate) fn check_ranges(sizes: &[(&str, usize, usize)], reals: &[(&str, f64, f64, f64)]) -> Result<()> {
-    for &(field, value, largest) in sizes {
-        if value == 0 || value > largest {
-            return Err(refused(field, value, format!("1 to {largest}")));
-        }
-    }
-    for &(field, value, smallest, largest) in reals {
-        if !(value >= smallest && value <= largest) {
-            return Err(refused(field, value, format!("{smallest} to {largest}")));
-        }
-    }
-    Ok(())
-}
-
-/// The error for a size that cannot be.
-pub(crate) fn refused(field: &str, found: impl std::fmt::Display, expected: impl Into<String>) -> Error {
-    Error::Config { place: "network".into(), field: field.into(), found: found.to_string(), expected: expected.into() }
 }
 
 #[cfg(test)]

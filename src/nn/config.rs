@@ -2,7 +2,7 @@
 //!
 //! What the sizes mean is in `phyture`; how the network is trained is not here.
 
-use super::architecture::{LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused};
+use super::configuration::{LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused};
 use crate::error::Result;
 use serde::{Deserialize, Serialize};
 

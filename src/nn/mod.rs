@@ -5,6 +5,7 @@
 
 mod architecture;
 mod config;
+mod configuration;
 mod layers;
 mod network;
 pub mod parity;

@@ -3,8 +3,8 @@
 //!
 //! Sizes are in `config`; inputs, output scale and loss in `network`.
 
-use super::architecture::Configuration;
 use super::config::{PhyTureConfig, Variant};
+use super::configuration::Configuration;
 use super::layers::Recorder;
 use crate::error::Result;
 use crate::tape::Var;

@@ -5,6 +5,7 @@
 //! added ([`Columns::absence`]). So one pass over the flights brings the Gram matrices of `[J | A | y - rest]`, and every choice among the effects
 //! is least squares on them. Each number but the baseline's has its usual size as a prior, so that many effects at once stay determined.
 
+mod intervals;
 mod normal;
 mod spread;
 
@@ -12,12 +13,10 @@ use super::design::{Design, Free, Layout};
 use super::engine::{Engine, FOLDS};
 use super::fit::Reduced;
 use super::gram::grams;
-use super::influence::{Influences, decisive};
 use super::known::{Known, known};
 use super::own::prediction_errors;
 use crate::error::{Error, Result};
-use crate::physics::{Correlation, Model, Wanted};
-use crate::student::quantile_975;
+use crate::physics::{Model, Wanted};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use normal::Normal;
 use std::collections::{BTreeMap, BTreeSet};
@@ -405,59 +404,6 @@ impl Point {
         }
     }
 
-    /// Notes 95 % intervals in the model: from what the numbers would be without each tenth of the blocks (the delete-a-group jackknife, Kott 2001,
-    /// Journal of Official Statistics 17:521), given those of each flight.
-    pub fn note_intervals(&mut self, folds: &Folds) {
-        let (start, open) = self.start(&[]);
-        // A number on its bound has none, whatever an earlier fit said.
-        for (number, free) in self.layout.free.iter().enumerate().filter(|(number, _)| open.binary_search(number).is_err()) {
-            if let Some((_, ci95)) =
-                self.model.effects[free.effect].number_mut(free.coefficient).filter(|_| !self.known[number].is_local)
-            {
-                *ci95 = None;
-            }
-        }
-        let without: Option<Vec<Vec<f64>>> = folds.normals.iter().map(|normal| self.solve(normal, &open, &start, 0.0)).collect();
-        let Some(without) = without else { return };
-        let count = without.len() as f64;
-        let mean = |number: usize| without.iter().map(|values| values[number]).sum::<f64>() / count;
-        let deviations: Vec<Vec<f64>> = {
-            let means: Vec<f64> = open.iter().map(|&number| mean(number)).collect();
-            let of = |values: &Vec<f64>| open.iter().zip(&means).map(|(&number, mean)| values[number] - mean).collect();
-            without.iter().map(of).collect()
-        };
-        let label = |&number: &usize| {
-            let effect = &self.model.effects[self.layout.free[number].effect];
-            let found = effect.number(self.layout.free[number].coefficient).expect("a number of the model");
-            Correlation::label(effect, &found.name)
-        };
-        let labels = open.iter().map(label).collect();
-        self.model.correlations = Correlation::of_deviations(labels, &deviations).into_iter().collect();
-        for (place, number) in open.into_iter().enumerate() {
-            let variance = deviations.iter().map(|values| values[place].powi(2)).sum::<f64>() * (count - 1.0) / count;
-            let half = quantile_975(count - 1.0) * variance.sqrt();
-            let free = self.layout.free[number];
-            if let Some((value, ci95)) = self.model.effects[free.effect].number_mut(free.coefficient) {
-                *ci95 = Some([*value - half, *value + half]);
-            }
-        }
-    }
-
-    /// Numbers that hang on one flight, where they have intervals ([`Point::note_intervals`]).
-    pub fn influences(&self, engine: &Engine<'_>) -> Option<Influences> {
-        let (start, open) = self.start(&[]);
-        let normals = self.without_each_flight(engine, &self.locals(&[]))?;
-        let without: Vec<(usize, Option<Vec<f64>>)> =
-            normals.iter().map(|(flight, normal)| (*flight, self.solve(normal, &open, &start, 0.0))).collect();
-        let of = |&number: &usize| {
-            let free = self.layout.free[number];
-            let interval = self.model.effects[free.effect].number(free.coefficient)?.ci95?;
-            let of_flight = without.iter().map(|(flight, values)| (*flight, values.as_ref().map(|values| values[number])));
-            Some(((free.effect, free.coefficient), decisive(interval, of_flight, engine.flights)?))
-        };
-        Some(open.iter().filter_map(of).collect())
-    }
-
     /// For each effect that may be left out, how little these blocks know of it: the standard error of its best known number in usual sizes.
     pub fn looseness(&self, engine: &Engine<'_>) -> Option<Vec<f64>> {
         let (_, open) = self.start(&[]);
@@ -500,16 +446,15 @@ fn own(made_of: &DMatrix<f64>, solved: &[f64]) -> DVector<f64> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::candidate::with;
     use super::super::gram::blocks;
     use super::super::gram::tests::{model, near, noise, whole};
-    use super::super::resample::tests::pulled_by;
     use super::*;
     use crate::flight::Flight;
     use crate::physics::{Effect, calibrate, catalogue};
 
-    fn engine(flights: &[Flight]) -> Engine<'_> {
+    pub(super) fn engine(flights: &[Flight]) -> Engine<'_> {
         let blocks = blocks(flights, &whole(flights), 2.0);
         let fold = (0..blocks.len()).map(|block| block % FOLDS).collect();
         Engine { flights, blocks, fold, correlation: 100.0, held: Vec::new() }
@@ -583,23 +528,6 @@ mod tests {
         let intervals = point.model.effects.iter().flat_map(|effect| &effect.coefficients).map(|coefficient| coefficient.ci95);
         let widths: Vec<f64> = intervals.map(|ci95| ci95.map_or(f64::NAN, |[low, high]| high - low)).collect();
         assert!(widths.iter().all(|width| *width > 0.0 && *width < 1.0), "{widths:?}");
-        Ok(())
-    }
-
-    #[test]
-    fn a_number_that_hangs_on_one_flight_names_it() -> Result<()> {
-        let mut flights = noise(8, &[3000; 12]);
-        let found = |flights: &[Flight]| {
-            let engine = engine(flights);
-            let mut point = Point::at(&engine, Point::fitted(&engine, model(), 10)?, Vec::new())?;
-            point.note_intervals(&point.folds(&engine, &[]).expect("determined"));
-            Ok::<_, Error>(point.influences(&engine).expect("determined"))
-        };
-        assert!(found(&flights)?.is_empty());
-        pulled_by(&mut flights[11])?;
-        let influences = found(&flights)?;
-        let named: Vec<&str> = influences.values().map(|influence| influence.flight.as_str()).collect();
-        assert_eq!(named, ["f11"], "{influences:?}");
         Ok(())
     }
 

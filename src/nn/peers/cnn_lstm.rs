@@ -7,7 +7,7 @@
 
 use super::common_fields;
 use crate::error::Result;
-use crate::nn::architecture::{
+use crate::nn::configuration::{
     ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
 };
 use crate::nn::layers::Recorder;

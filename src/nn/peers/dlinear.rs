@@ -5,7 +5,7 @@
 //! any nonlinearity this is a linear filter. The maps over time are shared by all channels ("DLinear") or one a channel.
 
 use crate::error::Result;
-use crate::nn::architecture::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::Recorder;
 use crate::tape::Var;
 use crate::tape::ops::{Add, MovingAverage, Subtract};

@@ -13,7 +13,7 @@
 
 use super::common_fields;
 use crate::error::Result;
-use crate::nn::architecture::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges};
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges};
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{Activation, Add, GeneralConv1d, LastRows, Place, SpacedRows};

@@ -14,7 +14,7 @@
 
 use super::common_fields;
 use crate::error::Result;
-use crate::nn::architecture::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{
