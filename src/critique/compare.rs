@@ -113,7 +113,7 @@ impl Comparison {
 /// Lays the predictions of each row beside the measured targets at the last row of each window.
 ///
 /// # Errors
-/// [`Error::Shape`] if a row has not one prediction a window, or a window lies outside its flight.
+/// [`Error::Shape`](crate::Error::Shape) if a row has not one prediction a window, or a window lies outside its flight.
 pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part) -> Result<Comparison> {
     let measured = measured(flights, windows)?;
     let groups = Groups::new(flights, windows);

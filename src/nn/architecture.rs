@@ -107,7 +107,7 @@ impl Architecture {
     /// Checks each size and how they fit together.
     ///
     /// # Errors
-    /// [`Error::Config`] with the field, its value and its range.
+    /// [`Error::Config`](crate::Error::Config) with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
         of_each!(self, config => Configuration::check(config))
     }
