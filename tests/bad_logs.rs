@@ -252,3 +252,64 @@ fn a_clock_that_runs_fast_is_named_with_its_rate() -> Outcome {
         }
     })
 }
+
+#[test]
+fn knots_and_a_heading_alone_in_degrees_are_mended() -> Outcome {
+    let in_knots = flights(|columns| {
+        for velocity in [Column::Vx, Column::Vy, Column::Vz] {
+            columns[velocity as usize].iter_mut().for_each(|value| *value *= 3600.0 / 1852.0);
+        }
+    })?;
+    assert_mended(&in_knots, "", "velocity = \"kt\"")?;
+    let turned = flights(|columns| {
+        columns[Column::Yaw as usize].iter_mut().for_each(|yaw| *yaw = yaw.to_degrees().rem_euclid(360.0));
+    })?;
+    assert_mended(&turned, "", "yaw = \"yaw * 0.01745")
+}
+
+/// Messages of the faults that are claimed.
+fn faults(flights: Vec<Flight>) -> Vec<String> {
+    let set = DataSet { flights, ..DataSet::default() };
+    let is_fault = |finding: &phyture::critique::check::Finding| finding.verdict == Verdict::Fault;
+    check(&set, None).findings.into_iter().filter(is_fault).map(|finding| finding.message).collect()
+}
+
+#[test]
+fn rows_in_falling_time_are_named_and_nothing_that_follows_from_them_in_their_place() -> Outcome {
+    let reversed = |columns: &mut [Vec<f64>; Column::COUNT]| columns.iter_mut().for_each(|values| values.reverse());
+    for some in [some(|index| index == 1, reversed)?, some(|index| index % 2 == 0, reversed)?] {
+        let said = faults(some);
+        assert!(said.iter().any(|message| message.contains("order of falling time")), "{said:#?}");
+        assert!(!said.iter().any(|message| message.contains("does not hold")), "{said:#?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_value_for_what_was_not_received_is_named_however_much_there_is_of_it() -> Outcome {
+    let lost = |columns: &mut [Vec<f64>; Column::COUNT]| {
+        for start in [500, 1200, 2100] {
+            columns[Column::U2 as usize][start..start + 40].fill(-999.0);
+        }
+    };
+    for some in [some(|index| index == 1, lost)?, some(|index| index % 2 == 0, lost)?] {
+        let said = faults(some);
+        assert!(said.iter().any(|message| message.contains("cells of u2")), "{said:#?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn sticks_of_a_slower_stream_are_named() -> Outcome {
+    let held = |columns: &mut [Vec<f64>; Column::COUNT]| {
+        for stick in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = &mut columns[stick as usize];
+            for sample in 0..values.len() {
+                values[sample] = values[sample / 10 * 10];
+            }
+        }
+    };
+    let said = faults(flights(held)?);
+    assert!(said.iter().any(|message| message.contains("u1, u2, u3, u4 come at 10.000 Hz")), "{said:#?}");
+    Ok(())
+}

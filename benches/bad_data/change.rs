@@ -1,5 +1,5 @@
 //! What a corruption is, and the tools it is made of: one flight's columns, and random numbers of its own. What is wrong with which
-//! log stands in `corruptions` and `reserved`; no running here.
+//! log stands in the lists; no running here.
 
 use phyture::Result;
 use phyture::flight::{Column, Flight};

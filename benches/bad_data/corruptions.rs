@@ -1,5 +1,5 @@
 //! Corruptions that development looks at: the half on which checks are tuned. Those that version 0.1.0 was seen to turn into sure and wrong
-//! verdicts are all here. The other half stands in `reserved`.
+//! verdicts are all here. The other half stands in `second`.
 
 use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Change, Corruption, Kind, LINEAR, Log, POSITION, Part, RATES, VELOCITY};
 use phyture::flight::attitude::{cross, gravity_body, rotate, rotation_body_to_inertial};

@@ -2,7 +2,7 @@
 //!
 //!     cargo bench --features cli --bench bad_data                                      a few cases, some minutes
 //!     cargo bench --features cli --bench bad_data -- run OUT.jsonl [SEEDS] [WHAT…]     everything, resumable
-//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   what is in `corruptions.rs` and `further.rs`, on development seeds
+//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   what is not in `reserved.rs`, on development seeds
 //!     cargo bench --features cli --bench bad_data -- table OUT.jsonl                   the tables
 //!     cargo bench --features cli --bench bad_data -- sound                             only that each corruption changes what it is to change
 //!
@@ -18,6 +18,7 @@ mod further;
 mod mend;
 mod reserved;
 mod run;
+mod second;
 mod sound;
 mod tables;
 

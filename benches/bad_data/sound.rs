@@ -1,10 +1,10 @@
-//! What must hold of the corruptions themselves: no name twice, as many of each kind in either half, and each changes the flights that it is applied to. No check is run here, so the
-//! reserved half may be looked at so far.
+//! What must hold of the corruptions themselves: no name twice, as many of each kind in the first two lists, and each changes the flights that
+//! it is applied to. No check is run here, so what is reserved may be looked at so far.
 
 use crate::change::{Chance, Change, Corruption, Kind, Log, Part};
 use crate::corruptions::DEVELOPMENT;
-use crate::reserved::RESERVED;
 use crate::run;
+use crate::second::SECOND;
 use phyture::{Error, Result};
 
 /// Tries all of them on two minutes of a development seed.
@@ -21,7 +21,7 @@ pub fn all() -> Result<()> {
         kinds.sort_unstable();
         kinds
     };
-    if kinds(DEVELOPMENT) != kinds(RESERVED) {
+    if kinds(DEVELOPMENT) != kinds(SECOND) {
         return fault("the halves do not have as many corruptions of each kind".into());
     }
     let set = run::simulated(run::DEVELOPMENT.seeds.start, 2.0, None)?;

@@ -10,8 +10,12 @@ const LOOKED_AT: usize = 20_000;
 const TAIL: f64 = 5e-3;
 /// A cell is a spike if it lies outside by so many ranges, and is reached and left in single steps of that size …
 const OUTSIDE: f64 = 2.0;
-/// … and is over within this time, s.
+/// … and is over within this time, s …
 const LONGEST_S: f64 = 0.25;
+/// … or within this, if all of it is one and the same value: such a value stands where nothing was received.
+const LONGEST_OF_ONE_S: f64 = 2.0;
+/// Where the usual range is so many times that of the middle four fifths, it is not usual.
+const STRETCHED: f64 = 200.0;
 /// Controls are about [-1, 1]: a stick that is seldom moved is no spike below this, beside its usual range.
 const LARGEST_CONTROL: f64 = 1.5;
 
@@ -45,7 +49,8 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
     let mut spikes = Spikes { cells: 0, flights: Vec::new(), longest_s: 0.0, range: [low - jump, high + jump] };
     for (index, flight) in flights.iter().enumerate() {
         let values = flight.column(column);
-        let longest = (LONGEST_S / flight.step_s).round().max(1.0) as usize;
+        let [longest, longest_of_one] =
+            [LONGEST_S, LONGEST_OF_ONE_S].map(|longest_s| (longest_s / flight.step_s).round().max(1.0) as usize);
         let mut start = 0;
         while let Some(first) = (start..values.len()).find(|&sample| far(values[sample])) {
             let end = (first..values.len()).find(|&sample| !far(values[sample])).unwrap_or(values.len());
@@ -53,7 +58,9 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
             let leaps =
                 |inside: usize, outside: Option<&f64>| outside.is_none_or(|outside| (values[inside] - outside).abs() > jump);
             let before = first.checked_sub(1).and_then(|sample| values.get(sample));
-            if end - first <= longest && leaps(first, before) && leaps(end - 1, values.get(end)) {
+            let is_one = values[first..end].iter().all(|value| *value == values[first]);
+            let is_short = end - first <= if is_one { longest_of_one } else { longest };
+            if is_short && leaps(first, before) && leaps(end - 1, values.get(end)) {
                 spikes.cells += end - first;
                 spikes.longest_s = spikes.longest_s.max((end - first) as f64 * flight.step_s);
                 if spikes.flights.last() != Some(&index) {
@@ -66,14 +73,19 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
     (spikes.cells > 0).then_some(spikes)
 }
 
-/// The range that a column keeps to, but for a two-hundredth of its samples at either end; `None` where it does not move.
+/// The range that a column keeps to, but for a two-hundredth of its samples at either end, or a tenth where these stretch it; `None` where it does not
+/// move.
 fn usual(flights: &[Flight], column: Column) -> Option<[f64; 2]> {
     let samples: usize = flights.iter().map(Flight::len).sum();
     let every = samples.div_ceil(LOOKED_AT).max(1);
     let mut values: Vec<f64> = super::of_all(flights, column).step_by(every).map(|(value, _)| value).collect();
     values.sort_unstable_by(f64::total_cmp);
-    let tail = (TAIL * values.len() as f64).ceil() as usize;
-    let [low, high] = [*values.get(tail)?, *values.get(values.len().checked_sub(tail + 1)?)?];
+    let within = |share: f64| {
+        let tail = (share * values.len() as f64).ceil() as usize;
+        Some([*values.get(tail)?, *values.get(values.len().checked_sub(tail + 1)?)?])
+    };
+    let ([low, high], [lower, upper]) = (within(TAIL)?, within(0.1)?);
+    let [low, high] = if upper > lower && high - low > STRETCHED * (upper - lower) { [lower, upper] } else { [low, high] };
     (high > low).then_some([low, high])
 }
 

@@ -17,6 +17,12 @@ const OTHER_TIME: f64 = 0.2;
 /// … and this near to each other say that the time runs otherwise.
 const SAME: f64 = 0.1;
 
+/// Of the relation between position and velocity.
+const POSITION_RATE: &str = "position_rate";
+
+/// Of the finding on a time that runs backward.
+pub(super) const TIME_REVERSED: &str = "time_reversed";
+
 /// Of the finding on gains that are all alike.
 pub(super) const TIME_STEP: &str = "time_step";
 
@@ -65,9 +71,29 @@ impl Evidence {
         self.halves.absorb(&one.halves, together);
     }
 
+    /// Whether rates and accelerations, angular and linear, all have the other sign against the changes: then it is the time that runs backward.
+    /// `None` where not all of them are known.
+    fn is_reversed(&self) -> Option<bool> {
+        let known = self.relations.iter().filter(|relation| relation.has_blocks() && relation.name != POSITION_RATE);
+        let reversed = known.map(|relation| {
+            let other = relation.other_reading(self.gains.left(relation.name));
+            other.is_some_and(|reading| relation.is_reversal(reading))
+        });
+        let reversed: Vec<bool> = reversed.collect();
+        (reversed.len() == 3).then(|| reversed.iter().all(|reversed| *reversed))
+    }
+
     /// The relations, and the gains of those that hold; an axis says nothing of which less is explained by its gain.
     pub fn kinematics(&self, least_explained: f64) -> Vec<Finding> {
         let mut findings = Vec::new();
+        match self.is_reversed() {
+            Some(true) => {
+                let message = "rates and accelerations all have the other sign against the changes: the rows stand in the order of falling time";
+                return vec![super::finding(TIME_REVERSED, Verdict::Fault, message.into(), None)];
+            }
+            Some(false) => findings.push(super::finding(TIME_REVERSED, Verdict::Ok, "the time runs forward".into(), None)),
+            None => {}
+        }
         for relation in &self.relations {
             let Some(finding) = relation.finding(self.gains.left(relation.name)) else { continue };
             // Gains of a relation that is known to be read wrongly, or in which nothing moves, say nothing more.

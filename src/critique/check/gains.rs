@@ -9,8 +9,10 @@ use super::report::{Finding, Subject, Verdict};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
 
-/// Certainly nearer to another convention than to 1.
+/// Certainly nearer to another convention than to 1 …
 const FAULT_MARGIN: f64 = 0.5;
+/// … or to that of a unit than to 1: knots are nearly half a metre a second.
+const UNIT_MARGIN: f64 = 0.4;
 /// Ten per cent is more than smoothing and noise do to a gain, and less than a wrong time step.
 const WARNING_MARGIN: f64 = 0.1;
 
@@ -273,11 +275,11 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     };
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;
-    if beyond(FAULT_MARGIN) {
+    let off = |gain: f64| (value / gain).ln().abs();
+    let known = of_units(relation).iter().filter(|unit| value > 0.0 && off(unit.0) < WARNING_MARGIN);
+    let known = known.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
+    if beyond(FAULT_MARGIN) || (beyond(UNIT_MARGIN) && known.is_some()) {
         finding.verdict = Verdict::Fault;
-        let off = |gain: f64| (value / gain).ln().abs();
-        let known = of_units(relation).iter().filter(|unit| value > 0.0 && off(unit.0) < WARNING_MARGIN);
-        let known = known.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
         finding.message = match known {
             _ if (value + 1.0).abs() < WARNING_MARGIN => "the gain of this axis is that of the other sign".into(),
             Some((_, says, _)) => format!("the gain of this axis is that of {says}"),
@@ -325,6 +327,8 @@ const LINEAR: &Units = &[
     (1e-2, "accelerations in cm/s²", "acceleration = \"cm/s^2\""),
     (1e-3, "accelerations in mm/s²", "acceleration = \"mm/s^2\""),
     (1.0 / FOOT_M, "velocity in feet a second", "velocity = \"ft/s\""),
+    (3.6, "velocity in km/h", "velocity = \"km/h\""),
+    (3.6 / 1.852, "velocity in knots", "velocity = \"kt\""),
     (1e2, "velocity in cm/s", "velocity = \"cm/s\""),
     (1e3, "velocity in mm/s", "velocity = \"mm/s\""),
 ];

@@ -246,6 +246,7 @@ fn symptom(finding: Finding) -> Finding {
         gains::OFFSET,
         gains::HEADING,
         evidence::TIME_STEP,
+        evidence::TIME_REVERSED,
         mounts::NAME,
         "frozen_",
         streams::HELD,

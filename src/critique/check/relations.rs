@@ -54,12 +54,16 @@ const OF_COLUMNS: f64 = 2.0;
 /// … and this share of the changes.
 const SLACK: f64 = 0.005;
 
+/// How readings end in which all rates have the other sign.
+const REVERSED: &str = "s have the other sign";
+
 const TRANSPOSED: &str =
     "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
 const REORDERED: &str = "the quaternion's scalar stands at its other end";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
+const YAW_DEGREES: &str = "[columns] yaw = \"yaw * 0.017453292519943295\", with the file's name";
 
 const EXCHANGED: &str = "roll and pitch are exchanged";
 const ROLL_PITCH: &str = "[columns] roll = \"pitch\", pitch = \"roll\", with the file's names";
@@ -140,6 +144,7 @@ impl Relation {
             read("pitch has the other sign", PITCH_SIGN, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, -1.0, 1.0])), i.velocity))),
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.velocity))),
             read("the angles are in degrees", ANGLES_DEGREES, at, |i| stack(rotate(&turned(i.angles.map(|angle| angle * DEGREE)), i.velocity))),
+            read("yaw is in degrees and roll and pitch are not", YAW_DEGREES, at, |i| stack(rotate(&turned(scaled(i.angles, [1.0, 1.0, DEGREE])), i.velocity))),
             read("vx and vy are exchanged", "[columns] vx = \"vy\", vy = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, first_two(i.velocity)))),
             read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
             read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
@@ -187,6 +192,7 @@ impl Relation {
             read("yaw has the other sign", "[columns] yaw = \"-yaw\", with the file's name", |i| axes(&turned(scaled(i.angles, [1.0, 1.0, -1.0]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, -1.0])), i.rates)),
             read("the rates are in degrees a second", "[units] rates = \"deg/s\"", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates.map(|rate| rate * DEGREE))),
             read("the angles are in degrees", ANGLES_DEGREES, |i| axes(&turned(i.angles.map(|angle| angle * DEGREE))), |i| turning(&turned(i.angles.map(|angle| angle * DEGREE)), i.rates)),
+            read("yaw is in degrees and roll and pitch are not", YAW_DEGREES, |i| axes(&turned(scaled(i.angles, [1.0, 1.0, DEGREE]))), |i| turning(&turned(scaled(i.angles, [1.0, 1.0, DEGREE])), i.rates)),
             read("wx and wy are exchanged", "[columns] wx = \"wy\", wy = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, first_two(i.rates))),
             read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
             read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
@@ -272,6 +278,16 @@ impl Relation {
         // One that explains little itself only leaves out what is wrong.
         let bar = LARGEST_SHARE.min(CONVINCING_SHARE * nominal).min(OF_COLUMNS * left + SLACK);
         (nominal > MATERIAL_SHARE && self.share(best) < bar && self.consistent(best)).then_some(best)
+    }
+
+    /// Whether it applied to anything.
+    pub fn has_blocks(&self) -> bool {
+        self.misfit.first().is_some_and(|blocks| !blocks.is_empty())
+    }
+
+    /// Whether a reading says that the rates have the other sign than the changes.
+    pub fn is_reversal(&self, index: usize) -> bool {
+        self.hypotheses[index].says.ends_with(REVERSED)
     }
 
     /// Whether a reading leaves less than the nominal one, be it by little.

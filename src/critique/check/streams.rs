@@ -67,6 +67,14 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
             None => held.push((hold, vec![column])),
         }
     }
+    // A stick that rests does so for any time; one that comes from a slower stream for whole periods of that.
+    for column in CONTROLS.into_iter().filter(present).filter(|column| !is_rounded(*column)) {
+        let Some(hold) = Rests::of(flights, column).held(flights).filter(|hold| hold.seconds > LONG_S) else { continue };
+        match held.iter_mut().find(|(other, _)| *other == hold) {
+            Some((_, columns)) => columns.push(column),
+            None => held.push((hold, vec![column])),
+        }
+    }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
     let rounded: Vec<(Column, Finding)> =
         grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
