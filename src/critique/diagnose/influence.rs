@@ -1,6 +1,7 @@
-//! Whether an effect or a number hangs on one flight. Of an effect told is the flight without which its gain would be gone. Of a number the fit is repeated without each flight (deletion diagnostics, Belsley, Kuh & Welsch 1980, "Regression
-//! Diagnostics", chapter 2), and told is the flight without which the number would leave its own 95 % interval. The fits themselves are in `fit`
-//! and `joint`. No block is weighed down for its size: an effect that acts in few manoeuvres is all in blocks that look like outliers.
+//! Whether an effect or a number hangs on one flight. Of an effect told is the flight without which its gain would be gone. Of a
+//! number the fit is repeated without each flight (deletion diagnostics, Belsley, Kuh & Welsch 1980, "Regression Diagnostics", chapter
+//! 2), and told is the flight without which the number would leave its own 95 % interval. The fits themselves are in `fit` and `joint`.
+//! No block is weighed down for its size: an effect that acts in few manoeuvres is all in blocks that look like outliers.
 
 use super::engine::Engine;
 use super::report::Influence;
