@@ -313,3 +313,58 @@ fn sticks_of_a_slower_stream_are_named() -> Outcome {
     assert!(said.iter().any(|message| message.contains("u1, u2, u3, u4 come at 10.000 Hz")), "{said:#?}");
     Ok(())
 }
+
+#[test]
+fn a_stick_that_stops_within_the_flight_is_named_with_its_flights() -> Outcome {
+    assert_flights(
+        "still_u2",
+        |index| index % 2 == 0,
+        |columns| {
+            let stick = &mut columns[Column::U2 as usize];
+            let middle = stick.len() / 2;
+            let value = stick[middle];
+            stick[middle..].fill(value);
+        },
+    )
+}
+
+#[test]
+fn a_flight_that_breaks_with_mechanics_is_named_though_no_reading_mends_it() -> Outcome {
+    // The attitude of a slow drift that is in no list of readings, on top of the true one.
+    assert_flights(
+        "unexplained_attitude",
+        |index| index == 3,
+        |columns| {
+            for (sample, roll) in columns[Column::Roll as usize].iter_mut().enumerate() {
+                *roll += 0.4 * (0.05 * sample as f64).sin();
+            }
+        },
+    )
+}
+
+#[test]
+fn leaps_of_the_attitude_are_placed() -> Outcome {
+    let flights = some(
+        |index| index == 3,
+        |columns| columns[Column::Roll as usize].iter_mut().skip(1000).step_by(700).take(3).for_each(|roll| *roll += 1.5),
+    )?;
+    let name = flights[3].name.clone();
+    let set = DataSet { flights, ..DataSet::default() };
+    let report = check(&set, None);
+    let finding = report.findings.iter().find(|finding| finding.name == "unexplained_attitude").ok_or("no finding")?;
+    assert_eq!(finding.flights, [name]);
+    assert!(finding.message.contains("leaps") && finding.message.contains("10 s"), "{}", finding.message);
+    Ok(())
+}
+
+#[test]
+fn a_trim_of_a_stick_is_a_warning_with_its_size() -> Outcome {
+    let flights = some(|index| index % 2 == 1, |columns| columns[Column::U1 as usize].iter_mut().for_each(|u| *u -= 0.2))?;
+    let set = DataSet { flights, ..DataSet::default() };
+    let report = check(&set, None);
+    let finding = report.findings.iter().find(|finding| finding.name == "trim_u1").ok_or("no finding")?;
+    assert_eq!(finding.verdict, Verdict::Warning);
+    assert!(finding.message.contains("u1 stands 0.2"), "{}", finding.message);
+    assert!(!report.fault, "{}", report.summary);
+    Ok(())
+}

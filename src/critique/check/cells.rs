@@ -45,8 +45,10 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
     let jump = OUTSIDE * (high - low);
     let is_control = super::CONTROLS.contains(&column);
     let size = low.abs().max(high.abs()).max(1.0);
-    let far = |value: f64| (value < low - jump || value > high + jump) && (!is_control || value.abs() > LARGEST_CONTROL * size);
-    let mut spikes = Spikes { cells: 0, flights: Vec::new(), longest_s: 0.0, range: [low - jump, high + jump] };
+    let beyond = if is_control { LARGEST_CONTROL * size } else { f64::NEG_INFINITY };
+    let range = [(low - jump).min(-beyond), (high + jump).max(beyond)];
+    let far = |value: f64| value < range[0] || value > range[1];
+    let mut spikes = Spikes { cells: 0, flights: Vec::new(), longest_s: 0.0, range };
     for (index, flight) in flights.iter().enumerate() {
         let values = flight.column(column);
         let [longest, longest_of_one] =

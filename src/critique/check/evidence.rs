@@ -10,6 +10,7 @@ use super::mounts::Mounts;
 use super::relations::Relation;
 use super::report::{Finding, Verdict};
 use super::timing::Timing;
+use super::unexplained::Left;
 use std::collections::BTreeSet;
 
 /// Gains of all relations that are this far from 1 …
@@ -110,6 +111,11 @@ impl Evidence {
         };
         findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")]));
         findings
+    }
+
+    /// What each relation leaves unexplained.
+    pub fn unexplained(&self) -> Vec<Left> {
+        self.gains.unexplained()
     }
 
     /// The other reading of a relation, by its place; none where single columns explain as much.

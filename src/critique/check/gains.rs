@@ -6,6 +6,7 @@
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Subject, Verdict};
+use super::unexplained::{Fit, Left};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
 
@@ -138,6 +139,27 @@ impl Gains {
             "rate_targets" => three(&self.angular),
             _ => of(self.attitude.explained()),
         }
+    }
+
+    /// What each relation leaves unexplained.
+    pub fn unexplained(&self) -> Vec<Left> {
+        type Names = [[&'static str; 3]; 3];
+        const LINEAR: Names = [["vx", "vx_dot", "vx_dot says"], ["vy", "vy_dot", "vy_dot says"], ["vz", "vz_dot", "vz_dot says"]];
+        const ANGULAR: Names = [["wx", "wx_dot", "wx_dot says"], ["wy", "wy_dot", "wy_dot says"], ["wz", "wz_dot", "wz_dot says"]];
+        let position = Fit::Mechanics { name: "position", changes: "the position (x, y, z)", says: "velocity and attitude say" };
+        let attitude = Fit::Mechanics { name: "attitude", changes: "the attitude (roll, pitch, yaw)", says: "the rates say" };
+        let three = |names: Names, all: &[BlockRegression<1>; 3]| {
+            let of = |(names, one): ([&'static str; 3], &BlockRegression<1>)| {
+                let [changes, name, says] = names;
+                Left::of(Fit::Mechanics { name, changes, says }, one)
+            };
+            names.into_iter().zip(all).filter_map(of).collect::<Vec<_>>()
+        };
+        let mut left: Vec<Left> = Left::of(position, &self.position).into_iter().collect();
+        left.extend(Left::of(attitude, &self.attitude));
+        left.extend(three(LINEAR, &self.linear));
+        left.extend(three(ANGULAR, &self.angular));
+        left
     }
 
     /// Findings of the relation of this name, see [`super::relations`]; of no column of which less is explained.

@@ -27,6 +27,8 @@ mod streams;
 #[cfg(feature = "files")]
 mod suggestion;
 mod timing;
+mod trims;
+mod unexplained;
 
 pub use excitation::{Collinearity, Excitation};
 pub use report::{CheckReport, Finding, Subject, Verdict};
@@ -100,6 +102,8 @@ struct Gathered {
     sticks: Sticks,
     /// Sticks whose values pile up at an end, by flight.
     piled: Vec<(usize, limits::Piled)>,
+    /// What relations and answers leave unexplained, by flight.
+    left: Vec<unexplained::OfFlight>,
 }
 
 impl Gathered {
@@ -127,7 +131,15 @@ impl Gathered {
         let odd = Odd::new(&judged, &all, &data.flights);
         except.extend(&odd.flights);
         unjudged.extend(&odd.flights);
-        Self { poor, odd: odd.findings, misread, together: of(&except), except, unjudged, sticks, piled }
+        let left = each.iter().map(|own| (own.flight, own.left.iter().cloned().chain(sticks.unexplained(own.flight)).collect()));
+        let left: Vec<unexplained::OfFlight> = left.collect();
+        let strange = if misread { None } else { unexplained::of_mechanics(&left, &unjudged, &data.flights) };
+        let named: BTreeSet<&String> = strange.iter().flat_map(|finding| &finding.flights).collect();
+        let of_strange: Vec<usize> = (0..data.flights.len()).filter(|&flight| named.contains(&data.flights[flight].name)).collect();
+        except.extend(&of_strange);
+        unjudged.extend(&of_strange);
+        let odd = odd.findings.into_iter().chain(strange).collect();
+        Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, left }
     }
 
     /// All that is said of conventions and of streams against each other, causes before symptoms.
@@ -141,10 +153,17 @@ impl Gathered {
             findings.iter().filter(|finding| is_read(finding)).map(|finding| finding.set.clone()).collect();
         let lateral = self.together.forces.lateral();
         let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Verdict::Fault;
-        findings.extend(lateral.map(|finding| if is_other(&finding) { not_judged(finding) } else { finding }));
+        findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
-            findings.extend(self.sticks.findings(&data.flights, &self.unjudged));
+            let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
+            of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
+            let faults = of_sticks.iter().filter(|finding| finding.verdict == Verdict::Fault);
+            let named: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
+            let is_known = |flight: &usize| named.contains(&data.flights[*flight].name);
+            let known = (0..data.flights.len()).filter(is_known).chain(self.unjudged.iter().copied()).collect();
+            findings.extend(of_sticks);
+            findings.extend(unexplained::of_answers(&self.left, &known, &data.flights));
             findings.extend(cut_off);
         }
         // What thrust does along z is known from the collective alone.

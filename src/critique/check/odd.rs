@@ -7,6 +7,7 @@ use super::increments::{Motion, TOGETHER};
 use super::report::{Finding, Subject, Verdict};
 use super::sticks::median;
 use super::timing::Timing;
+use super::unexplained::Left;
 use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,11 +23,11 @@ const LATER_S: f64 = 0.05;
 /// Delays of flights that differ by so many times what they scatter are not those of what is flown.
 const APART: f64 = 3.0;
 /// From a median absolute deviation to the standard deviation of normal numbers.
-const NORMAL: f64 = 1.4826;
+pub(super) const NORMAL: f64 = 1.4826;
 /// Flights at least in which a single stick is late or scaled, or a clock another: there are many flights and many sticks, and manoeuvres do the like.
 pub(super) const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
-const SCALED: f64 = 0.07;
+const SCALED: f64 = 0.04;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
 const EXPLAINED: f64 = 0.5;
 /// Fall of the logarithm of the squared error that a shift of a stream has to bring in a single flight.
@@ -44,6 +45,8 @@ pub(super) struct Own {
     pub flight: usize,
     pub evidence: Evidence,
     findings: Vec<Finding>,
+    /// What each relation leaves unexplained here.
+    pub left: Vec<Left>,
 }
 
 impl Own {
@@ -60,7 +63,7 @@ impl Own {
         let mut evidence = Evidence::new(quaternion, step_s);
         // A block of usual length is longer than most manoeuvres.
         evidence.absorb(&short, TOGETHER);
-        Self { flight, evidence, findings }
+        Self { flight, evidence, findings, left: short.unexplained() }
     }
 }
 

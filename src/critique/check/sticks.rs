@@ -10,18 +10,19 @@ use super::increments::Motion;
 use super::odd::{FEWEST, MOST, WIDER, in_flights};
 use super::regression::{BlockRegression, Estimate};
 use super::report::{Finding, Verdict};
+use super::unexplained::{Fit, Left};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
 use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// The accelerations by which sticks are told, and the stick that moves each: the conventions of this program.
-const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
+pub(super) const AXES: [&str; 4] = ["wx_dot", "wy_dot", "wz_dot", "vz_dot"];
 pub(super) const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 
 /// Place of the first stick among the columns, and of the 1.
-const FIRST: usize = 1;
-const CONSTANT: usize = 5;
+pub(super) const FIRST: usize = 1;
+pub(super) const CONSTANT: usize = 5;
 const COLUMNS: usize = 6;
 
 /// An axis answers to another stick if that one moves it so many times as much as its own.
@@ -46,7 +47,7 @@ pub(super) type Regressions = [BlockRegression<COLUMNS>; 4];
 
 /// Accumulates flights, each by itself.
 pub(super) struct Sticks {
-    flights: Vec<(usize, Regressions)>,
+    pub flights: Vec<(usize, Regressions)>,
 }
 
 /// What one flight, or all of them, say of the sticks.
@@ -138,6 +139,14 @@ impl Sticks {
     /// Adds what a flight says.
     pub fn push(&mut self, flight: usize, regressions: Regressions) {
         self.flights.push((flight, regressions));
+    }
+
+    /// What state and sticks leave unexplained of each axis in a flight.
+    pub fn unexplained(&self, flight: usize) -> Vec<Left> {
+        let of = |entry: &(usize, Regressions)| {
+            AXES.into_iter().zip(&entry.1).filter_map(|(axis, one)| Left::of(Fit::Answer { axis }, one)).collect()
+        };
+        self.flights.iter().find(|entry| entry.0 == flight).map_or_else(Vec::new, of)
     }
 
     /// What is wrong with sticks, worst first; one finding that nothing is, or that these flights do not tell. Flights of which something else is

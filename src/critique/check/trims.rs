@@ -1,0 +1,154 @@
+//! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, and one that stands elsewhere in some flights
+//! than in the others for the same answer. Signs, gains and order of the sticks are the business of `sticks`.
+
+use super::CONTROLS;
+use super::increments::SHORT_BLOCK_S;
+use super::odd::{NORMAL, in_flights};
+use super::report::{Finding, Verdict};
+use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks, median};
+use crate::flight::Flight;
+use std::collections::BTreeSet;
+
+/// A stick has stopped where it stands for so long, s …
+const STANDS_S: f64 = 6.0;
+/// … and for this share of the flight …
+const STANDS_SHARE: f64 = 0.15;
+/// … while its axis moves by this share of what it did before.
+const MOVING: f64 = 0.5;
+/// Another stick moves where it does so by more than this share of what it did before.
+const STILL: f64 = 1e-3;
+/// A pilot who lets a stick go has let it go before: it stood at the same value for so long, s.
+const AT_REST_S: f64 = 0.3;
+
+/// A trim differs from that of the others from here on, in units of the stick's usual deviation …
+const TRIMMED: f64 = 0.5;
+/// … and where it is so many times as far from them as they scatter.
+const APART: f64 = 6.0;
+
+/// What is wrong with where sticks stand; nothing of flights in `except`.
+pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<usize>) -> Vec<Finding> {
+    let judged: Vec<&(usize, Regressions)> = sticks.flights.iter().filter(|(flight, _)| !except.contains(flight)).collect();
+    let mut findings: Vec<Finding> = (0..4).filter_map(|stick| stopped(stick, &judged, flights)).collect();
+    let stands: BTreeSet<&String> = findings.iter().flat_map(|finding| &finding.flights).collect();
+    let rest: Vec<&(usize, Regressions)> =
+        judged.into_iter().filter(|(flight, _)| !stands.contains(&flights[*flight].name)).collect();
+    // The tail holds against the torque of the rotor and the collective carries the weight: where these stand is what is flown.
+    let of_trim: Vec<Finding> = (0..2).filter_map(|stick| trimmed(stick, &rest, flights)).collect();
+    findings.extend(of_trim);
+    findings
+}
+
+/// Flights in which a stick keeps its last value while its axis moves on.
+fn stopped(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
+    let has_stopped = |(index, regressions): &&&(usize, Regressions)| {
+        let flight = &flights[*index];
+        let values = flight.column(CONTROLS[stick]);
+        let stops = last_run(values);
+        let (samples, stood_s) = (values.len(), (values.len() - stops) as f64 * flight.step_s);
+        let at_rest = values.last().is_some_and(|last| longest_at(&values[..stops], *last) as f64 * flight.step_s >= AT_REST_S);
+        flight.rest();
+        if at_rest || stood_s < STANDS_S || stood_s < STANDS_SHARE * samples as f64 * flight.step_s {
+            return false;
+        }
+        let block = (stops as f64 * flight.step_s / SHORT_BLOCK_S).ceil() as usize;
+        let own = &regressions[stick];
+        let (before, after) = (own.part(0..block), own.part(block..own.blocks()));
+        let moves = |other: usize| after.deviation(FIRST + other, CONSTANT) > STILL * before.deviation(FIRST + other, CONSTANT);
+        let others = (0..4).filter(|other| *other != stick && moves(*other)).count();
+        others >= 2 && before.deviation(FIRST + stick, CONSTANT) > 0.0 && after.response() > MOVING * before.response()
+    };
+    let such: Vec<usize> = judged.iter().filter(has_stopped).map(|entry| entry.0).collect();
+    let (name, axis) = (STICKS[stick], AXES[stick]);
+    let message =
+        format!("{name} stands still from somewhere in the flight to its end while {axis} moves on: it was no longer recorded");
+    (!such.is_empty()).then(|| in_flights(&format!("still_{name}"), &such, &message, flights))
+}
+
+/// The first sample of the run of equal values at the end.
+fn last_run(values: &[f64]) -> usize {
+    values.chunk_by(|one, next| one == next).last().map_or(0, |run| values.len() - run.len())
+}
+
+/// Samples for which a value is kept at most.
+fn longest_at(values: &[f64], value: f64) -> usize {
+    values.chunk_by(|one, next| one == next).filter(|run| run[0] == value).map(<[f64]>::len).max().unwrap_or(0)
+}
+
+/// What a flight says of the place of a stick at which its axis rests.
+struct Trim {
+    flight: usize,
+    place: f64,
+    /// Half of its interval.
+    half: f64,
+}
+
+/// Flights in which the same answer needs the stick elsewhere than in the others. A centre of mass that lies elsewhere does the same, so it is a warning.
+fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
+    let of = |(flight, regressions): &&(usize, Regressions)| {
+        let estimates = regressions[stick].estimates()?;
+        let (constant, gain) = (estimates[CONSTANT], estimates[FIRST + stick]);
+        // Where the gain is not sure, nothing is.
+        let is_sure = gain.interval[0] * gain.interval[1] > 0.0;
+        let half = 0.5 * (constant.interval[1] - constant.interval[0]) / gain.value.abs();
+        is_sure.then(|| Trim { flight: *flight, place: -constant.value / gain.value, half })
+    };
+    let trims: Vec<Trim> = judged.iter().filter_map(of).collect();
+    let moves = median(judged.iter().map(|(_, regressions)| regressions[stick].deviation(FIRST + stick, CONSTANT)).collect())?;
+    let (fewer, by) = apart(trims, TRIMMED * moves)?;
+    let name = STICKS[stick];
+    let message = format!(
+        "{name} stands {:.3} {} than in the other flights for the same answer: a trim or an offset of {name} there, or a centre of mass that lies \
+         elsewhere",
+        by.abs(),
+        if by > 0.0 { "higher" } else { "lower" }
+    );
+    let mut indices: Vec<usize> = fewer.iter().map(|trim| trim.flight).collect();
+    indices.sort_unstable();
+    Some(Finding { verdict: Verdict::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
+}
+
+/// The smaller of two groups of trims far apart, and by how much it differs; `None` where there is one group.
+fn apart(mut trims: Vec<Trim>, least: f64) -> Option<(Vec<Trim>, f64)> {
+    trims.sort_unstable_by(|one, other| one.place.total_cmp(&other.place));
+    let gap = |at: usize| trims[at].place - trims[at - 1].place;
+    let split = (1..trims.len()).max_by(|one, other| gap(*one).total_cmp(&gap(*other)))?;
+    let high = trims.split_off(split);
+    let middle = |group: &[Trim]| median(group.iter().map(|trim| trim.place).collect());
+    let [below, above] = [middle(&trims)?, middle(&high)?];
+    let scatter = trims.iter().map(|trim| trim.place - below).chain(high.iter().map(|trim| trim.place - above));
+    let scatter = NORMAL * median(scatter.map(f64::abs).collect())?;
+    let by = above - below;
+    let gap = high.first()?.place - trims.last()?.place;
+    let (fewer, by) = if high.len() <= trims.len() { (high, by) } else { (trims, -by) };
+    let unsure = median(fewer.iter().map(|trim| trim.half).collect())?;
+    let is_apart = by.abs() > least + unsure && by.abs() > APART * scatter && gap > 0.4 * by.abs();
+    is_apart.then_some((fewer, by))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trims(places: &[f64]) -> Vec<Trim> {
+        places.iter().enumerate().map(|(flight, &place)| Trim { flight, place, half: 0.01 }).collect()
+    }
+
+    #[test]
+    fn two_groups_of_trims_are_told_and_one_that_scatters_is_not() {
+        let (fewer, by) = apart(trims(&[0.01, 0.21, -0.01, 0.0, 0.02]), 0.05).expect("two groups");
+        assert_eq!(fewer.iter().map(|trim| trim.flight).collect::<Vec<_>>(), [1]);
+        assert!((by - 0.2).abs() < 0.02, "{by}");
+        let (fewer, by) = apart(trims(&[0.2, 0.0, 0.21, 0.01, 0.0]), 0.05).expect("two groups");
+        assert_eq!(fewer.iter().map(|trim| trim.flight).collect::<BTreeSet<_>>(), BTreeSet::from([0, 2]));
+        assert!(by > 0.15);
+        assert!(apart(trims(&[0.0, 0.1, -0.1, 0.2, -0.05]), 0.05).is_none());
+    }
+
+    #[test]
+    fn the_run_at_the_end_is_found_and_an_earlier_rest_at_its_value_too() {
+        assert_eq!(last_run(&[1.0, 2.0, 2.0, 2.0]), 1);
+        assert_eq!(last_run(&[]), 0);
+        assert_eq!(longest_at(&[2.0, 2.0, 1.0, 2.0], 2.0), 2);
+        assert_eq!(longest_at(&[1.0], 2.0), 0);
+    }
+}
