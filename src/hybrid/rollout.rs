@@ -53,7 +53,8 @@ impl<'a> HybridRollout<'a> {
     /// As [`Rollout::roll`]; [`crate::Error::Config`] for a start without a full history.
     pub fn roll<T: Send>(&self, starts: &[Window], each: Each<'_, T>) -> Result<Vec<T>> {
         self.hybrid.check_windows(self.rollout.flights(), starts)?;
-        let addition = |flight: usize, samples: &[usize]| Ok(Box::new(Added::new(self, flight, samples)?) as Box<dyn Addition + '_>);
+        let addition =
+            |flight: usize, samples: &[usize]| Ok(Box::new(Added::new(self, flight, samples)?) as Box<dyn Addition + '_>);
         let further = Further { program: &self.program, lanes: LANES, addition: &addition };
         self.rollout.roll_with(starts, None, Some(&further), each)
     }
@@ -91,15 +92,7 @@ impl<'a> Added<'a> {
             let before = |sample: usize| (0..lags).rev().flat_map(move |lag| signals.row(sample, lag).iter().copied());
             samples.iter().map(|&sample| before(sample).collect()).collect()
         };
-        Ok(Self {
-            hybrid: of.hybrid,
-            linear,
-            session,
-            history,
-            state,
-            physics,
-            signals: linear.map(signals).unwrap_or_default(),
-        })
+        Ok(Self { hybrid: of.hybrid, linear, session, history, state, physics, signals: linear.map(signals).unwrap_or_default() })
     }
 
     /// What the linear history says, six numbers a lane; its inputs come after the network's.

@@ -16,5 +16,5 @@ pub use benchmark::benchmark_page;
 pub use compare::{CompareReport, compare_page};
 pub use diagnose::{DiagnoseReport, diagnose_page};
 pub use figures::Figure;
-pub use rollout::rollout_page;
 pub use page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, page};
+pub use rollout::rollout_page;

@@ -34,14 +34,22 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
             let percent = (*row.whole.difference_percent.of(quantity))?;
             let chance = (*row.whole.difference_percent_ci95.of(quantity)).is_none_or(|[low, high]| low <= 0.0 && high >= 0.0);
             let size = format!("{:.0} % {}", percent.abs(), if percent < 0.0 { "less" } else { "more" });
-            Some(format!("{size} in {}{}", quantity.name(), if chance { " (within its interval)" } else { "" }))
+            let size = if percent.abs() < 0.5 { "as much".to_owned() } else { size };
+            Some(format!(
+                "{size} in {}{}",
+                quantity.name(),
+                if chance && percent.abs() >= 0.5 { " (within its interval)" } else { "" }
+            ))
         };
         let found: Vec<String> = Quantity::ALL.into_iter().filter_map(says).collect();
         out.push(format!("Summed over the horizon, {} errs against {}: {}.", row.name, rollouts.relative_to, found.join(", ")));
     }
     for row in rollouts.rows.iter().filter(|row| row.whole.diverged > 0) {
         let (diverged, n) = (row.whole.diverged, row.whole.n);
-        out.push(format!("Beware: {diverged} of {n} rollouts of {} diverged; their states stay where they left the bounds.", row.name));
+        out.push(format!(
+            "Beware: {diverged} of {n} rollouts of {} diverged; their states stay where they left the bounds.",
+            row.name
+        ));
     }
     out
 }
@@ -63,7 +71,8 @@ fn figure(rollouts: &Rollouts) -> super::Figure {
         order.insert(1, focus);
     }
     let panels = Quantity::ALL.map(|quantity| (quantity.name().to_owned(), quantity.unit().to_owned()));
-    let caption = "Mean size of the error over all starts. Drag to zoom, double-click to go back; click a name to hide or show its line.";
+    let caption =
+        "Mean size of the error over all starts. Drag to zoom, double-click to go back; click a name to hide or show its line.";
     let data: Vec<LineData> = order.into_iter().map(line).collect();
     lines("Error over the horizon", caption, "time from the start, s", &panels, &data)
 }

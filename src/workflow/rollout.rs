@@ -7,8 +7,8 @@ use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::{DataSet, Window};
 use crate::hybrid::{Hybrid, HybridRollout};
-use crate::physics::rollout::{Rollout, starts};
 use crate::physics::Model;
+use crate::physics::rollout::{Rollout, starts};
 
 /// Who is rolled out, and from where. Work is shared with the other threads of the pool it runs in.
 pub struct Rolling<'a> {

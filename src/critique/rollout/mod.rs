@@ -224,8 +224,7 @@ impl<'a> Judge<'a> {
 
     /// The errors of predictors, each with its name, its sums block by block, and the index of the row that differences are relative to.
     pub fn rows(&self, predictors: Vec<(String, Vec<Sums>)>, relative_to: usize) -> Vec<RolloutRow> {
-        let predictors: Vec<(String, Vec<Sums>)> =
-            predictors.into_iter().map(|(name, sums)| (name, self.by_block(sums))).collect();
+        let predictors: Vec<(String, Vec<Sums>)> = predictors.into_iter().map(|(name, sums)| (name, self.by_block(sums))).collect();
         let mut manoeuvres: Vec<&str> = self.starts.iter().map(|start| self.flights[start.flight].manoeuvre.as_str()).collect();
         manoeuvres.sort_unstable();
         manoeuvres.dedup();
@@ -343,11 +342,8 @@ pub fn angle(a: [f64; 4], b: [f64; 4]) -> f64 {
     // Of conj(a) ⊗ b; from sine and cosine, so that small angles keep their digits.
     let [ax, ay, az, aw] = a;
     let [bx, by, bz, bw] = b;
-    let vector = [
-        aw * bx - ax * bw - ay * bz + az * by,
-        aw * by + ax * bz - ay * bw - az * bx,
-        aw * bz - ax * by + ay * bx - az * bw,
-    ];
+    let vector =
+        [aw * bx - ax * bw - ay * bz + az * by, aw * by + ax * bz - ay * bw - az * bx, aw * bz - ax * by + ay * bx - az * bw];
     2.0 * dot(vector, vector).sqrt().atan2((ax * bx + ay * by + az * bz + aw * bw).abs())
 }
 
@@ -357,4 +353,85 @@ pub fn angle(a: [f64; 4], b: [f64; 4]) -> f64 {
 /// Those of the predictors.
 pub fn collected(batches: Result<Vec<Vec<Sums>>>) -> Result<Vec<Sums>> {
     Ok(batches?.into_iter().flatten().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::{Column, Targets};
+    use crate::physics::{Model, Rollout};
+    use phyture_kernels::Tolerance;
+    use proptest::prelude::*;
+
+    const CLOSE: f64 = Tolerance::Close.relative_f64();
+
+    /// Level flights of 20 s north-east at (3, 4) m/s, the second of them at the double speed and of another class.
+    fn flights() -> Result<Vec<Flight>> {
+        let flight = |name: &str, class: &str, factor: f64| {
+            let columns = Column::ALL.map(|column| {
+                let of = |sample: usize| match column {
+                    Column::X => 3.0 * factor * 0.1 * sample as f64,
+                    Column::Y => 4.0 * factor * 0.1 * sample as f64,
+                    Column::Vx => 3.0 * factor,
+                    Column::Vy => 4.0 * factor,
+                    Column::Wz => 0.5,
+                    _ => 0.0,
+                };
+                (0..200).map(of).collect()
+            });
+            Flight::new(name, class, 0.0, 0.1, columns, Targets::Recorded)
+        };
+        Ok(vec![flight("a", "slow", 1.0)?, flight("b", "fast", 2.0)?])
+    }
+
+    #[test]
+    fn errors_sums_coefficients_and_differences_are_what_they_are_by_hand() -> Result<()> {
+        let flights = flights()?;
+        let starts: Vec<Window> = (0..2).flat_map(|flight| (1..180).step_by(2).map(move |last| Window { flight, last })).collect();
+        let judge = Judge::new(&flights, &starts, 10);
+        // A body without weight that flies on, but turns by its recorded rate.
+        let model = Model { effects: Vec::new(), ..Model::paper("nothing", 1.0, [1.0; 3], 0.5) };
+        let rolled = collected(Rollout::new(&model, &flights, 10)?.roll(&starts, None, &|rolled| judge.sums(rolled)))?;
+        let rows = judge.rows(vec![("held".into(), judge.state_held()), ("nothing".into(), rolled)], 0);
+        let (held, turning) = (&rows[0], &rows[1]);
+        let close = |found: f64, expected: f64| (found - expected).abs() <= CLOSE * expected.abs().max(1.0);
+        // Speeds of 5 and 10 m/s: 7.5 m/s in the mean, 0.1 s a step.
+        assert!((0..10).all(|step| close(held.error.position[step], 0.75 * (step + 1) as f64)), "{held:?}");
+        assert!(close(held.whole.sum.position, 0.75 * 55.0) && close(held.whole.theil.position.unwrap_or(0.0), 1.0));
+        assert_eq!((held.whole.n, held.whole.blocks, held.whole.diverged), (180, 4, 0));
+        assert!(
+            held.whole.sum.velocity == 0.0
+                && held.whole.theil.velocity == Some(0.0)
+                && held.whole.difference_percent.velocity.is_none()
+        );
+        assert!(close(held.by_manoeuvre["slow"].sum.position, 0.5 * 55.0) && close(held.by_manoeuvre["fast"].sum.position, 55.0));
+        // The scatter within a class is none, between the classes it is known: two blocks at 5, two at 10, nearly as many starts in each.
+        assert!(held.by_manoeuvre["slow"].sum_ci95.position.is_some_and(|[low, high]| close(low, high)));
+        assert!(held.whole.sum_ci95.position.is_some_and(|[low, high]| low < 0.6 * 55.0 && high > 0.9 * 55.0));
+        // The recorded attitude stays, so a prediction that turns errs by the angle.
+        assert!((0..10).all(|step| close(turning.error.attitude[step], 0.05 * (step + 1) as f64)), "{turning:?}");
+        assert!(close(turning.whole.theil.attitude.unwrap_or(0.0), 1.0) && turning.whole.sum.rates <= CLOSE);
+        // Velocity turns with the body axes, as no Coriolis term keeps it: 2 sin(angle / 2) of the speed.
+        assert!(close(turning.error.velocity[9], 7.5 * 2.0 * 0.25_f64.sin()), "{turning:?}");
+        let percent = turning.whole.difference_percent.position.unwrap_or(0.0);
+        assert!(close(percent, 100.0 * (turning.whole.sum.position / held.whole.sum.position - 1.0)) && percent < -50.0);
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn the_angle_between_attitudes_is_that_of_the_turn(
+            q in prop::array::uniform4(-1.0..1.0_f64), axis in prop::array::uniform3(-1.0..1.0_f64), turn in 1e-9..3.1_f64,
+        ) {
+            let unit = |values: &[f64]| values.iter().map(|value| value * value).sum::<f64>().sqrt();
+            prop_assume!(unit(&q) > 0.1 && unit(&axis) > 0.1);
+            let [a, b, c, w] = q.map(|part| part / unit(&q));
+            let [x, y, z] = axis.map(|part| part / unit(&axis) * (0.5 * turn).sin());
+            let s = (0.5 * turn).cos();
+            let turned = [w * x + a * s + b * z - c * y, w * y + b * s + c * x - a * z, w * z + c * s + a * y - b * x, w * s - a * x - b * y - c * z];
+            let found = angle([a, b, c, w], turned);
+            prop_assert!((found - turn).abs() <= CLOSE, "{} {}", found, turn);
+            prop_assert!((angle(turned.map(|part| -part), [a, b, c, w]) - turn).abs() <= CLOSE, "a quaternion and its negative are one attitude");
+        }
+    }
 }

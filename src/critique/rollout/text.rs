@@ -3,12 +3,12 @@
 use super::{Quantity, RolloutError, RolloutRow, Rollouts};
 use crate::critique::digits::{Kind, aligned, significant};
 use crate::critique::table::{OWN_FROM_FIRST_HALF, ordinal};
-use crate::critique::wrap::{clipped, wrapped};
+use crate::critique::wrap::{WIDTH, clipped, wrapped};
 use crate::flight::split::Part;
 use std::fmt;
 
 /// Widest name of a row.
-const NAME: usize = 26;
+const NAME: usize = 22;
 
 impl Rollouts {
     /// One sentence on what was rolled out.
@@ -65,8 +65,15 @@ impl Rollouts {
             cells.push(row.whole.diverged.to_string());
             (clipped(&row.name, NAME), cells)
         };
+        let mut rows: Vec<(String, Vec<String>)> = self.rows.iter().map(cells).collect();
+        if wide(&heads, &rows) > WIDTH {
+            // Of very large or small numbers; the interval is in the JSON and on the page.
+            let interval = shown.len() + 1;
+            heads.remove(interval);
+            rows.iter_mut().for_each(|(_, cells)| drop(cells.remove(interval)));
+        }
         writeln!(f, "\n{} error", capital(quantity.name()))?;
-        aligned(f, &heads, &self.rows.iter().map(cells).collect::<Vec<_>>())
+        aligned(f, &heads, &rows)
     }
 
     fn manoeuvre_table(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -98,12 +105,32 @@ impl RolloutError {
     /// How much larger the sum is than that of the reference, %, with its interval: `-12.3 (-15.0…-9.8)`.
     pub fn difference_text(&self, quantity: Quantity) -> String {
         let Some(percent) = *self.difference_percent.of(quantity) else { return "–".to_owned() };
-        let signed = |value: f64| format!("{value:+.1}");
         match *self.difference_percent_ci95.of(quantity) {
-            Some([low, high]) if low < high => format!("{} ({}…{})", signed(percent), signed(low), signed(high)),
+            Some([low, high]) if signed(low) != signed(high) => format!("{} ({}…{})", signed(percent), signed(low), signed(high)),
             _ => signed(percent),
         }
     }
+}
+
+/// Percent with a sign and one decimal; in powers of ten from a thousand on.
+fn signed(percent: f64) -> String {
+    match percent.abs() {
+        // Without the sign of a rounding error.
+        0.0..0.05 => "0.0".to_owned(),
+        0.05..1000.0 => format!("{percent:+.1}"),
+        _ => format!("{percent:+.1e}"),
+    }
+}
+
+/// Width of a table as [`aligned`] writes it.
+fn wide(heads: &[(&str, &str)], rows: &[(String, Vec<String>)]) -> usize {
+    let wide = |text: &str| text.chars().count();
+    let first = rows.iter().map(|(name, _)| wide(name)).max().unwrap_or(0);
+    let column = |(column, head): (usize, &(&str, &str))| {
+        let cells = rows.iter().filter_map(|(_, cells)| cells.get(column)).map(|cell| wide(cell));
+        2 + cells.chain([wide(head.0), wide(head.1)]).max().unwrap_or(0)
+    };
+    2 + first + heads.iter().enumerate().map(column).sum::<usize>()
 }
 
 fn capital(text: &str) -> String {
@@ -120,5 +147,59 @@ impl fmt::Display for Rollouts {
         Quantity::ALL.into_iter().try_for_each(|quantity| self.quantity_table(f, quantity))?;
         self.manoeuvre_table(f)?;
         writeln!(f, "\n{}", wrapped("", &self.legend()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{PerQuantity, RolloutError};
+    use super::*;
+    use std::collections::BTreeMap;
+
+    fn row(name: &str, size: f64) -> RolloutRow {
+        let whole = RolloutError {
+            n: 1234,
+            blocks: 20,
+            diverged: 1234,
+            sum: PerQuantity::new(|_| 50.0 * size),
+            sum_ci95: PerQuantity::new(|_| Some([45.0 * size, 55.0 * size])),
+            theil: PerQuantity::new(|_| Some(0.98765)),
+            difference_percent: PerQuantity::new(|_| Some(-size)),
+            difference_percent_ci95: PerQuantity::new(|_| Some([-1.1 * size, 1.1 * size])),
+        };
+        RolloutRow {
+            name: name.into(),
+            error: PerQuantity::new(|_| vec![size; 50]),
+            by_manoeuvre: BTreeMap::from([("hover".to_owned(), whole.clone()), ("chaos".to_owned(), whole.clone())]),
+            whole,
+        }
+    }
+
+    #[test]
+    fn tables_fit_the_terminal_whatever_the_numbers_and_name_steps_and_units() {
+        let long = "a model with a very long name, rates held";
+        let of = |size: f64, horizon: usize| Rollouts {
+            horizon,
+            step_s: 0.01,
+            stride: 2,
+            split: Part::Locked,
+            own_from_first_half: true,
+            most_speed_m_s: 200.0,
+            most_rate_rad_s: 100.0,
+            relative_to: long.into(),
+            rows: vec![row("state held", size), row(long, size)],
+        };
+        for size in [1e-9, 0.0123456, 5.0, 123.456, 9.87654e7] {
+            let text = of(size, 50).to_string();
+            assert!(text.lines().all(|line| line.chars().count() <= WIDTH), "{text}");
+            assert!(
+                text.contains("1234 starts in the locked flights, every 2nd sample; 50 steps of 0.01 s, 0.500 s in all"),
+                "{text}"
+            );
+            assert!(text.contains("h = 10") && text.contains("Manoeuvre chaos") && text.contains("rad/s"), "{text}");
+        }
+        assert_eq!(of(1.0, 50).shown(), [1, 10, 50]);
+        assert_eq!((of(1.0, 4).shown(), of(1.0, 1).shown()), (vec![1, 4], vec![1]));
+        assert_eq!([-1e-12, -2.04, 351.93, 12345.6].map(signed), ["0.0", "-2.0", "+351.9", "+1.2e4"]);
     }
 }

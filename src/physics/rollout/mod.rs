@@ -226,7 +226,8 @@ pub fn starts(spans: &[Span], history: usize, horizon: usize, stride: usize) -> 
 /// Refuses flights that lack a part of the state.
 fn check_state(flight: &Flight) -> Result<()> {
     let Some(column) = STATE.iter().find(|column| flight.absent.contains(column)) else { return Ok(()) };
-    let what = if *column as usize <= Column::Z as usize { "no position in the log" } else { "a part of the state missing in the log" };
+    let what =
+        if *column as usize <= Column::Z as usize { "no position in the log" } else { "a part of the state missing in the log" };
     Err(Error::Log {
         path: (&flight.name).into(),
         found: format!("{what} (no column `{}`)", column.name()),
@@ -256,7 +257,10 @@ fn check_horizon(flights: &[Flight], horizon: usize) -> Result<()> {
             format!("flight `{}`", other.name),
             "step",
             format!("{} s", other.step_s),
-            format!("the {step_s} s of flight `{}`, as errors are told by step; set `resample_hz` in dataset.toml", flights[0].name),
+            format!(
+                "the {step_s} s of flight `{}`, as errors are told by step; set `resample_hz` in dataset.toml",
+                flights[0].name
+            ),
         ),
     }
 }
