@@ -29,6 +29,7 @@ pub fn rollout_page(rollouts: &Rollouts, provenance: &[(String, String)]) -> Pag
 fn summary(rollouts: &Rollouts) -> Vec<String> {
     let mut out = vec![format!("{}.", rollouts.basis())];
     out.extend(rollouts.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
+    out.extend(rollouts.caution());
     for row in rollouts.rows.iter().filter(|row| row.name != rollouts.relative_to).skip(1) {
         let says = |quantity: Quantity| {
             let percent = (*row.whole.difference_percent.of(quantity))?;

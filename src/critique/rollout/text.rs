@@ -1,6 +1,7 @@
 //! Errors by step as text for a person at a terminal. Only layout; every number comes from [`Rollouts`].
 
 use super::{Quantity, RolloutError, RolloutRow, Rollouts};
+use crate::blocks::FEW_BLOCKS;
 use crate::critique::digits::{Kind, aligned, significant};
 use crate::critique::table::{OWN_FROM_FIRST_HALF, ordinal};
 use crate::critique::wrap::{WIDTH, clipped, wrapped};
@@ -28,6 +29,20 @@ impl Rollouts {
             "{starts} starts in {part}, {every}; {} steps of {} s, {seconds} s in all, under the measured controls",
             self.horizon, self.step_s
         )
+    }
+
+    /// What so few blocks of ten seconds can say, if they are few.
+    pub fn caution(&self) -> Option<String> {
+        match self.rows.first().map_or(0, |row| row.whole.blocks) {
+            0 => None,
+            1 => {
+                Some("All starts lie in one block of ten seconds: nothing can be said of chance, so there are no intervals.".into())
+            }
+            blocks if blocks < FEW_BLOCKS => {
+                Some(format!("The starts lie in {blocks} blocks of ten seconds: the intervals are a rough guide."))
+            }
+            _ => None,
+        }
     }
 
     /// The steps that a table shows: the first, the tenth and the last of fifty; of another horizon the first, the one after a fifth of it, and the last.
@@ -143,6 +158,9 @@ impl fmt::Display for Rollouts {
         writeln!(f, "{}", wrapped("", &self.basis()))?;
         if self.own_from_first_half {
             writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
+        }
+        if let Some(caution) = self.caution() {
+            writeln!(f, "{}", wrapped("", &caution))?;
         }
         Quantity::ALL.into_iter().try_for_each(|quantity| self.quantity_table(f, quantity))?;
         self.manoeuvre_table(f)?;
