@@ -47,6 +47,9 @@ pub struct Rollout<'a> {
     hold_rates: bool,
 }
 
+/// Makes the addition for the lanes that start at some samples of a flight.
+type Make<'a> = &'a (dyn Fn(usize, &[usize]) -> Result<Box<dyn Addition + 'a>> + Sync);
+
 /// Formulas beside the model's, and what is made of them and added to its accelerations.
 pub(crate) struct Further<'a> {
     /// The formulas.
@@ -54,7 +57,7 @@ pub(crate) struct Further<'a> {
     /// Most lanes at once.
     pub lanes: usize,
     /// Makes the addition for the lanes that start at these samples of a flight.
-    pub addition: &'a (dyn Fn(usize, &[usize]) -> Result<Box<dyn Addition + 'a>> + Sync),
+    pub addition: Make<'a>,
 }
 
 /// Starts on one flight, in order of time.
