@@ -76,6 +76,13 @@ impl Graph {
         self.intern(Kind::Symbol(self.symbols.len() as u32 - 1))
     }
 
+    /// Lets each evaluation give a symbol another value.
+    pub fn let_vary(&mut self, symbol: Node) {
+        if let Kind::Symbol(index) = self.nodes[symbol.0 as usize] {
+            self.symbols[index as usize].varies = true;
+        }
+    }
+
     /// A column by name.
     pub fn input(&mut self, name: &str) -> Node {
         let known = self.inputs.iter().position(|known| known == name);
@@ -257,14 +264,43 @@ impl Graph {
 
     /// The nodes behind some roots, themselves included, operands before what is made of them.
     pub(super) fn behind(&self, roots: &[Node]) -> Vec<Node> {
+        self.behind_given(roots, &[])
+    }
+
+    /// The same without what stands behind those that are given.
+    pub(super) fn behind_given(&self, roots: &[Node], given: &[Node]) -> Vec<Node> {
         let mut needed = vec![false; self.nodes.len()];
         roots.iter().for_each(|root| needed[root.0 as usize] = true);
         for index in (0..self.nodes.len()).rev() {
-            if needed[index] {
+            if needed[index] && !given.contains(&Node(index as u32)) {
                 self.operands(Node(index as u32)).for_each(|operand| needed[operand.0 as usize] = true);
             }
         }
         (0..self.nodes.len()).filter(|&index| needed[index]).map(|index| Node(index as u32)).collect()
+    }
+
+    /// The largest parts of some values that no column named by `moves` is behind, and that are not the same at all samples: what can be worked
+    /// out before it is known how those columns move.
+    pub fn apart_from(&self, roots: &[Node], moves: &dyn Fn(&str) -> bool) -> Vec<Node> {
+        let behind = self.behind(roots);
+        let mut moved = vec![false; self.nodes.len()];
+        let mut asked_for = vec![false; self.nodes.len()];
+        roots.iter().for_each(|root| asked_for[root.0 as usize] = true);
+        for &node in &behind {
+            let at = node.0 as usize;
+            moved[at] = match self.nodes[at] {
+                Kind::Input(index) => moves(&self.inputs[index as usize]),
+                _ => self.operands(node).any(|operand| moved[operand.0 as usize]),
+            };
+            if moved[at] {
+                self.operands(node).for_each(|operand| asked_for[operand.0 as usize] = true);
+            }
+        }
+        let is_apart = |node: &Node| {
+            let at = node.0 as usize;
+            asked_for[at] && !moved[at] && self.uniform[at].is_none()
+        };
+        behind.into_iter().filter(is_apart).collect()
     }
 
     /// Whether a value is made of any of these.

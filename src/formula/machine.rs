@@ -29,19 +29,30 @@ enum Step {
     Recall { memory: u32, x: Slot, number: Slot, tangents: [Slot; 2], out: Slot },
 }
 
+/// The columns that an operator which remembers reads at the samples at hand, and the one that it fills.
+pub(super) struct Recalled<'a> {
+    pub level: Level,
+    pub signal: &'a [f64],
+    /// Time or limit.
+    pub number: &'a [f64],
+    pub tangents: [&'a [f64]; 2],
+    pub out: &'a mut [f64],
+}
+
 /// Some values of a [`Graph`] ready to be evaluated, with the hidden state of what remembers. Samples come in order; the first one after
 /// [`Machine::new`] or [`Machine::reset`] is taken to follow a long rest at its own value.
 #[derive(Clone, Debug)]
 pub struct Machine {
     steps: Vec<Step>,
-    memory: Vec<Memory>,
+    pub(super) memory: Vec<Memory>,
     /// One column a slot; those of constants are filled once.
     columns: Vec<Vec<f64>>,
     roots: Vec<Slot>,
-    /// Index in the graph's inputs of each column that is read.
+    /// Index in the graph's inputs of each column that is read; those of values that are given follow them.
     inputs: Vec<usize>,
     block: usize,
     level: Level,
+    pub(super) step_s: f64,
 }
 
 /// Gives out columns, and takes back those that are no longer read.
@@ -75,16 +86,32 @@ impl Machine {
     /// [`Error::Config`] for a step that is not positive and finite, a delay of too many steps, or an instruction set that was asked for
     /// and is not there.
     pub fn new(graph: &Graph, roots: &[Node], step_s: f64, number: &dyn Fn(Node) -> Option<f64>) -> Result<Self> {
+        Self::with_given(graph, roots, &[], step_s, number)
+    }
+
+    /// As [`Machine::new`], with values that are not worked out but given, as if they were columns: in [`Machine::inputs`] the index of
+    /// the n-th of `given` is n more than the graph has inputs. None of them may be the same at all samples.
+    ///
+    /// # Errors
+    /// As [`Machine::new`].
+    pub fn with_given(
+        graph: &Graph,
+        roots: &[Node],
+        given: &[Node],
+        step_s: f64,
+        number: &dyn Fn(Node) -> Option<f64>,
+    ) -> Result<Self> {
         if !(step_s > 0.0 && step_s.is_finite()) {
             let (found, expected) = (step_s.to_string(), "a positive, finite step".into());
             return Err(Error::Config { place: "formula".into(), field: "step_s".into(), found, expected });
         }
-        let behind = graph.behind(roots);
+        let behind = graph.behind_given(roots, given);
         let uniform = uniform(graph, &behind, number);
         let is_uniform = |node: &Node| uniform[node.0 as usize].is_some();
+        let operands = |node: Node| graph.operands(node).filter(move |_| !given.contains(&node));
         let mut last_use: Vec<Option<usize>> = vec![None; graph.nodes.len()];
         for (place, &node) in behind.iter().enumerate() {
-            graph.operands(node).for_each(|operand| last_use[operand.0 as usize] = Some(place));
+            operands(node).for_each(|operand| last_use[operand.0 as usize] = Some(place));
         }
         roots.iter().for_each(|root| last_use[root.0 as usize] = Some(usize::MAX));
         let mut machine = Self {
@@ -95,14 +122,18 @@ impl Machine {
             inputs: Vec::new(),
             block: 0,
             level: Level::detect().map_err(Error::level)?,
+            step_s,
         };
         let mut slots = Slots { count: 0, free: Vec::new(), of: vec![None; graph.nodes.len()] };
         // Columns of constants are filled once, so they are never given to anything else.
         let of_constant = |node: &Node| Some((slots.take(*node), uniform[node.0 as usize]?));
         let constants: Vec<(Slot, f64)> = behind.iter().filter(|node| is_uniform(node)).filter_map(of_constant).collect();
         for (place, &node) in behind.iter().enumerate().filter(|(_, node)| !is_uniform(node)) {
-            machine.step(graph, node, step_s, &uniform, &mut slots)?;
-            for operand in graph.operands(node).filter(|operand| !is_uniform(operand)) {
+            match given.iter().position(|given| *given == node) {
+                Some(place) => machine.input(graph.inputs().len() + place, node, &mut slots),
+                None => machine.step(graph, node, &uniform, &mut slots)?,
+            }
+            for operand in operands(node).filter(|operand| !is_uniform(operand)) {
                 // Once, also for one that is both operands.
                 if last_use[operand.0 as usize].take_if(|last| *last == place).is_some() {
                     let slot = slots.of(operand);
@@ -117,17 +148,24 @@ impl Machine {
         Ok(machine)
     }
 
+    /// Adds what takes a column from outside.
+    fn input(&mut self, input: usize, node: Node, slots: &mut Slots) {
+        let known = self.inputs.iter().position(|known| *known == input);
+        let place = known.unwrap_or_else(|| {
+            self.inputs.push(input);
+            self.inputs.len() - 1
+        });
+        self.steps.push(Step::Input { input: place as u32, out: slots.take(node) });
+    }
+
     /// Adds what computes one node.
-    fn step(&mut self, graph: &Graph, node: Node, step_s: f64, uniform: &[Option<f64>], slots: &mut Slots) -> Result<()> {
+    fn step(&mut self, graph: &Graph, node: Node, uniform: &[Option<f64>], slots: &mut Slots) -> Result<()> {
+        let step_s = self.step_s;
         let step = match graph.nodes[node.0 as usize] {
             Kind::Number(_) | Kind::Symbol(_) => unreachable!("a number is the same at all samples"),
             Kind::Input(input) => {
-                let known = self.inputs.iter().position(|known| *known == input as usize);
-                let place = known.unwrap_or_else(|| {
-                    self.inputs.push(input as usize);
-                    self.inputs.len() - 1
-                });
-                Step::Input { input: place as u32, out: slots.take(node) }
+                self.input(input as usize, node, slots);
+                return Ok(());
             }
             Kind::One(operation, x) => Step::One { operation, x: slots.of(x), out: slots.take(node) },
             Kind::Two(operation, x, y) => {
@@ -148,6 +186,7 @@ impl Machine {
                         expected: format!("at most {MAX_DELAY_SAMPLES:e} samples, which can be kept"),
                     });
                 }
+                check_time(recall, number)?;
                 self.memory.push(Memory::new(recall, number, step_s));
                 let (x, number, tangents) = (slots.of(x), slots.of(time), [slots.of(tangent), slots.of(limit)]);
                 Step::Recall { memory: self.memory.len() as u32 - 1, x, number, tangents, out: slots.take(node) }
@@ -174,8 +213,24 @@ impl Machine {
 
     /// Takes the next samples, at most [`Machine::block`] of them; `input` gives their columns in the order of [`Machine::inputs`].
     pub fn advance<'a>(&mut self, samples: usize, input: &dyn Fn(usize) -> &'a [f64]) {
+        let Self { memory, .. } = self;
+        let mut memory = std::mem::take(memory);
+        self.evaluate(samples, input, &mut |index, recalled| {
+            let Recalled { level, signal, number, tangents, out } = recalled;
+            memory[index].run(level, signal, number, tangents, out);
+        });
+        self.memory = memory;
+    }
+
+    /// Works through the steps; `recall` fills the columns of what remembers, by its number.
+    pub(super) fn evaluate<'a>(
+        &mut self,
+        samples: usize,
+        input: &dyn Fn(usize) -> &'a [f64],
+        recall: &mut dyn FnMut(usize, Recalled<'_>),
+    ) {
         assert!(samples <= self.block, "{samples} samples at once, at most {}", self.block);
-        let Self { steps, memory, columns, level, .. } = self;
+        let Self { steps, columns, level, .. } = self;
         for step in steps {
             let (Step::Input { out, .. }
             | Step::One { out, .. }
@@ -191,7 +246,8 @@ impl Machine {
                 Step::Two { operation, x, y, .. } => operation.of_columns(*level, column(x), column(y), values),
                 Step::PowerInteger { x, exponent, .. } => whole_power_of_column(*level, exponent, column(x), values),
                 Step::Recall { memory: index, x, number, tangents, .. } => {
-                    memory[index as usize].run(*level, column(x), column(number), tangents.map(column), values);
+                    let (signal, number, tangents) = (column(x), column(number), tangents.map(column));
+                    recall(index as usize, Recalled { level: *level, signal, number, tangents, out: values });
                 }
             }
             columns[out as usize] = result;
@@ -202,6 +258,22 @@ impl Machine {
     pub fn root(&self, index: usize) -> &[f64] {
         &self.columns[self.roots[index] as usize]
     }
+}
+
+/// Refuses a time or a limit that its operator cannot have: one that a symbol was given, as the graph has looked at its own.
+fn check_time(recall: Recall, number: Option<f64>) -> Result<()> {
+    let Some(number) = number else { return Ok(()) };
+    let (field, possible, expected) = match recall {
+        Recall::History(History::Lag) => ("lag", number >= 0.0, "a time of at least 0 s"),
+        Recall::History(History::Delay) => ("delay", number >= 0.0, "a time of at least 0 s"),
+        Recall::History(History::Slew) => ("slew", number > 0.0, "a largest rate above 0"),
+        _ => return Ok(()),
+    };
+    if possible {
+        return Ok(());
+    }
+    let (place, found, expected) = ("formula".into(), number.to_string(), expected.into());
+    Err(Error::Config { place, field: field.into(), found, expected })
 }
 
 /// By node, the values that are the same at all samples, with the symbols that vary at the values of this evaluation.

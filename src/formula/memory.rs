@@ -41,7 +41,8 @@ pub(super) enum Memory {
     /// `dy/ds` of that: the slope between the two samples.
     DelayByTime { whole: usize, step_s: f64, past: Past },
     /// `y[k] = (x[k] - x[k-1]) / T`, zero at the first sample: causal, so half a sample late.
-    Rate { step_s: f64, last: Option<f64> },
+    /// The last two samples are kept, for [`Memory::ahead`].
+    Rate { step_s: f64, last: Option<[f64; 2]> },
     /// `y[k] = y[k-1] + clamp(x[k] - y[k-1], -limit, limit)`: a servo at its largest speed.
     Slew { limit: f64, last: Option<f64> },
     /// Derivative of that by a number, from those of `x` and of the largest rate. The last `y` and its derivative.
@@ -131,7 +132,8 @@ impl Memory {
             Self::LagTangent { last, .. } => *last = None,
             Self::LagByTime { last, .. } => *last = None,
             Self::Delay { past, .. } | Self::DelayByTime { past, .. } => past.0.clear(),
-            Self::Rate { last, .. } | Self::Slew { last, .. } => *last = None,
+            Self::Rate { last, .. } => *last = None,
+            Self::Slew { last, .. } => *last = None,
         }
     }
 
@@ -196,8 +198,9 @@ impl Memory {
             }
             Self::Rate { step_s, last } => {
                 for (out, x) in samples {
-                    *out = (x - last.unwrap_or(x)) / *step_s;
-                    *last = Some(x);
+                    let [before, _] = last.unwrap_or([x, x]);
+                    *out = (x - before) / *step_s;
+                    *last = Some([x, before]);
                 }
             }
             Self::Slew { limit, last } => {
@@ -216,6 +219,53 @@ impl Memory {
                     *last = Some((slewed(x, before, *limit), *out)).filter(|(value, _)| value.is_finite());
                 }
             }
+        }
+    }
+}
+
+impl Memory {
+    /// Whether it is an operator of the grammar, not a derivative of one: [`Memory::ahead`] knows these.
+    pub(super) const fn looks_ahead(&self) -> bool {
+        !matches!(self, Self::LagTangent { .. } | Self::LagByTime { .. } | Self::DelayByTime { .. } | Self::SlewTangent { .. })
+    }
+
+    /// The value a part of a step (0 to 1) after the last sample, where the signal is `x` by then and went there in a straight line; nothing
+    /// is taken. At 1 it is what [`Memory::run`] would give for `x` next. `number` is the time or limit.
+    pub(super) fn ahead(&self, part: f64, step_s: f64, x: f64, number: f64) -> f64 {
+        match self {
+            Self::Lag { last, .. } | Self::VaryingLag { last, .. } => {
+                let [approach, ramp] = lag_coefficients(number, part * step_s);
+                let (x_before, y_before) = last.unwrap_or((x, x));
+                y_before + approach * (x_before - y_before) + ramp * (x - x_before)
+            }
+            Self::Delay { whole, part: fraction, past: Past(samples) } => {
+                let Some(&newest) = samples.last() else { return x };
+                let back = *whole as f64 + fraction - part;
+                if back <= 0.0 {
+                    return newest + (x - newest) * (-back / part);
+                }
+                let near = samples.len() - 1 - back.floor() as usize;
+                samples[near] + back.fract() * (samples[near.saturating_sub(1)] - samples[near])
+            }
+            Self::Rate { last, .. } => {
+                let [newest, before] = last.unwrap_or([x, x]);
+                (x - (newest + (1.0 - part) * (before - newest))) / step_s
+            }
+            Self::Slew { limit, last } => slewed(x, last.unwrap_or(x), part * limit),
+            Self::LagTangent { .. } | Self::LagByTime { .. } | Self::DelayByTime { .. } | Self::SlewTangent { .. } => {
+                unreachable!("refused where lanes are made")
+            }
+        }
+    }
+
+    /// The same without what it will not look at again.
+    pub(super) fn slim(&self) -> Self {
+        match self {
+            Self::Delay { whole, part, past: Past(samples) } => {
+                let kept = samples[samples.len().saturating_sub(whole + 2)..].to_vec();
+                Self::Delay { whole: *whole, part: *part, past: Past(kept) }
+            }
+            other => other.clone(),
         }
     }
 }

@@ -20,6 +20,7 @@
 
 mod derivative;
 mod graph;
+mod lanes;
 mod lexer;
 mod machine;
 mod memory;
@@ -29,6 +30,7 @@ mod print;
 mod shared;
 
 pub use graph::{Graph, Node};
+pub use lanes::{Lanes, Remembered};
 pub use machine::{Machine, StreamingFormula};
 pub use shared::{Shared, shared};
 

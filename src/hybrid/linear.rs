@@ -96,7 +96,7 @@ impl Signals {
     }
 
     /// A row; before the first one, the first one.
-    fn row(&self, sample: usize, lag: usize) -> &[f64] {
+    pub(super) fn row(&self, sample: usize, lag: usize) -> &[f64] {
         let start = sample.saturating_sub(lag) * self.inputs;
         &self.rows[start..start + self.inputs]
     }

@@ -5,6 +5,7 @@
 
 pub mod inputs;
 pub mod linear;
+pub mod rollout;
 pub mod scaling;
 pub mod sensitivity;
 pub mod sequence;
@@ -13,6 +14,7 @@ mod stream;
 mod target;
 
 use linear::Linear;
+pub use rollout::HybridRollout;
 pub use scaling::{Scale, Scaling};
 pub use stages::Stages;
 pub use stream::StreamingHybrid;
@@ -300,11 +302,14 @@ impl Hybrid {
     /// The network's last row, on top of the baseline where it is a residual.
     fn complete(&self, baseline: [f64; 6], output: &[f32]) -> [f64; 6] {
         let residual = self.description.config.predicts_residual();
+        let learned = self.learned(output);
+        std::array::from_fn(|channel| if residual { baseline[channel] + learned[channel] } else { learned[channel] })
+    }
+
+    /// The network's last row behind the gate, m/s² and rad/s².
+    fn learned(&self, output: &[f32]) -> [f64; 6] {
         let last = &output[output.len().saturating_sub(6)..];
-        std::array::from_fn(|channel| {
-            let learned = last.get(channel).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel];
-            if residual { baseline[channel] + learned } else { learned }
-        })
+        std::array::from_fn(|channel| last.get(channel).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel])
     }
 
     /// A predictor that takes one sample at a time.

@@ -48,7 +48,7 @@ pub fn evaluate(formula: &Formula, flight: &Flight) -> Result<Vec<f64>> {
 }
 
 /// The state columns of some samples of a flight.
-fn state_columns(flight: &Flight, range: Range<usize>) -> [&[f64]; 16] {
+pub(super) fn state_columns(flight: &Flight, range: Range<usize>) -> [&[f64]; 16] {
     std::array::from_fn(|index| {
         Column::STATE.get(index).and_then(|column| flight.column(*column).get(range.clone())).unwrap_or_default()
     })
@@ -91,8 +91,17 @@ pub(super) struct Bound {
 impl Bound {
     /// Binds nodes of a graph to samples `step_s` seconds apart; `flight`, if it is known, gives the numbers that differ from flight to flight.
     pub(super) fn new(composer: &Composer, nodes: &[Node], step_s: f64, flight: Option<&Flight>) -> Result<Self> {
-        let number = |symbol: Node| flight.and_then(|flight| composer.in_flight(symbol, &flight.name));
-        let machine = Machine::new(&composer.graph, nodes, step_s, &number)?;
+        Self::with_numbers(composer, nodes, step_s, &|symbol| flight.and_then(|flight| composer.in_flight(symbol, &flight.name)))
+    }
+
+    /// The same with the values of symbols that vary given by their nodes.
+    pub(super) fn with_numbers(
+        composer: &Composer,
+        nodes: &[Node],
+        step_s: f64,
+        number: &dyn Fn(Node) -> Option<f64>,
+    ) -> Result<Self> {
+        let machine = Machine::new(&composer.graph, nodes, step_s, number)?;
         let mut bound = Self { sources: Vec::new(), extras: Vec::new(), machine };
         for &input in bound.machine.inputs() {
             let name = composer.graph.inputs()[input].as_str();

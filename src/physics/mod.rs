@@ -20,6 +20,7 @@ mod least_squares;
 mod model;
 #[cfg(feature = "files")]
 mod model_file;
+pub mod rollout;
 mod sign;
 mod signal;
 #[cfg(feature = "files")]
@@ -39,6 +40,7 @@ pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Paramet
 pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
+pub use rollout::Rollout;
 pub use sign::{Sign, SignDoubt, SignFinding, doubt, physical_sign};
 pub use signal::{Plain, SIGNALS, Signal, Stage, signal_named};
 pub use vehicle::{Assumed, MASS_KG, ROTOR_RADIUS_M};

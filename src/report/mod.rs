@@ -9,6 +9,7 @@ pub mod compare;
 pub mod diagnose;
 pub mod figures;
 pub mod page;
+pub mod rollout;
 
 #[cfg(feature = "protocol")]
 pub use benchmark::benchmark_page;
@@ -16,3 +17,4 @@ pub use compare::{CompareReport, compare_page};
 pub use diagnose::{DiagnoseReport, diagnose_page};
 pub use figures::Figure;
 pub use page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, page};
+pub use rollout::rollout_page;

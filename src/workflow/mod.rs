@@ -5,9 +5,11 @@
 mod contest;
 #[cfg(feature = "report")]
 mod provenance;
+mod rollout;
 mod search;
 
 pub use contest::{Affordable, Contest, Judged, affordable_stride};
 #[cfg(feature = "report")]
 pub use provenance::provenance;
+pub use rollout::Rolling;
 pub use search::{NetworkSearch, SearchTask, append_to_ledger, convention_fault, network_search};

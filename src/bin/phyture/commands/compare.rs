@@ -9,7 +9,7 @@ use phyture::critique::wrap::wrapped;
 use phyture::disk::{Target, write_atomically};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, Span, Window};
+use phyture::flight::{DataSet, Flight, Span, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
@@ -77,18 +77,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
             expected: "a model file or a network".into(),
         });
     };
-    let mut split = context.split(&set.flights, first, division);
-    if wanted.all {
-        let whole: Vec<Span> =
-            set.flights.iter().enumerate().map(|(flight, log)| Span { flight, start: 0, end: log.len() }).collect();
-        split = Ok(Split {
-            training: split.map(|split| split.training).unwrap_or_default(),
-            validation: Vec::new(),
-            test: whole,
-            tested: Part::All,
-        });
-    }
-    let split = split?;
+    let split = tested(&set, context.split(&set.flights, first, division), wanted.all)?;
     let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
     let stride = match wanted.stride {
         Some(stride) => stride,
@@ -138,7 +127,22 @@ fn affordable(context: &Context, set: &DataSet, every: &[Window], networks: &[(S
     Ok(found.stride)
 }
 
-fn name(path: &Path) -> String {
+/// The split, or with `all` one whose test part is every flight.
+pub fn tested(set: &DataSet, split: Result<Split>, all: bool) -> Result<Split> {
+    if !all {
+        return split;
+    }
+    let whole = |(flight, log): (usize, &Flight)| Span { flight, start: 0, end: log.len() };
+    Ok(Split {
+        training: split.map(|split| split.training).unwrap_or_default(),
+        validation: Vec::new(),
+        test: set.flights.iter().enumerate().map(whole).collect(),
+        tested: Part::All,
+    })
+}
+
+/// What a row of a file or folder is called.
+pub fn name(path: &Path) -> String {
     path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
 }
 

@@ -13,6 +13,7 @@ mod implant;
 mod manual;
 mod parity;
 mod predict;
+mod rollout;
 mod simulate;
 mod train;
 
@@ -55,6 +56,7 @@ pub enum Command {
     #[command(mut_arg("data", |data| data.required(false).required_unless_present("print_config")))]
     Train(train::Args),
     Predict(predict::Args),
+    Rollout(rollout::Args),
     Effect(effect::Args),
     Implant(implant::Args),
     Benchmark(benchmark::Args),
@@ -84,6 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Loop(args) => diagnose::run_loop(&context, args),
         Command::Train(args) => train::run(&context, args),
         Command::Predict(args) => predict::run(&context, args),
+        Command::Rollout(args) => rollout::run(&context, args),
         Command::Effect(args) => effect::run(&context, args),
         Command::Implant(args) => implant::run(&context, args),
         Command::Benchmark(args) => benchmark::run(&context, args),

@@ -1,0 +1,80 @@
+//! `rollout`: models and networks integrated forward from measured states, their errors by step.
+
+use super::compare::{name, tested, write_page};
+use super::predict::read_network;
+use crate::arguments::{Data, Division, STRIDES, count};
+use crate::context::Context;
+use phyture::physics::Model;
+use phyture::report::rollout_page;
+use phyture::workflow::{Rolling, provenance};
+use phyture::{Error, Result};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Steps of a rollout.
+const HORIZONS: std::ops::RangeInclusive<usize> = 1..=100_000;
+
+/// Open-loop prediction from measured states under the measured controls: errors by step, beside yardsticks
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  phyture rollout flights -m n9-calibrated.toml --report report\n  phyture rollout flights -m n9-calibrated.toml -n run --horizon 100 --json rollout.json"
+)]
+pub struct Args {
+    /// Flights.
+    #[command(flatten)]
+    pub data: Data,
+    /// Model file; repeatable
+    #[arg(short, long, required_unless_present = "network")]
+    pub model: Vec<PathBuf>,
+    /// Trained network: a run folder; repeatable
+    #[arg(short, long)]
+    pub network: Vec<PathBuf>,
+    /// Steps of the log to predict
+    #[arg(long, default_value_t = 50, value_name = "STEPS", allow_negative_numbers = true, value_parser = count(HORIZONS))]
+    pub horizon: usize,
+    /// Samples between starts
+    #[arg(long, default_value_t = 10, allow_negative_numbers = true, value_parser = count(STRIDES))]
+    pub stride: usize,
+    /// Folder for the page rollout.html
+    #[arg(long, value_name = "DIR")]
+    pub report: Option<PathBuf>,
+    /// Start in every flight, also in those that were trained on
+    #[arg(long)]
+    pub all: bool,
+    /// What trains and what tests.
+    #[command(flatten)]
+    pub division: Division,
+}
+
+/// Rolls out on the test part (locked flights where there are any) and prints; writes the page if asked to.
+pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
+    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, "rollout.html")).transpose()?;
+    let networks = wanted.network.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
+    let models = wanted.model.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
+    let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
+    let set = context.flights(&wanted.data, history)?;
+    let of_networks = networks.iter().map(|(_, hybrid)| &hybrid.description().model);
+    let all: Vec<&Model> = models.iter().map(|(_, model)| model).chain(of_networks).collect();
+    all.iter().try_for_each(|model| model.check_flights(&set.flights))?;
+    let Some(first) = all.first() else {
+        return Err(Error::Config {
+            place: "command line".into(),
+            field: "--model".into(),
+            found: "nothing".into(),
+            expected: "a model file or a network".into(),
+        });
+    };
+    let split = tested(&set, context.split(&set.flights, first, &wanted.division), wanted.all)?;
+    let rolling = Rolling { models: &models, networks: &networks, horizon: wanted.horizon, stride: wanted.stride };
+    let result = rolling.run(&set, &split)?;
+    context.say(format!("\n{result}"));
+    if let Some(target) = page {
+        let names: Vec<&str> =
+            models.iter().map(|(name, _)| name).chain(networks.iter().map(|(name, _)| name)).map(String::as_str).collect();
+        let provenance = provenance("rollout", &wanted.data.data, &set, &names, context.seed());
+        write_page(&rollout_page(&result, &provenance), &target)?;
+        context.say(format!("report: {}", target.path().display()));
+    }
+    context.json(&result)?;
+    Ok(ExitCode::SUCCESS)
+}

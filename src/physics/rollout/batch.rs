@@ -1,0 +1,133 @@
+//! The integration of one batch of lanes: Runge and Kutta's method of order four at the log's step, accelerations of formulas and, held over
+//! a step, of whoever adds some.
+
+use super::motion::{Motion, Seen, State};
+use super::program::{LaneProgram, When};
+use crate::error::Result;
+use crate::flight::Flight;
+
+/// Largest size of the body rates before a lane is stopped, rad/s: above what gyroscopes of small aircraft measure (2000 °/s is 35 rad/s).
+pub const MOST_RATE_RAD_S: f64 = 100.0;
+
+/// Largest speed before a lane is stopped, m/s.
+pub const MOST_SPEED_M_S: f64 = 200.0;
+
+/// What is added to a model's accelerations: worked out where a step begins and held over it.
+pub(crate) trait Addition {
+    /// Fills `held`, one column an acceleration (m/s², rad/s²), one entry a lane, for the step that begins `step` samples after the starts;
+    /// `physics` are the model's own accelerations there, `inputs` the values of the further formulas.
+    fn held(
+        &mut self,
+        step: usize,
+        physics: [&[f64]; 6],
+        inputs: &dyn Fn(usize) -> Vec<f64>,
+        held: &mut [Vec<f64>; 6],
+    ) -> Result<()>;
+
+    /// Whether it stands for the accelerations, not beside them.
+    fn replaces(&self) -> bool;
+}
+
+/// The lanes of a batch on their way.
+pub(super) struct Batch<'a> {
+    pub flight: &'a Flight,
+    pub starts: Vec<usize>,
+    pub model: LaneProgram<'a>,
+    /// Formulas that an addition reads.
+    pub further: Option<LaneProgram<'a>>,
+    pub addition: Option<Box<dyn Addition + 'a>>,
+    pub angles: bool,
+    pub hold_rates: bool,
+}
+
+/// Where the lanes of a batch went.
+#[derive(Clone, Debug)]
+pub struct Rolled {
+    /// Index of the flight.
+    pub flight: usize,
+    /// The sample at which each lane starts.
+    pub starts: Vec<usize>,
+    /// The first step at which a lane would have been out of bounds, if it ever was: it stays where it was before.
+    pub stopped: Vec<Option<usize>>,
+    steps: Vec<Motion>,
+}
+
+impl Rolled {
+    /// Number of lanes.
+    pub fn lanes(&self) -> usize {
+        self.starts.len()
+    }
+
+    /// Where a lane is so many steps after its start.
+    pub fn state(&self, lane: usize, step: usize) -> State {
+        self.steps[step].state(lane)
+    }
+}
+
+impl Batch<'_> {
+    /// Rolls all lanes over so many steps.
+    pub fn run(mut self, flight: usize, horizon: usize) -> Result<Rolled> {
+        let lanes = self.starts.len();
+        let mut motion = Motion::recorded(self.flight, &self.starts);
+        let mut seen = Seen::new(lanes, self.angles);
+        let mut held: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; lanes]);
+        let mut stopped = vec![None; lanes];
+        let mut steps = Vec::with_capacity(horizon + 1);
+        steps.push(motion.clone());
+        let [mut slope, mut next, mut stage] = [motion.clone(), motion.clone(), motion.clone()];
+        let step_s = self.flight.step_s;
+        for step in 0..horizon {
+            self.model.hold(&self.starts, step);
+            seen.look(&motion);
+            self.model.evaluate(When::Sample, &motion, &seen);
+            self.hold_addition(step, &motion, &seen, &mut held)?;
+            self.slope(&motion, &seen, &held, &mut slope);
+            next.set(&motion, step_s / 6.0, &slope);
+            for (part, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+                stage.set(&motion, part * step_s, &slope);
+                seen.look(&stage);
+                self.model.evaluate(When::Ahead(part), &stage, &seen);
+                self.slope(&stage, &seen, &held, &mut slope);
+                next.add(weight * step_s / 6.0, &slope);
+            }
+            next.renormalise();
+            for (lane, stopped) in stopped.iter_mut().enumerate() {
+                if stopped.is_some() || !next.is_bounded(lane, MOST_SPEED_M_S, MOST_RATE_RAD_S) {
+                    stopped.get_or_insert(step + 1);
+                    next.keep(lane, &motion);
+                }
+            }
+            std::mem::swap(&mut motion, &mut next);
+            steps.push(motion.clone());
+        }
+        Ok(Rolled { flight, starts: self.starts, stopped, steps })
+    }
+
+    /// What is added over the step that begins here.
+    fn hold_addition(&mut self, step: usize, motion: &Motion, seen: &Seen, held: &mut [Vec<f64>; 6]) -> Result<()> {
+        let (Some(addition), Some(further)) = (&mut self.addition, &mut self.further) else { return Ok(()) };
+        further.hold(&self.starts, step);
+        further.evaluate(When::Sample, motion, seen);
+        let (lanes, model) = (self.starts.len(), &self.model);
+        let physics = std::array::from_fn(|channel| &model.root(channel)[..lanes]);
+        addition.held(step, physics, &|index| further.root(index)[..lanes].to_vec(), held)
+    }
+
+    /// The derivative of a motion on which the model has been evaluated.
+    fn slope(&self, motion: &Motion, seen: &Seen, held: &[Vec<f64>; 6], slope: &mut Motion) {
+        motion.kinematics(seen, slope);
+        let replaces = self.addition.as_ref().map(|addition| addition.replaces());
+        for (channel, to) in slope.accelerations_mut().iter_mut().enumerate() {
+            if self.hold_rates && channel >= 3 {
+                to.fill(0.0);
+                continue;
+            }
+            let (own, held) = (self.model.root(channel), &held[channel]);
+            match replaces {
+                None => to.copy_from_slice(&own[..held.len()]),
+                Some(true) => to.copy_from_slice(held),
+                Some(false) => to.iter_mut().zip(own).zip(held).for_each(|((to, own), held)| *to = own + held),
+            }
+        }
+    }
+}
