@@ -480,14 +480,14 @@ impl Pass {
 }
 
 /// Bounds of a parameter; coefficients have none here.
-fn parameter_bounds(model: &Model, (effect, index): Free) -> Option<[f64; 2]> {
+pub(super) fn parameter_bounds(model: &Model, (effect, index): Free) -> Option<[f64; 2]> {
     let effect = model.effects.get(effect)?;
     let parameter = effect.parameters.get(index.checked_sub(effect.coefficients.len())?)?;
     Some(catalogue::definition(&effect.kind)?.parameter(&parameter.name)?.bounds)
 }
 
 /// About how large a number usually is.
-fn usual_size(model: &Model, (effect, index): Free) -> f64 {
+pub(super) fn usual_size(model: &Model, (effect, index): Free) -> f64 {
     let effect = &model.effects[effect];
     let Some(number) = effect.number(index) else { return 1.0 };
     let definition = catalogue::definition(&effect.kind);
@@ -524,7 +524,7 @@ fn cut(flights: &[Flight], rows: &[usize]) -> Result<Vec<(usize, usize)>> {
     Ok(jobs)
 }
 
-fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {
+pub(super) fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {
     let effect = model.effects.get(effect)?;
     let number = effect.number(index)?;
     let definition = catalogue::definition(&effect.kind);

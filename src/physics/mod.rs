@@ -20,6 +20,7 @@ mod least_squares;
 mod model;
 #[cfg(feature = "files")]
 mod model_file;
+mod output_error;
 pub mod rollout;
 mod sign;
 mod signal;
@@ -40,6 +41,7 @@ pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Paramet
 pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
+pub use output_error::{OutputError, output_error};
 pub use rollout::Rollout;
 pub use sign::{Sign, SignDoubt, SignFinding, doubt, physical_sign};
 pub use signal::{Plain, SIGNALS, Signal, Stage, signal_named};

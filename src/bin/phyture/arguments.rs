@@ -11,6 +11,9 @@ use std::path::PathBuf;
 /// Samples between windows.
 pub const STRIDES: RangeInclusive<usize> = 1..=TrainConfig::MOST_STRIDE;
 
+/// Steps of a rollout.
+pub const HORIZONS: RangeInclusive<usize> = 1..=100_000;
+
 /// A count in a range, which the error message states.
 pub fn count(range: RangeInclusive<usize>) -> RangedU64ValueParser<usize> {
     RangedU64ValueParser::new().range(*range.start() as u64..=*range.end() as u64)

@@ -261,7 +261,13 @@ fn scaled(relation: &str, by_name: &BTreeMap<&str, Vec<(usize, &Finding)>>) -> V
         return Vec::new();
     }
     let mean = such.iter().map(|entry| entry.1).sum::<f64>() / such.len() as f64;
-    let message = format!("the gains of the axes are {mean:.2} times those of the others: one of the two streams is scaled there");
+    let streams = match relation {
+        "position_rate" => "velocity or position",
+        "velocity_targets" => "acceleration or velocity",
+        "rate_targets" => "angular acceleration or rates",
+        _ => "rates or angles",
+    };
+    let message = format!("the gains of the axes are {mean:.2} times those of the others: {streams} are scaled there");
     vec![(such.into_iter().map(|entry| entry.0).collect(), message)]
 }
 

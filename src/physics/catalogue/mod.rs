@@ -19,8 +19,10 @@ mod thrust;
 use super::baseline;
 use super::definition::{Definition, Vehicle};
 
-/// Effects of the main rotor and of the fuselage apply to helicopters, or to everything that flies.
+/// Effects of the main rotor and of the fuselage apply to helicopters, those of rotors that change their speed to multirotors, others to
+/// everything that flies.
 const HELICOPTER: &[Vehicle] = &[Vehicle::Helicopter];
+const MULTIROTOR: &[Vehicle] = &[Vehicle::Multirotor];
 const ANY: &[Vehicle] = &Vehicle::ALL;
 
 /// Every effect of the catalogue.

@@ -1,7 +1,7 @@
 //! The main rotor as a whole: its torque, its speed, and the tilt of its disc.
 
 use super::super::definition::{Definition, Notes, Origin, change, coefficient, parameter};
-use super::HELICOPTER;
+use super::{HELICOPTER, MULTIROTOR};
 
 /// Speed squared of the rotor, relative: power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum
 /// theory: T (v_i + v_c), the induced part as thrust to the 3/2, the climbing part with the speed along the thrust.
@@ -112,6 +112,28 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             would_tell_apart: "collective steps held for 3 s with small cyclic and tail doublets during them, or a log of the rotor speed",
             fault_of_log: None,
             source: "Gavrilets: Omega' = (Q_e - Q) / I_rot with a PI governor, thrust as Omega squared",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "rotor_acceleration",
+        meaning: "rotors that speed up turn the body the other way, by the rate at which they do so",
+        coefficients: &[coefficient("k", "rad/s", "yaw rate that goes over to the body when the yaw control goes to 1")
+            .within(-20.0, 20.0)
+            .usually(-3.0, 3.0)],
+        parameters: &[parameter("tau_s", "s", "lag from the control, or the speeds in the log, to the rotors")
+            .starting(0.02)
+            .tried(&[0.005, 0.01, 0.02, 0.04, 0.08])
+            .within(0.002, 0.3)],
+        terms: &[(5, Some("k"), "rate(lag(u3, tau_s))")],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: MULTIROTOR,
+            excitation: "quick yaw inputs",
+            confusable_with: &["ctrl_delay", "ctrl_nonlin"],
+            would_tell_apart: "yaw steps that are held: the reaction comes and goes with the step, the drag of the blades stays",
+            fault_of_log: None,
+            source: "reaction of a spinning mass, I_r dOmega/dt: Mahony, Kumar & Corke, IEEE Robot. Autom. Mag. 19(3), 2012",
             searched: true,
         }),
     },

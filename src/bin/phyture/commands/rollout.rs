@@ -2,7 +2,7 @@
 
 use super::compare::{name, tested, write_page};
 use super::predict::read_network;
-use crate::arguments::{Data, Division, STRIDES, count};
+use crate::arguments::{Data, Division, HORIZONS, STRIDES, count};
 use crate::context::Context;
 use phyture::physics::Model;
 use phyture::report::rollout_page;
@@ -10,9 +10,6 @@ use phyture::workflow::{Rolling, provenance};
 use phyture::{Error, Result};
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// Steps of a rollout.
-const HORIZONS: std::ops::RangeInclusive<usize> = 1..=100_000;
 
 /// Open-loop prediction from measured states under the measured controls: errors by step, beside yardsticks
 #[derive(clap::Args)]
