@@ -442,12 +442,12 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
     fits(&told);
     let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
     let found = json(place.path(), "diagnosis.json")?;
-    let fall = &found["locked"]["mse_fall"]["vz_dot"];
-    assert!(fall[2].as_f64().is_some_and(|high| high < 0.0), "the interval is wholly negative: {fall}");
-    assert_eq!(found["confirmation"], "contradicted");
-    assert!(told.contains("Verdict: nothing to add") && !told.contains("effects missing"), "{told}");
-    assert!(told.contains("of vz_dot grows by") && !told.contains("holds zero"), "{told}");
-    assert!(told.contains("Nearly all the error is in") && told.contains("wx_dot") && told.contains("u1"), "{told}");
+    let fall = &found["locked"]["mse_fall"]["wx_dot"];
+    assert!(fall[1].as_f64().is_some_and(|low| low > 0.1), "the interval is wholly positive: {fall}");
+    assert_eq!(found["confirmation"], "confirmed");
+    assert!(told.contains("Verdict: effects missing. The model lacks `dihedral_speedstab`"), "{told}");
+    assert!(!told.contains("nothing to add") && told.contains("wy_dot changes by"), "{told}");
+    assert!(told.contains("Most of the error is in") && told.contains("u2"), "{told}");
     assert!(!told.contains("usual 1.5 to 4"), "a Crazyflie is no 5 kg helicopter: {told}");
     // What does not hold on unseen flights is not suggested, and what is suggested shows its measure.
     for unknown in found["unknown"].as_array().into_iter().flatten() {
@@ -455,6 +455,6 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
         assert_eq!(unknown["suggested_formula"].is_string(), low > 0.0, "{unknown}");
     }
     let tried = found["unknown"][0]["tried"]["formula"].as_str().unwrap_or_default();
-    assert!(tried == "u1 * abs(u1)" && told.contains("`u1 * abs(u1)`, does not hold on 251 s"), "{told}");
+    assert!(!tried.is_empty() && told.contains(&format!("`{tried}`, does not hold on 126 s")), "{told}");
     Ok(())
 }

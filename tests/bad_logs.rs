@@ -346,7 +346,11 @@ fn a_flight_that_breaks_with_mechanics_is_named_though_no_reading_mends_it() -> 
 fn leaps_of_the_attitude_are_placed() -> Outcome {
     let flights = some(
         |index| index == 3,
-        |columns| columns[Column::Roll as usize].iter_mut().skip(1000).step_by(700).take(3).for_each(|roll| *roll += 1.5),
+        |columns| {
+            for first in [1100, 2100] {
+                columns[Column::Roll as usize][first..first + 30].iter_mut().for_each(|roll| *roll += 1.5);
+            }
+        },
     )?;
     let name = flights[3].name.clone();
     let set = DataSet { flights, ..DataSet::default() };

@@ -177,6 +177,20 @@ impl Axes {
     }
 }
 
+/// The rotation vector, rad, from one attitude (unit quaternion, scalar last) to another, in the axes of the first.
+pub fn rotation_vector(from: [f64; 4], to: [f64; 4]) -> [f64; 3] {
+    let [ax, ay, az, aw] = from;
+    let [bx, by, bz, bw] = to;
+    let vector =
+        [aw * bx - ax * bw - ay * bz + az * by, aw * by + ax * bz - ay * bw - az * bx, aw * bz - ax * by + ay * bx - az * bw];
+    let scalar = ax * bx + ay * by + az * bz + aw * bw;
+    let sine = dot(vector, vector).sqrt();
+    // A quaternion and its negative are one attitude; a turn by nothing has no axis.
+    let angle = 2.0 * sine.atan2(scalar.abs());
+    let factor = if sine > 0.0 { angle / sine * scalar.signum() } else { 0.0 };
+    vector.map(|part| part * factor)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,6 +227,22 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_turn_from_one_attitude_to_another_leads_there(
+            q in prop::array::uniform4(-1.0..1.0_f64), by in prop::array::uniform3(-1.7..1.7_f64), sign in prop::bool::ANY,
+        ) {
+            let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
+            prop_assume!(length > 0.1 && dot(by, by).sqrt() < 3.1);
+            let [x, y, z, w] = q.map(|part| part / length);
+            let angle = dot(by, by).sqrt();
+            let half = if angle > 0.0 { (0.5 * angle).sin() / angle } else { 0.5 };
+            let ([a, b, c], s) = (by.map(|part| part * half), (0.5 * angle).cos());
+            let to = [w * a + x * s + y * c - z * b, w * b + y * s + z * a - x * c, w * c + z * s + x * b - y * a, w * s - x * a - y * b - z * c];
+            let to = if sign { to } else { to.map(|part| -part) };
+            let found = rotation_vector([x, y, z, w], to);
+            prop_assert!((0..3).all(|axis| (found[axis] - by[axis]).abs() <= CLOSE), "{:?} {:?}", found, by);
+        }
+
         #[test]
         fn rotations_are_orthogonal_and_gravity_is_their_third_row(roll in -PI..PI, pitch in -1.57..1.57, yaw in -10.0..10.0) {
             let matrix = rotation_body_to_inertial(roll, pitch, yaw);

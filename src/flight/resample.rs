@@ -93,6 +93,22 @@ mod tests {
     }
 
     #[test]
+    fn a_constant_stays_one_where_stamps_leave_four_samples_at_the_edge_of_the_window() -> Result<()> {
+        let jitter = |k: usize| match k {
+            0 => -0.257_343_503_340_230_2,
+            2 => -0.134_747_153_928_616,
+            3 => -0.130_754_889_869_215_88,
+            59 => -0.125_754_441_122_138_4,
+            _ => 0.0,
+        };
+        let times: Vec<f64> = (0..60).map(|k| 0.0081 * (k as f64 + jitter(k))).collect();
+        let resampler = Resampler::new(&times, 1.0 / 397.591_876_129_598_23)?;
+        let far = resampler.apply(&[1.0; 60]).iter().map(|value| (value - 1.0).abs()).fold(0.0, f64::max);
+        assert!(far <= Tolerance::Close.relative_f64(), "{far:e}");
+        Ok(())
+    }
+
+    #[test]
     fn the_same_rate_keeps_every_sample_time_and_almost_the_values() -> Result<()> {
         let times: Vec<f64> = (0..100).map(|k| 0.01 * f64::from(k)).collect();
         let resampler = Resampler::new(&times, 0.01)?;

@@ -3,7 +3,7 @@
 use super::figures::{LineData, lines};
 use super::page::{Cell, DATA_NOTE, Page, Part, Section, Table, data_notes};
 use crate::critique::digits::significant;
-use crate::critique::rollout::{Quantity, RolloutError, RolloutRow, Rollouts};
+use crate::critique::rollout::{POSITION_FROM_VELOCITY, Quantity, RolloutError, RolloutRow, Rollouts};
 use crate::critique::table::OWN_FROM_FIRST_HALF;
 
 /// The page of one set of rollouts; `provenance` says where the numbers come from: (what, value).
@@ -29,6 +29,7 @@ pub fn rollout_page(rollouts: &Rollouts, provenance: &[(String, String)]) -> Pag
 fn summary(rollouts: &Rollouts) -> Vec<String> {
     let mut out = vec![format!("{}.", rollouts.basis())];
     out.extend(rollouts.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
+    out.extend(rollouts.position_from_velocity.then(|| POSITION_FROM_VELOCITY.to_owned()));
     out.extend(rollouts.caution());
     for row in rollouts.rows.iter().filter(|row| row.name != rollouts.relative_to).skip(1) {
         let says = |quantity: Quantity| {

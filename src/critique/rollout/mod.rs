@@ -7,12 +7,14 @@
 
 mod text;
 
+pub use text::POSITION_FROM_VELOCITY;
+
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;
-use crate::flight::attitude::dot;
+use crate::flight::attitude::{dot, rotation_vector};
 use crate::flight::split::Part;
 use crate::flight::{Flight, Window};
-use crate::physics::rollout::{MOST_RATE_RAD_S, MOST_SPEED_M_S, Rolled, State};
+use crate::physics::rollout::{MOST_RATE_RAD_S, MOST_SPEED_M_S, Rolled, State, has_position, recorded_states};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -133,6 +135,9 @@ pub struct Rollouts {
     pub split: Part,
     /// Whether flights that no fit has seen are judged on their second halves, as some model has numbers of each flight.
     pub own_from_first_half: bool,
+    /// Whether some flight has no position, and the way that the recorded velocity makes stands for it.
+    #[serde(default)]
+    pub position_from_velocity: bool,
     /// A start is stopped when its speed is above this, m/s …
     pub most_speed_m_s: f64,
     /// … or its body rate above this, rad/s, or one of its numbers is not finite.
@@ -169,10 +174,7 @@ impl<'a> Judge<'a> {
     /// For rollouts of so many steps from these starts, all of which have room for them.
     pub fn new(flights: &'a [Flight], starts: &'a [Window], horizon: usize) -> Self {
         let used = |flight: usize| starts.iter().any(|start| start.flight == flight);
-        let states = |(index, flight): (usize, &Flight)| {
-            let samples = if used(index) { flight.len() } else { 0 };
-            (0..samples).map(|sample| State::recorded(flight, sample)).collect()
-        };
+        let states = |(index, flight): (usize, &Flight)| if used(index) { recorded_states(flight) } else { Vec::new() };
         let measured = flights.iter().enumerate().map(states).collect();
         Self { flights, starts, horizon, blocks: Blocks::new(flights, starts), measured }
     }
@@ -212,8 +214,12 @@ impl<'a> Judge<'a> {
     fn add(&self, sums: &mut Sums, flight: usize, start: usize, predicted: &dyn Fn(usize) -> State) {
         let measured = &self.measured[flight];
         sums.starts += 1;
+        // Without a position in the log a rollout starts anywhere.
+        let (from, begun) = (measured[start].position, predicted(0).position);
         for step in 1..=self.horizon {
-            let sizes = sizes(&measured[start], &measured[start + step], &predicted(step));
+            let mut there = predicted(step);
+            there.position = std::array::from_fn(|axis| there.position[axis] + (from[axis] - begun[axis]));
+            let sizes = sizes(&measured[start], &measured[start + step], &there);
             for (quantity, [error, of_measured, of_predicted]) in sizes.into_iter().enumerate() {
                 sums.sizes[quantity][step - 1] += error;
                 let squares = [error, of_measured, of_predicted].map(|size| size * size);
@@ -306,6 +312,7 @@ impl<'a> Judge<'a> {
             stride,
             split,
             own_from_first_half: false,
+            position_from_velocity: self.starts.iter().any(|start| !has_position(&self.flights[start.flight])),
             most_speed_m_s: MOST_SPEED_M_S,
             most_rate_rad_s: MOST_RATE_RAD_S,
             relative_to: rows.get(relative_to).map_or_else(String::new, |row| row.name.clone()),
@@ -339,12 +346,8 @@ fn sizes(start: &State, measured: &State, predicted: &State) -> [[f64; 3]; 4] {
 
 /// The angle of the rotation from one attitude (unit quaternion, scalar last) to another, rad, 0 to π.
 pub fn angle(a: [f64; 4], b: [f64; 4]) -> f64 {
-    // Of conj(a) ⊗ b; from sine and cosine, so that small angles keep their digits.
-    let [ax, ay, az, aw] = a;
-    let [bx, by, bz, bw] = b;
-    let vector =
-        [aw * bx - ax * bw - ay * bz + az * by, aw * by + ax * bz - ay * bw - az * bx, aw * bz - ax * by + ay * bx - az * bw];
-    2.0 * dot(vector, vector).sqrt().atan2((ax * bx + ay * by + az * bz + aw * bw).abs())
+    let vector = rotation_vector(a, b);
+    dot(vector, vector).sqrt()
 }
 
 /// Rows of several predictors, from what each gave batch by batch.

@@ -153,11 +153,18 @@ fn capital(text: &str) -> String {
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
+/// Said where some flight has no position.
+pub const POSITION_FROM_VELOCITY: &str =
+    "No position in the log of some flights: the way that the recorded velocity makes stands for it.";
+
 impl fmt::Display for Rollouts {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", wrapped("", &self.basis()))?;
         if self.own_from_first_half {
             writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
+        }
+        if self.position_from_velocity {
+            writeln!(f, "{}", wrapped("", POSITION_FROM_VELOCITY))?;
         }
         if let Some(caution) = self.caution() {
             writeln!(f, "{}", wrapped("", &caution))?;
@@ -202,6 +209,7 @@ mod tests {
             stride: 2,
             split: Part::Locked,
             own_from_first_half: true,
+            position_from_velocity: true,
             most_speed_m_s: 200.0,
             most_rate_rad_s: 100.0,
             relative_to: long.into(),

@@ -32,7 +32,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "quick stick inputs",
-            confusable_with: &["cyclic_lag", "tail_lag", "collective_lag", "sync"],
+            confusable_with: &["rotor_acceleration", "cyclic_lag", "tail_lag", "collective_lag", "sync"],
             would_tell_apart: "3-2-1-1 inputs on each stick: a lag rounds the corners, a delay does not",
             fault_of_log: Some("controls with late or early time stamps look the same: no flight tells these two"),
             source: "servo and receiver delays of 40 to 50 ms: Walker & Tischler, VFS Forum 77, 2021",
@@ -175,6 +175,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             vehicles: ANY,
             excitation: "each stick over most of its travel",
             confusable_with: &[
+                "rotor_acceleration",
                 "cyclic_lag",
                 "servo_rate_limit",
                 "stall_saturation",

@@ -14,7 +14,7 @@ mod program;
 
 pub(crate) use batch::Addition;
 pub use batch::{MOST_RATE_RAD_S, MOST_SPEED_M_S, Rolled};
-pub use motion::State;
+pub use motion::{State, has_position, recorded_states};
 pub(crate) use program::Program;
 
 use super::model::Model;
@@ -27,8 +27,8 @@ use program::{Prepared, check_lanes};
 /// Steps of flights that are rolled out side by side may differ by this share (the tolerance of a log's own step).
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// What the state is made of.
-const STATE: &[Column] = Column::STATE.split_at(Column::U1 as usize).0;
+/// What the state is made of and a log has to have. Where it lacks the position, or the heading, only the change of these is predicted.
+const STATE: [Column; 8] = [Column::Roll, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
 
 /// The value of a number of [`Rollout::numbers`], by its index there, in a flight, by its index.
 pub type Numbers<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
@@ -229,12 +229,10 @@ pub fn starts(spans: &[Span], history: usize, horizon: usize, stride: usize) -> 
 /// Refuses flights that lack a part of the state.
 fn check_state(flight: &Flight) -> Result<()> {
     let Some(column) = STATE.iter().find(|column| flight.absent.contains(column)) else { return Ok(()) };
-    let what =
-        if *column as usize <= Column::Z as usize { "no position in the log" } else { "a part of the state missing in the log" };
     Err(Error::Log {
         path: (&flight.name).into(),
-        found: format!("{what} (no column `{}`)", column.name()),
-        expected: "position, attitude, velocity and rates, from which a rollout starts and which it is judged by".into(),
+        found: format!("no column `{}`", column.name()),
+        expected: "attitude, velocity and rates, from which a rollout starts and which it is judged by".into(),
     })
 }
 

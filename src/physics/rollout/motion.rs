@@ -31,6 +31,28 @@ impl State {
     }
 }
 
+/// The recorded states of a whole flight. Where the log has no position it is the way that the velocity makes, from 0 on (trapezoidal rule).
+pub fn recorded_states(flight: &Flight) -> Vec<State> {
+    let mut states: Vec<State> = (0..flight.len()).map(|sample| State::recorded(flight, sample)).collect();
+    if has_position(flight) {
+        return states;
+    }
+    let mut position = [0.0; 3];
+    for sample in 0..states.len() {
+        if let Some(before) = sample.checked_sub(1).and_then(|before| states.get(before)) {
+            let velocity = states[sample].velocity;
+            position = std::array::from_fn(|axis| position[axis] + 0.5 * flight.step_s * (before.velocity[axis] + velocity[axis]));
+        }
+        states[sample].position = position;
+    }
+    states
+}
+
+/// Whether position is in the log of a flight.
+pub fn has_position(flight: &Flight) -> bool {
+    ![Column::X, Column::Y, Column::Z].iter().any(|column| flight.absent.contains(column))
+}
+
 /// Columns of a [`Motion`]: position, quaternion, velocity in body axes, rates.
 const NUMBERS: usize = 13;
 const POSITION: usize = 0;

@@ -274,14 +274,30 @@ fn what_cannot_be_rolled_out_is_refused_by_name() -> Result<()> {
     let long = said(&model, &flights, 39);
     assert_eq!(long, "rollout: `horizon` is 39 steps, expected at most 38: the longest flight, `f`, has 40 samples");
     let mut without = flights[0].clone();
-    without.absent = vec![Column::Y];
-    let lacks = said(&model, &[without], 10);
-    assert!(lacks.starts_with("f: found no position in the log (no column `y`)"), "{lacks}");
+    without.absent = vec![Column::Vy];
+    let lacks = said(&of_effects(Vec::new()), &[without], 10);
+    assert!(lacks.starts_with("f: found no column `vy`, expected attitude, velocity and rates"), "{lacks}");
     let reads = of_effects(vec![Effect::formula("motor", 2, "rpm", 1.0)?]);
     assert!(said(&reads, &flights, 10).contains("unknown name `rpm`"));
     let other = flight(40, 0.02, |_, _| 0.0)?;
     assert!(said(&model, &[flights[0].clone(), other], 10).contains("`step` is 0.02 s, expected the 0.01 s of flight `f`"));
     let late = Rollout::new(&model, &flights, 20)?.trajectories(&[Window { flight: 0, last: 20 }], None);
     assert!(late.is_err_and(|error| error.to_string().contains("sample 20 of flight 0 has no 20 samples after it")));
+    Ok(())
+}
+
+#[test]
+fn a_log_without_position_has_the_way_that_its_velocity_makes() -> Result<()> {
+    let mut without = lively_flight(60)?;
+    without.absent = vec![Column::X, Column::Y, Column::Z];
+    let states = recorded_states(&without);
+    assert!(!has_position(&without) && states[0].position == [0.0; 3]);
+    // Step by step the mean of two velocities.
+    for (pair, axis) in states.windows(2).flat_map(|pair| (0..3).map(move |axis| (pair, axis))) {
+        let moved = 0.5 * without.step_s * (pair[0].velocity[axis] + pair[1].velocity[axis]);
+        assert!((pair[1].position[axis] - pair[0].position[axis] - moved).abs() <= CLOSE, "{pair:?}");
+    }
+    assert!(states.iter().any(|state| state.position != [0.0; 3]), "a lively flight goes somewhere");
+    assert!(Rollout::new(&lively()?, &[without], 10).is_ok());
     Ok(())
 }
