@@ -30,7 +30,7 @@ const HUBER: f64 = 0.1;
 /// Most rollouts from which numbers are fitted; of more starts every other, every third … is taken.
 const MOST_STARTS: usize = 2000;
 /// Weight that holds each number to where it starts, in units of its usual size: what no rollout shows stays.
-const PRIOR: f64 = 1e-4;
+const PRIOR: f64 = 1e-7;
 /// Finite differences are taken over this share of a number, or of its usual size.
 const DIFFERENCE: f64 = 1e-5;
 /// Damping at first, and its change with each step that succeeds or fails (Levenberg 1944, Marquardt 1963).
@@ -373,7 +373,7 @@ impl<'a> Problem<'a> {
             let error = deviations.iter().map(|world| world[place] * world[place]).sum::<f64>().sqrt();
             let value = fit.at[place];
             let on_bound = self.bounds(place).is_some_and(|[low, high]| value <= low || value >= high);
-            let interval = (blocks > 1 && !on_bound).then(|| [value - quantile * error, value + quantile * error]);
+            let interval = (blocks > 1 && !on_bound).then_some([value - quantile * error, value + quantile * error]);
             let (own, ci95) = found.effects[effect].number_mut(number).expect("a number of the model that was put together");
             (*own, *ci95) = (value, interval);
         }

@@ -44,7 +44,8 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
             ))
         };
         let found: Vec<String> = Quantity::ALL.into_iter().filter_map(says).collect();
-        out.push(format!("Summed over the horizon, {} errs against {}: {}.", row.name, rollouts.relative_to, found.join(", ")));
+        let (name, other) = (&row.name, &rollouts.relative_to);
+        out.push(format!("The errors of {name}, summed over the horizon, beside {other}: {}.", found.join(", ")));
     }
     for row in rollouts.rows.iter().filter(|row| row.whole.diverged > 0) {
         let (diverged, n) = (row.whole.diverged, row.whole.n);
