@@ -21,6 +21,7 @@ mod run;
 mod second;
 mod sound;
 mod tables;
+mod third;
 
 use run::Plan;
 use std::ops::Range;
