@@ -5,7 +5,7 @@ use phyture::Error;
 use phyture::critique::check::{Verdict, check};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::write::data_set_csv;
-use phyture::flight::{Column, DataSet, Flight};
+use phyture::flight::{Column, DataSet, Flight, Targets};
 use phyture::sim::{Level, Mechanisms, Simulation, simulate};
 use std::path::Path;
 
@@ -370,5 +370,59 @@ fn a_trim_of_a_stick_is_a_warning_with_its_size() -> Outcome {
     assert_eq!(finding.verdict, Verdict::Warning);
     assert!(finding.message.contains("u1 stands 0.2"), "{}", finding.message);
     assert!(!report.fault, "{}", report.summary);
+    Ok(())
+}
+
+/// Five flights of an agile aircraft, white gusts and sticks that are moved quickly, in some of which the controls are recorded a sample late.
+fn agile(late: impl Fn(usize) -> bool) -> Result<Vec<Flight>, Error> {
+    const STEP_S: f64 = 0.01;
+    let noise = |seed: usize, sample: usize| {
+        let mut bits = (seed as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ (sample as u64).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((bits ^ (bits >> 31)) % 10_007) as f64 / 10_007.0 - 0.5
+    };
+    let flight = |index: usize| {
+        let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; 6000]);
+        let (mut rates, mut sticks) = ([0.0; 3], [0.0; 3]);
+        for sample in 0..6000 {
+            for axis in 0..3 {
+                sticks[axis] = 0.7 * sticks[axis] + noise(10 * index + axis, sample);
+                let acts = 40.0 * sticks[axis] - 4.0 * rates[axis] + 4.0 * noise(10 * index + axis + 5, sample);
+                columns[Column::U1 as usize + axis][sample] = sticks[axis];
+                columns[Column::Wx as usize + axis][sample] = rates[axis];
+                columns[Column::WxDot as usize + axis][sample] = acts;
+                rates[axis] += STEP_S * acts;
+            }
+        }
+        if late(index) {
+            for stick in [Column::U1, Column::U2, Column::U3] {
+                columns[stick as usize].rotate_right(1);
+            }
+        }
+        Flight::new(format!("flight_{index}"), "agile", 0.0, STEP_S, columns, Targets::Recorded)
+    };
+    (0..5).map(flight).collect()
+}
+
+#[test]
+fn controls_that_were_joined_a_sample_late_in_some_logs_are_moved_back_there() -> Outcome {
+    let stamps = |flights: Vec<Flight>| {
+        let report = check(&DataSet { flights, ..DataSet::default() }, None);
+        let own = report.findings.into_iter().filter(|finding| finding.name == "control_stamps");
+        own.map(|finding| (finding.verdict, finding.flights, finding.set.unwrap_or_default())).collect::<Vec<_>>()
+    };
+    assert_eq!(stamps(agile(|_| false)?), []);
+    assert_eq!(stamps(agile(|_| true)?), []);
+    let names = ["flight_1".to_owned(), "flight_3".to_owned()];
+    let line = "[[late_in]] flights = [\"flight_1\", \"flight_3\"], controls = 0.01";
+    assert_eq!(stamps(agile(|index| index % 2 == 1)?), [(Verdict::Warning, names.to_vec(), line.to_owned())]);
+
+    let folder = tempfile::tempdir()?;
+    let path = folder.path();
+    data_set_csv(path, &agile(|index| index % 2 == 1)?)?;
+    let (_, text) = suggested(path)?;
+    std::fs::write(path.join("dataset.toml"), text.ok_or("nothing is suggested")?)?;
+    let mended = data_set(path, &ReadOptions::default())?;
+    assert_eq!(stamps(mended.flights), []);
     Ok(())
 }

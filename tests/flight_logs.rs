@@ -5,7 +5,7 @@ mod support;
 
 use phyture::flight::attitude::{Axes, cross, euler_to_quaternion, gravity_body, rotate, rotation_body_to_inertial};
 use phyture::flight::read::{ReadOptions, data_set};
-use phyture::flight::{Column, Targets};
+use phyture::flight::{Column, DataSet, Targets};
 use phyture_kernels::Tolerance;
 use std::f64::consts::{FRAC_PI_2, PI};
 use support::*;
@@ -430,5 +430,30 @@ fn a_stream_that_comes_late_is_moved_back() -> Outcome {
         put(root, "dataset.toml", &format!("[late]\n{late}"))?;
         assert_says(&refusal(data_set(root, &ReadOptions::default())), &[says]);
     }
+    Ok(())
+}
+
+#[test]
+fn a_stream_that_comes_late_in_one_log_is_moved_there_alone() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let root = folder.path();
+    put(root, "a.csv", &Sheet::canonical(60).csv())?;
+    let other = Sheet::canonical(61).csv();
+    put(root, "b.csv", &other)?;
+    let plain = data_set(root, &ReadOptions::default())?;
+    let step_s = plain.flights[0].step_s;
+    let rule = |name: &str| format!("[late]\nu1 = {step_s}\n[[late_in]]\nflights = [\"{name}\"]\nu1 = {step_s}\nu2 = {step_s}\n");
+    put(root, "dataset.toml", &rule("b"))?;
+    let moved = data_set(root, &ReadOptions::default())?;
+    let u1 = |data: &DataSet, flight: usize| data.flights[flight].column(Column::U1).to_vec();
+    // One sample in all, and another one on top of it.
+    assert_eq!((u1(&moved, 0), u1(&moved, 1)), (u1(&plain, 0)[1..].to_vec(), u1(&plain, 1)[2..].to_vec()));
+    assert_eq!(moved.flights[1].column(Column::U2)[..], plain.flights[1].column(Column::U2)[1..60]);
+    put(root, "dataset.toml", &rule("c"))?;
+    assert_says(&refusal(data_set(root, &ReadOptions::default())), &["`late_in.flights` is `c`, which is no log of this data set"]);
+    // A log read alone is a part of the set that the description is of.
+    put(root, "dataset.toml", &rule("b"))?;
+    let alone = data_set(&root.join("a.csv"), &ReadOptions::default())?;
+    assert_says(&alone.notes.join("\n"), &["to be moved in time, as dataset.toml says, but not among these flights: b"]);
     Ok(())
 }

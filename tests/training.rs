@@ -26,13 +26,31 @@ struct Job {
     validation: Vec<Window>,
 }
 
+fn simulated() -> Result<DataSet> {
+    simulate(&Simulation { minutes: 2.0, seed: 3, ..Simulation::default() })
+}
+
+fn paper() -> Model {
+    Model::paper("truth", 4.58, [0.18, 0.34, 0.28], 0.8)
+}
+
 fn job() -> Result<Job> {
-    let set = simulate(&Simulation { minutes: 2.0, seed: 3, ..Simulation::default() })?;
+    job_of(simulated()?, &paper(), TrainConfig::default().inputs, LinearConfig { lags: 3, ..LinearConfig::default() })
+}
+
+fn job_of(set: DataSet, model: &Model, inputs: Vec<String>, linear: LinearConfig) -> Result<Job> {
     let split = Split::new(&set.flights, &[], &Protocol::Segments, 1)?;
-    let (model, _) = calibrate(&Model::paper("truth", 4.58, [0.18, 0.34, 0.28], 0.8), &set.flights, &split.training)?;
-    let network =
-        PhyTureConfig { history: 16, d_model: 8, heads: 2, levels: 2, stacks: 1, moving_average: 5, ..PhyTureConfig::default() };
-    let linear = LinearConfig { lags: 3, ..LinearConfig::default() };
+    let (model, _) = calibrate(model, &set.flights, &split.training)?;
+    let network = PhyTureConfig {
+        history: 16,
+        d_model: 8,
+        heads: 2,
+        levels: 2,
+        stacks: 1,
+        moving_average: 5,
+        state_channels: inputs.len(),
+        ..PhyTureConfig::default()
+    };
     let config = TrainConfig {
         network: network.into(),
         linear: Some(linear.clone()),
@@ -40,6 +58,7 @@ fn job() -> Result<Job> {
         stride: 40,
         batch: 16,
         seed: 5,
+        inputs,
         ..TrainConfig::default()
     };
     let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
@@ -278,6 +297,42 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
         std::fs::write(&cut, &bytes[..length]).map_err(Error::io(&cut))?;
         assert!(Hybrid::read(&cut).is_err(), "cut to {length}");
     }
+    Ok(())
+}
+
+#[test]
+fn a_stream_takes_columns_of_the_logs_own_where_physics_history_and_network_read_them() -> Result<()> {
+    let mut set = simulated()?;
+    for (index, flight) in set.flights.iter_mut().enumerate() {
+        let own = |speed: f64| (0..flight.len()).map(|sample| (speed * sample as f64 + index as f64).sin()).collect::<Vec<f64>>();
+        flight.extra =
+            [("front", own(0.11)), ("rear", own(0.07)), ("unread", own(0.05))].map(|(name, own)| (name.into(), own)).into();
+    }
+    let text = "[model]\nmass_kg = 4.58\ninertia = [0.18, 0.34, 0.28]\nrotor_radius_m = 0.8\nbaseline = \"paper\"\n\
+                [[effect]]\nkind = \"formula\"\nname = \"own\"\nchannel = \"wx_dot\"\nformula = \"front * vx\"\n";
+    let model = Model::from_toml(text, "model.toml".as_ref())?;
+    let inputs: Vec<String> = TrainConfig::default().inputs.into_iter().chain(["front - rear".to_owned()]).collect();
+    let linear = LinearConfig { lags: 3, inputs: vec!["vx".into(), "lag(rear, 0.1)".into()] };
+    let job = job_of(set, &model, inputs, linear)?;
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let (_, state) = train(&job, &RunFolder::create(place.path().join("run"))?, None, 2, Some(2))?;
+    let hybrid = Hybrid::new(job.description.clone(), state.parameters)?;
+    let flight = &job.set.flights[1];
+    let all: Vec<Window> = (15..100).map(|last| Window { flight: 0, last }).collect();
+    let batch = hybrid.predict(std::slice::from_ref(flight), &all, Threads(2))?;
+    let mut stream = hybrid.stream()?;
+    assert_eq!(stream.own_columns(), ["front", "rear"]);
+    let mut streamed = Vec::new();
+    for sample in 0..100 {
+        let state = std::array::from_fn(|column| flight.column(phyture::flight::Column::STATE[column])[sample]);
+        let own = ["front", "rear"].map(|name| flight.extra[name][sample]);
+        let refused = stream.push(&state).map_err(|error| error.to_string()).err().unwrap_or_default();
+        assert!(refused.contains("0 values for the log's own columns, which are [\"front\", \"rear\"]"), "{refused}");
+        assert!(stream.push_with(&state, &[own[0], f64::INFINITY]).is_err());
+        // What was refused was not taken.
+        streamed.extend(stream.push_with(&state, &own)?);
+    }
+    assert!(streamed == batch, "stream and batch differ");
     Ok(())
 }
 

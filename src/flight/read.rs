@@ -6,11 +6,12 @@
 
 use super::assemble::{Assembled, Cuts, assemble, gather};
 use super::listing::{DESCRIPTION, Listing, Log, check_unique, ending, list};
-use super::schema::Schema;
+use super::schema::{LateIn, Schema};
 use super::source::Read;
 use super::table::{fault, read_csv};
 use super::{DataSet, Flight, Source, names, stanford};
 use crate::error::{Error, Result};
+use crate::suggest::did_you_mean;
 use std::collections::hash_map::{DefaultHasher, Entry};
 use std::collections::{BTreeMap, HashMap};
 use std::hash::{Hash, Hasher};
@@ -55,9 +56,16 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     check_unique(path, &logs)?;
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
 
+    // A description that was found above the folder, or beside a single log, is that of a larger set.
+    let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
+    let own = late_in(&schema, &logs, is_whole, &mut notes)
+        .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     let held = AtomicUsize::new(0);
     let results = in_parallel(&logs, |log| {
-        let done = read_log(log, &schema, cuts)?;
+        let done = match own.get(log.name.as_str()) {
+            Some(rules) => read_log(log, &schema.for_log(rules), cuts)?,
+            None => read_log(log, &schema, cuts)?,
+        };
         let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
         Ok((sparing(done, &held), prints))
     });
@@ -101,8 +109,6 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
             .iter()
             .map(|(first, others)| format!("left out, since they hold the same numbers as `{first}`: {}", others.join(", "))),
     );
-    // A description that was found above the folder, or beside a single log, is that of a larger set.
-    let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
     leave_out(&mut data, &schema, &logs, &unread, is_whole)
         .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     if data.flights.is_empty() {
@@ -138,6 +144,45 @@ fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], unread: &[&str],
         data.notes.push(format!("to be left out, as dataset.toml says, but not among these flights: {}", gone.join(", ")));
     }
     data.leave_out(&asked, "as dataset.toml says")
+}
+
+/// What the description says of single logs, by their names. One that is not among the logs may be that of another part of a larger set.
+fn late_in<'s, 'l>(
+    schema: &'s Schema,
+    logs: &'l [Log],
+    is_whole: bool,
+    notes: &mut Vec<String>,
+) -> Result<BTreeMap<&'l str, Vec<&'s LateIn>>> {
+    let known = || logs.iter().map(|log| log.name.as_str());
+    let mut own: BTreeMap<&str, Vec<&LateIn>> = BTreeMap::new();
+    let mut elsewhere = Vec::new();
+    for rule in &schema.late_in {
+        for name in &rule.flights {
+            let fault = |found: &str, expected: String| Error::Config {
+                place: "flights".into(),
+                field: "late_in.flights".into(),
+                found: format!("`{name}`, which {found}"),
+                expected,
+            };
+            match names::matching(name, known()).as_slice() {
+                [] if is_whole => {
+                    let hint = did_you_mean(name, known().chain(known().map(names::own_name)));
+                    let listed = names::listed(known().collect::<Vec<_>>().into_iter());
+                    return Err(fault("is no log of this data set", format!("one of {listed}{hint}")));
+                }
+                [] => elsewhere.push(name.as_str()),
+                [one] => own.entry(one).or_default().push(rule),
+                several => {
+                    let found = format!("{} logs are called", several.len());
+                    return Err(fault(&found, "a log's path below the data folder, without the ending".into()));
+                }
+            }
+        }
+    }
+    if !elsewhere.is_empty() {
+        notes.push(format!("to be moved in time, as dataset.toml says, but not among these flights: {}", elsewhere.join(", ")));
+    }
+    Ok(own)
 }
 
 /// The error with the description that the key stands in.

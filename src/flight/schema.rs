@@ -12,6 +12,7 @@
 //! | `[columns]` | `vx = "v_nose"`, a column of the file, or a formula of its columns, or a list of which the first that the file can give is taken |
 //! | `[units]` | unit by column or group: `angles = "deg"`, `rates = "deg/s"`, `acceleration = "g"`, `vx = "ft/s"` |
 //! | `[late]` | seconds by which a group of `[units]`, or a column, comes later than the rest (negative: earlier): `angles = 0.04` |
+//! | `[[late_in]]` | `flights` and the same for those alone, on top of `[late]`: logs of one set that were joined differently |
 //! | `missing` | columns the logs lack: position, `yaw`, accelerations |
 //! | `use` | rows to use: a formula with a comparison, or a list that must all hold, in canonical and further columns and `height airspeed alpha beta g_x g_y g_z` |
 //! | `minimum_length_s` | pieces that `use` or gaps leave shorter than this are left out, with a note |
@@ -75,6 +76,15 @@ pub(crate) struct Repair {
     pub max_gap_s: f64,
 }
 
+/// Streams that come late in some flights.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct LateIn {
+    /// Names of flights, as a person writes them.
+    pub flights: Vec<String>,
+    /// On top of what holds for all, s.
+    pub late: BTreeMap<Column, f64>,
+}
+
 /// A parsed `dataset.toml`; the default is the canonical form.
 #[derive(Clone, Debug)]
 pub(crate) struct Schema {
@@ -88,6 +98,8 @@ pub(crate) struct Schema {
     pub factors: BTreeMap<&'static str, f64>,
     /// By how much a column comes later than the rest, s.
     pub late: BTreeMap<Column, f64>,
+    /// What comes on top of that in some flights.
+    pub late_in: Vec<LateIn>,
     pub missing: Vec<Column>,
     pub rows: Vec<Formula>,
     pub minimum_length_s: f64,
@@ -117,6 +129,7 @@ impl Default for Schema {
             columns: BTreeMap::new(),
             factors: BTreeMap::new(),
             late: BTreeMap::new(),
+            late_in: Vec::new(),
             missing: Vec::new(),
             rows: Vec::new(),
             minimum_length_s: 0.0,
@@ -202,8 +215,19 @@ impl Schema {
         if let Some(units) = keys.section("units")? {
             schema.factors = factors(units)?;
         }
-        if let Some(late) = keys.section("late")? {
-            schema.late = times(late)?;
+        if let Some(mut late) = keys.section("late")? {
+            schema.late = late.times()?;
+            late.finish()?;
+        }
+        for mut rule in keys.sections("late_in")? {
+            let flights = rule.texts("flights")?.unwrap_or_default();
+            let late = rule.times()?;
+            if flights.is_empty() || late.is_empty() {
+                let expected = "`flights` and at least one stream, as `controls = 0.01`";
+                return Err(keys.fault("late_in", "an incomplete rule".into(), expected.into()));
+            }
+            rule.finish()?;
+            schema.late_in.push(LateIn { flights, late });
         }
         for mut rule in keys.sections("repair")? {
             let columns = rule.texts("columns")?.unwrap_or_default();
@@ -221,6 +245,16 @@ impl Schema {
         }
         keys.finish()?;
         Ok(schema)
+    }
+
+    /// The same for one log, of which it is known what comes late in it alone.
+    pub fn for_log(&self, own: &[&LateIn]) -> Self {
+        let mut schema = self.clone();
+        for (&column, late_s) in own.iter().flat_map(|rule| &rule.late) {
+            *schema.late.entry(column).or_insert(0.0) += late_s;
+        }
+        schema.late.retain(|_, late_s| *late_s != 0.0);
+        schema
     }
 
     /// Factor to SI of a canonical column.
@@ -290,28 +324,6 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
-}
-
-/// `[late]`: a group's word first, a single column's time over it.
-fn times(mut keys: Keys) -> Result<BTreeMap<Column, f64>> {
-    let mut late = BTreeMap::new();
-    for single in [false, true] {
-        for group in units::GROUPS {
-            let words: &[&'static str] = if single { group.columns } else { &[group.name] };
-            for &word in words {
-                let columns: &[&'static str] = if single { &[word] } else { group.columns };
-                let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
-                // Time and quaternions are no canonical columns; `finish` refuses them.
-                let Some(late_s) = (if columns.is_empty() { None } else { keys.number(word, -LATEST_S)? }) else { continue };
-                if late_s > LATEST_S {
-                    return Err(keys.fault(word, late_s.to_string(), format!("a time from -{LATEST_S} to {LATEST_S} s")));
-                }
-                late.extend(columns.into_iter().map(|column| (column, late_s)));
-            }
-        }
-    }
-    keys.finish()?;
-    Ok(late)
 }
 
 /// `[units]`: a group's word first, a single column's unit over it.
@@ -391,6 +403,27 @@ impl Keys {
         Err(self.fault(key, number.to_string(), expected))
     }
 
+    /// Times by stream: a group's word first, a single column's time over it.
+    fn times(&mut self) -> Result<BTreeMap<Column, f64>> {
+        let mut late = BTreeMap::new();
+        for single in [false, true] {
+            for group in units::GROUPS {
+                let words: &[&'static str] = if single { group.columns } else { &[group.name] };
+                for &word in words {
+                    let columns: &[&'static str] = if single { &[word] } else { group.columns };
+                    let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
+                    // Time and quaternions are no canonical columns; `finish` refuses them.
+                    let Some(late_s) = (if columns.is_empty() { None } else { self.number(word, -LATEST_S)? }) else { continue };
+                    if late_s > LATEST_S {
+                        return Err(self.fault(word, late_s.to_string(), format!("a time from -{LATEST_S} to {LATEST_S} s")));
+                    }
+                    late.extend(columns.into_iter().map(|column| (column, late_s)));
+                }
+            }
+        }
+        Ok(late)
+    }
+
     fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> Result<Option<T>> {
         let Some(text) = self.text(key)? else { return Ok(None) };
         if let Some(choice) = choices.iter().find(|choice| choice.0 == text) {
@@ -406,6 +439,7 @@ impl Keys {
             "columns" => "columns.",
             "units" => "units.",
             "late" => "late.",
+            "late_in" => "late_in.",
             _ => "repair.",
         };
         match self.take(key) {
@@ -501,6 +535,9 @@ mod tests {
             ("resample_hz = 1e9", "`resample_hz` is 1000000000, expected a rate from 2 to 100000 Hz"),
             ("quaternion = \"xyzx\"", "`quaternion` is `xyzx`, expected one of xyzw, wxyz"),
             ("[[repair]]\ncolumns = [\"m1\"]", "an incomplete rule"),
+            ("[[late_in]]\ncontrols = 0.01", "`late_in` is an incomplete rule"),
+            ("[[late_in]]\nflights = \"a\"\ncontrol = 0.01", "did you mean `controls`?"),
+            ("[[late_in]]\nflights = \"a\"\ncontrols = 2", "`late_in.controls` is 2, expected a time from -1 to 1 s"),
             ("[repair]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nvalid = \"m1 > 0\"", "unknown name `m1`"),
             ("manoeuvre = \"file\"", "`manoeuvre` is \"file\", expected \"folder\""),
             ("use = \"height >\"", "formula"),

@@ -22,6 +22,7 @@ mod odd;
 mod regression;
 mod relations;
 mod report;
+mod stamps;
 mod sticks;
 mod streams;
 #[cfg(feature = "files")]
@@ -138,7 +139,8 @@ impl Gathered {
         let of_strange: Vec<usize> = (0..data.flights.len()).filter(|&flight| named.contains(&data.flights[flight].name)).collect();
         except.extend(&of_strange);
         unjudged.extend(&of_strange);
-        let odd = odd.findings.into_iter().chain(strange).collect();
+        let stamps = stamps::findings(&judged, &unjudged, &data.flights);
+        let odd = odd.findings.into_iter().chain(strange).chain(stamps).collect();
         Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, left }
     }
 

@@ -6,7 +6,7 @@ use super::evidence::Evidence;
 use super::increments::{Motion, TOGETHER};
 use super::report::{Finding, Subject, Verdict};
 use super::sticks::median;
-use super::timing::Timing;
+use super::timing::{Acts, Timing};
 use super::unexplained::Left;
 use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
@@ -47,6 +47,8 @@ pub(super) struct Own {
     findings: Vec<Finding>,
     /// What each relation leaves unexplained here.
     pub left: Vec<Left>,
+    /// When u1, u2 and u3 act.
+    pub acts: [Option<Acts>; 3],
 }
 
 impl Own {
@@ -63,7 +65,7 @@ impl Own {
         let mut evidence = Evidence::new(quaternion, step_s);
         // A block of usual length is longer than most manoeuvres.
         evidence.absorb(&short, TOGETHER);
-        Self { flight, evidence, findings, left: short.unexplained() }
+        Self { flight, evidence, findings, left: short.unexplained(), acts: short.timing.acts() }
     }
 }
 

@@ -39,6 +39,8 @@ const FOR_PEOPLE: [&str; 2] = [", with the file's name", ", or leave `quaternion
 const TIME: &str = "t";
 /// Lists, to which findings add.
 const LISTS: [&str; 3] = ["leave_out", "missing", "ignore"];
+/// Sections that can stand several times.
+const RULES: [&str; 2] = ["repair", "late_in"];
 /// Of these lists the entries are columns as the file has them.
 const OF_COLUMNS: [&str; 2] = ["missing", "ignore"];
 
@@ -46,7 +48,8 @@ impl CheckReport {
     /// What mends the faults that were found in flights of this source. `None` where nothing is at fault, or where the source has a description that is
     /// none.
     pub fn suggestion(&self, source: &Source) -> Option<Suggestion> {
-        let mut faults = self.findings.iter().filter(|finding| finding.verdict == Verdict::Fault).peekable();
+        let is_mended = |finding: &&Finding| finding.verdict == Verdict::Fault || finding.name == super::stamps::NAME;
+        let mut faults = self.findings.iter().filter(is_mended).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
         let (mut mends, mut open) = (Vec::new(), Vec::new());
@@ -93,11 +96,17 @@ impl<'a> Draft<'a> {
         let comment = comment(&format!("{}: {}", finding.name, finding.message));
         let (mut made, mut set) = (self.made.clone(), self.set.clone());
         let unusual = |key: &str| format!("dataset.toml has `{key}` in a form that is not changed here: {line}");
-        let entries = if section == "repair" {
-            made = made.with_rule("repair", &self.rule(items)?, &comment).ok_or_else(|| unusual("repair"))?;
-            Vec::new()
-        } else {
-            self.entries(section, items)?
+        let entries = match section {
+            "repair" => {
+                made = made.with_rule("repair", &self.rule(items)?, &comment).ok_or_else(|| unusual("repair"))?;
+                Vec::new()
+            }
+            // Rules for single flights add up.
+            "late_in" => {
+                made = made.with_rule("late_in", &items, &comment).ok_or_else(|| unusual("late_in"))?;
+                Vec::new()
+            }
+            section => self.entries(section, items)?,
         };
         for (place, (section, key, value)) in entries.into_iter().enumerate() {
             let full = if section.is_empty() { key.clone() } else { format!("{section}.{key}") };
@@ -336,8 +345,9 @@ fn parsed<'l>(line: &'l str, finding: &Finding) -> Option<(&'l str, Table)> {
         return Some(("", Table::from_iter([("leave_out".to_owned(), Value::Array(names))])));
     }
     let line = FOR_PEOPLE.iter().fold(line, |line, end| line.split(end).next().unwrap_or(line));
-    let (section, items) = match line.strip_prefix("[[repair]] ") {
-        Some(items) => ("repair", items),
+    let rule = RULES.iter().find_map(|rule| Some((*rule, line.strip_prefix(&format!("[[{rule}]] "))?)));
+    let (section, items) = match rule {
+        Some(rule) => rule,
         None => line.strip_prefix('[').and_then(|rest| rest.split_once("] ")).unwrap_or(("", line)),
     };
     match format!("it = {{ {items} }}").parse::<Table>().ok()?.remove("it") {

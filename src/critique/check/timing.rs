@@ -21,6 +21,9 @@ const CLOSEST_SHIFTS_S: f64 = 0.005;
 const CONTROL_DELAYS_S: [f64; 2] = [-0.12, 0.12];
 /// The controls are looked at no more often than this, s: they move slowly against it.
 const CLOSEST_LOOKS_S: f64 = 0.02;
+/// Delays that are tried on changes, s, and what a change is over, s.
+const NEAR_S: f64 = 0.06;
+const CHANGE_S: f64 = 0.02;
 /// Fall of the summed log error over the profile below which its minimum means nothing.
 const LEAST_DEPTH: f64 = 0.02;
 
@@ -177,6 +180,18 @@ pub(super) struct Timing {
     delays: Vec<isize>,
     /// `[channel][delay]`: ω̇x, ω̇y, ω̇z, v̇z on their own state, their control and 1.
     controls: Vec<Vec<BlockRegression<3>>>,
+    /// Delays that are tried on changes.
+    near: Vec<isize>,
+    /// `[axis][delay]`: changes of ω̇x, ω̇y, ω̇z on those of their own rate and control. What acts slowly, and is held by the controls of a closed
+    /// loop, is not in them.
+    changes: Vec<Vec<BlockRegression<2>>>,
+}
+
+/// When a control acts, and half of its 95 % interval, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Acts {
+    pub at_s: f64,
+    pub half_s: f64,
 }
 
 impl Timing {
@@ -193,7 +208,9 @@ impl Timing {
         let profile = || Profile { errors: vec![vec![Vec::new(); shifts.len()]], shifts: shifts.clone(), grid: grid as f64 };
         let pairs = PAIRS.into_iter().map(|pair| (pair, profile())).collect();
         let controls = vec![vec![BlockRegression::new(); delays.len()]; 4];
-        Self { step_s, grid, pairs, delays, controls }
+        let near: Vec<isize> = delays.iter().copied().filter(|delay| (*delay as f64 * step_s).abs() <= NEAR_S).collect();
+        let changes = vec![vec![BlockRegression::new(); near.len()]; 3];
+        Self { step_s, grid, pairs, delays, controls, near, changes }
     }
 
     /// Adds a flight.
@@ -218,6 +235,7 @@ impl Timing {
             }
         }
         self.add_controls(flight, motion);
+        self.add_changes(flight, motion);
     }
 
     /// Adds the blocks of others of the same step, so many of them as one.
@@ -228,6 +246,8 @@ impl Timing {
         }
         let controls = self.controls.iter_mut().flatten().zip(other.controls.iter().flatten());
         controls.for_each(|(one, other)| one.absorb(other, together));
+        let changes = self.changes.iter_mut().flatten().zip(other.changes.iter().flatten());
+        changes.for_each(|(one, other)| one.absorb(other, together));
     }
 
     /// How many blocks the pairs have of which there are most.
@@ -246,6 +266,8 @@ impl Timing {
         }
         let controls = part.controls.iter_mut().flatten().zip(self.controls.iter().flatten());
         controls.for_each(|(one, own)| *one = own.part(range.clone()));
+        let changes = part.changes.iter_mut().flatten().zip(self.changes.iter().flatten());
+        changes.for_each(|(one, own)| *one = own.part(range.clone()));
         part
     }
 
@@ -262,6 +284,24 @@ impl Timing {
                 let controls = motion.instants[shifted(sample, -delay)].controls;
                 for (channel, (state, target, control)) in channels.into_iter().enumerate() {
                     self.controls[channel][index].add(block, &[state, controls[control], 1.0], target);
+                }
+            }
+        }
+    }
+
+    /// What u1, u2 and u3 and their axes do from one sample, or look at a log that is faster, to the next.
+    fn add_changes(&mut self, flight: usize, motion: &Motion) {
+        let margin = self.near.iter().map(|delay| delay.unsigned_abs()).max().unwrap_or(0);
+        let over = ((CHANGE_S / motion.step_s).round() as usize).max(1);
+        let end = motion.instants.len().saturating_sub(margin);
+        for sample in (margin + over..end).step_by(self.grid) {
+            let block = (flight, sample / motion.block_samples());
+            let (now, then) = (&motion.instants[sample], &motion.instants[sample - over]);
+            for (index, delay) in self.near.iter().enumerate() {
+                let [controls, before] = [sample, sample - over].map(|at| motion.instants[shifted(at, -delay)].controls);
+                for (axis, changes) in self.changes.iter_mut().enumerate() {
+                    let row = [now.rates[axis] - then.rates[axis], controls[axis] - before[axis]];
+                    changes[index].add(block, &row, now.angular_target[axis] - then.angular_target[axis]);
                 }
             }
         }
@@ -301,6 +341,17 @@ impl Timing {
             })
         };
         self.controls.iter().enumerate().filter_map(of).collect()
+    }
+
+    /// When u1, u2 and u3 act on their axes, by what both do from one sample to the next.
+    pub fn acts(&self) -> [Option<Acts>; 3] {
+        std::array::from_fn(|axis| {
+            let errors: Vec<Vec<f64>> = self.changes[axis].iter().map(BlockRegression::errors).collect::<Option<_>>()?;
+            let profile = Profile { shifts: self.near.clone(), errors: vec![errors], grid: self.grid as f64 };
+            let minimum = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH)?;
+            let half_s = 0.5 * (minimum.interval[1] - minimum.interval[0]) * self.step_s;
+            Some(Acts { at_s: minimum.at * self.step_s, half_s })
+        })
     }
 
     /// The delay of the controls, common to all, and its profile.
