@@ -18,7 +18,8 @@ fn bad_usage_and_bad_input_exit_with_2_and_say_what_is_wrong() -> Result<()> {
         (&["simulate", "data", "--hide", "ground_effect=much"], "EFFECT=SCALE"),
         (&["parity", "nothing.safetensors"], "nothing.safetensors"),
         (&["effect", "show", "grund_effect"], "did you mean `ground_effect`?"),
-        (&["effect", "show", "linear_drag"], "an effect of the catalogue"),
+        (&["effect", "add", "linear_drag", "-m", "none.toml", "-o", "out.toml"], "an effect of the catalogue"),
+        (&["simulate", "data", "--like", "stanford", "--minutes", "5"], "cannot be used with '--minutes"),
         (&["effect", "add", "wind", "-m", "none.toml", "-o", "out.toml"], "none.toml"),
         (&["implant", "data", "out"], "--effect"),
     ];
@@ -81,6 +82,10 @@ fn an_effect_is_listed_shown_and_added_once() -> Result<()> {
     ] {
         assert!(text.contains(part), "{part} in\n{text}");
     }
+    // The baseline's are shown, too.
+    let show = phyture(place.path(), &["effect", "show", "linear_drag"])?;
+    let text = String::from_utf8_lossy(&show.stdout).into_owned();
+    assert!(show.status.success() && text.contains("vx_dot += a_x * air_vx") && text.contains("any value"), "{text}");
     let json = phyture(place.path(), &["effect", "show", "wind", "--json", "-"])?;
     let value: serde_json::Value = serde_json::from_slice(&json.stdout).map_err(|error| Error::Undetermined(error.to_string()))?;
     assert_eq!(value["coefficients"][0]["by_flight"].as_f64(), Some(3.0));
@@ -229,6 +234,7 @@ fn completions_manual_pages_and_the_language_of_formulas_come_from_the_program_i
     for name in ["check", "calibrate", "compare", "diagnose", "loop", "train", "predict", "benchmark"] {
         assert!(!page(&format!("phyture-{name}.1"))?.is_empty());
     }
+    assert!(page("phyture-effect-show.1")?.contains("All that is known") && page("phyture-benchmark-collect.1").is_ok());
     let grammar = said(&["help", "formula"])?;
     for form in ["slew(x, per_s)", "atan2(y, x)", "a^b", "airspeed", "g_z"] {
         assert!(grammar.contains(form), "{form} in\n{grammar}");

@@ -147,3 +147,22 @@ fn two_programs_do_not_train_in_one_folder() -> Result<()> {
     // Its lock is gone with it.
     refused(at, &train, "a training run")
 }
+
+#[test]
+fn a_failure_gives_way_to_the_command_put_right() -> Result<()> {
+    let place = folder()?;
+    let at = place.path();
+    refused(at, &["check", "flights", "--json", "check.json"], "flights")?;
+    let failure = fs::read_to_string(at.join("check.json")).map_err(Error::io("check.json"))?;
+    assert!(failure.contains("\"error\""), "{failure}");
+    // The same again fails for the same reason, and not for what stands there.
+    refused(at, &["check", "flights", "--json", "check.json"], "flights")?;
+    done(at, &["simulate", "flights", "--minutes", "2", "--baseline", "--seed", "7314"])?;
+    done(at, &["check", "flights", "--json", "check.json"])?;
+    refused(at, &["check", "flights", "--json", "check.json"], "--force")?;
+    let other = "{\"error\": \"of somebody else\"}";
+    fs::write(at.join("other.json"), other).map_err(Error::io("other.json"))?;
+    refused(at, &["check", "flights", "--json", "other.json"], "--force")?;
+    assert!(fs::read_to_string(at.join("other.json")).is_ok_and(|text| text == other));
+    Ok(())
+}

@@ -32,7 +32,8 @@ impl<'a> Context<'a> {
     /// Looks at once whether the machine-readable result can be written.
     pub fn new(common: &'a Common) -> Result<Self> {
         let file = common.json.as_deref().filter(|path| *path != Path::new("-"));
-        let existing = if common.force { Existing::Replace } else { Existing::Keep };
+        let is_free = common.force || file.is_some_and(output::is_failure);
+        let existing = if is_free { Existing::Replace } else { Existing::Keep };
         Ok(Self { common, _json: file.map(|path| Target::file(path, existing, &[])).transpose()? })
     }
 
@@ -115,10 +116,10 @@ impl<'a> Context<'a> {
         let options = ReadOptions { minimum_rows: history, split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone() };
         let set = without(data_set(&data.data, &options)?, data)?;
         self.say(format!(
-            "{}: {} flights, {} manoeuvre classes, {:.0} s at {:.0} Hz",
+            "{}: {}, {}, {:.0} s at {:.0} Hz",
             data.data.display(),
-            set.flights.len(),
-            set.manoeuvres().len(),
+            counted(set.flights.len(), "flight", "flights"),
+            counted(set.manoeuvres().len(), "manoeuvre class", "manoeuvre classes"),
             set.duration_s(),
             1.0 / set.flights.first().map_or(f64::NAN, |flight| flight.step_s)
         ));
@@ -223,6 +224,11 @@ pub fn interruption() -> Result<Arc<AtomicBool>> {
         .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
     Ok(flag)
 }
+/// A number of things, in words for one and for several.
+fn counted(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
+}
+
 /// The word for all flights of which `check` says that they are read otherwise than the rest.
 const SUSPECTS: &str = "suspects";
 /// Times that what is left is checked again: beside the worst the next may not have shown.

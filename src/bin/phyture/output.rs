@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use phyture::critique::wrap::wrapped;
 use phyture::disk::write_atomically;
 use phyture::{Error, Result};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -34,23 +34,35 @@ pub fn json(target: Option<&Path>, content: &impl Serialize) -> Result<()> {
     write_atomically(path, |file| file.write_all(text.as_bytes()))
 }
 
+/// The machine-readable form of a failure.
+#[derive(Serialize, Deserialize)]
+struct Failure {
+    error: Reason,
+    exit_code: u8,
+}
+
+#[derive(Serialize, Deserialize)]
+struct Reason {
+    kind: String,
+    message: String,
+}
+
 /// Writes the machine-readable form of a failure where a result was asked for. The file of an earlier result stays unless forced.
 pub fn failure(target: Option<&Path>, force: bool, kind: &str, message: String, code: u8) {
-    #[derive(Serialize)]
-    struct Failure<'a> {
-        error: Reason<'a>,
-        exit_code: u8,
-    }
-    #[derive(Serialize)]
-    struct Reason<'a> {
-        kind: &'a str,
-        message: String,
-    }
-    let stays = !force && target.is_some_and(|path| path != Path::new("-") && path.is_file());
+    let stays = !force && target.is_some_and(|path| path != Path::new("-") && path.is_file() && !is_failure(path));
     if !stays {
         // What is wrong has been said on standard error, and a second failure would only hide it.
-        let _ = json(target, &Failure { error: Reason { kind, message }, exit_code: code });
+        let _ = json(target, &Failure { error: Reason { kind: kind.into(), message }, exit_code: code });
     }
+}
+
+/// Longest failure that is looked for, bytes.
+const LONGEST_FAILURE: u64 = 1 << 20;
+
+/// Whether a plain file holds a failure, which holds nothing that anybody would miss: the same command, put right, may write over it.
+pub fn is_failure(path: &Path) -> bool {
+    let is_short = std::fs::metadata(path).is_ok_and(|there| there.is_file() && there.len() <= LONGEST_FAILURE);
+    is_short && std::fs::read(path).is_ok_and(|text| serde_json::from_slice::<Failure>(&text).is_ok())
 }
 
 /// Text for a person: on standard output, unless that carries the JSON; then on standard error.

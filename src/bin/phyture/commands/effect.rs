@@ -125,7 +125,8 @@ fn list(context: &Context) -> Result<ExitCode> {
 }
 
 fn show(context: &Context, id: &str) -> Result<ExitCode> {
-    let definition = find(id)?;
+    // One of the baseline is shown, too, though no search and no `add` knows it.
+    let definition = definition(id).map_or_else(|| find(id), Ok)?;
     context.print(text(definition));
     context.json(&described(definition))?;
     Ok(ExitCode::SUCCESS)
@@ -161,10 +162,13 @@ fn text(definition: &Definition) -> String {
         line(0, "\nCoefficients".into());
     }
     for coefficient in definition.coefficients {
-        let [low, high] = coefficient.bounds;
+        let range = match coefficient.bounds {
+            [f64::NEG_INFINITY, f64::INFINITY] => "any value".into(),
+            [low, high] => format!("{low} to {high}"),
+        };
         let usual = coefficient.expected.map(|[low, high]| format!(", usually {low} to {high} at 5 kg")).unwrap_or_default();
         let flights = coefficient.by_flight.map(|s| format!("; one for each flight, s.d. {s}")).unwrap_or_default();
-        line(2, format!("{:<10} {}, {low} to {high}{usual}{flights}: {}", coefficient.name, coefficient.unit, coefficient.meaning));
+        line(2, format!("{:<10} {}, {range}{usual}{flights}: {}", coefficient.name, coefficient.unit, coefficient.meaning));
     }
     if !definition.parameters.is_empty() {
         line(0, "\nParameters".into());

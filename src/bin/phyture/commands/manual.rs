@@ -33,13 +33,19 @@ pub fn completions(args: &CompletionsArgs, mut command: clap::Command) -> ExitCo
     ExitCode::SUCCESS
 }
 
-/// Writes the page of `command` and one for each of its own.
+/// A command and all that are below it, as `effect show` below `effect`.
+fn with_subcommands(command: clap::Command) -> Vec<clap::Command> {
+    let below: Vec<clap::Command> =
+        command.get_subcommands().filter(|command| command.get_name() != "help").cloned().flat_map(with_subcommands).collect();
+    std::iter::once(command).chain(below).collect()
+}
+
+/// Writes the page of `command` and one for each that is below it.
 pub fn run(context: &Context, Args { dir: folder }: &Args, mut command: clap::Command) -> Result<ExitCode> {
     std::fs::create_dir_all(folder).map_err(Error::io(folder))?;
     command.build();
-    let subcommands = command.get_subcommands().filter(|command| command.get_name() != "help").cloned().collect::<Vec<_>>();
     let mut written = 0;
-    for page in std::iter::once(command).chain(subcommands) {
+    for page in with_subcommands(command) {
         let name = page.get_display_name().unwrap_or_else(|| page.get_name()).to_owned();
         let target = context.new_file(&folder.join(format!("{name}.1")), &[])?;
         let manual = clap_mangen::Man::new(page).title(name.to_uppercase());

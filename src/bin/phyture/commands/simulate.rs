@@ -33,7 +33,7 @@ pub struct Args {
     /// Folder to write
     pub dir: PathBuf,
     /// Flight time, minutes, at most 1440
-    #[arg(long, default_value_t = 30.0, allow_negative_numbers = true, value_parser = minutes)]
+    #[arg(long, default_value_t = 30.0, allow_negative_numbers = true, value_parser = minutes, conflicts_with = "like")]
     pub minutes: f64,
     /// Switch one effect on in the truth that the model file beside the data does not list; EFFECT or EFFECT=SCALE; repeatable
     #[arg(long, value_name = "EFFECT[=SCALE]")]
