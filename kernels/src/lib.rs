@@ -39,6 +39,7 @@ pub mod random;
 pub mod real;
 pub mod reference;
 pub mod reference_peers;
+mod registers;
 pub mod rows;
 pub mod sci;
 pub mod spectrum;
