@@ -1,9 +1,9 @@
 //! Samples that a recorder dropped and filled with the last ones: all that is measured stands still for a while and then jumps. A single column
 //! that stands still is the business of `streams`.
 
-use super::odd::{MOST, in_flights};
-use super::report::{Finding, Verdict};
-use super::{finding, named};
+use super::finding::{Finding, Verdict, finding};
+use super::flights::{MOST, in_flights, named};
+use super::robust::median;
 use crate::flight::{Column, Flight};
 
 /// A rest of all measurements from here on, s, is no chance.
@@ -83,5 +83,5 @@ fn of_flight(index: usize, flight: &Flight) -> Option<Lost> {
 /// The median change from sample to sample, of those that change anything.
 fn usual_change(values: &[f64]) -> f64 {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
-    super::sticks::median(changes.collect()).unwrap_or(0.0)
+    median(changes.collect()).unwrap_or(0.0)
 }

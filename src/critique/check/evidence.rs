@@ -1,14 +1,14 @@
 //! What the streams of a log say of each other, gathered: of one flight, in short blocks, or of all together. Verdicts on single flights are the
 //! business of `odd`.
 
-use super::RELATIONS;
 use super::clocks::Halves;
+use super::finding::{Finding, RELATIONS, Verdict, finding};
 use super::forces::Forces;
 use super::gains::Gains;
 use super::increments::Motion;
 use super::mounts::Mounts;
 use super::relations::Relation;
-use super::report::{Finding, Verdict};
+use super::robust::median;
 use super::timing::Timing;
 use super::unexplained::Left;
 use std::collections::BTreeSet;
@@ -90,9 +90,9 @@ impl Evidence {
         match self.is_reversed() {
             Some(true) => {
                 let message = "rates and accelerations all have the other sign against the changes: the rows stand in the order of falling time";
-                return vec![super::finding(TIME_REVERSED, Verdict::Fault, message.into(), None)];
+                return vec![finding(TIME_REVERSED, Verdict::Fault, message.into(), None)];
             }
-            Some(false) => findings.push(super::finding(TIME_REVERSED, Verdict::Ok, "the time runs forward".into(), None)),
+            Some(false) => findings.push(finding(TIME_REVERSED, Verdict::Ok, "the time runs forward".into(), None)),
             None => {}
         }
         for relation in &self.relations {
@@ -148,7 +148,7 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
     let gain = |finding: &Finding| of_relation(finding).zip(finding.measured);
     let gains: Vec<(&str, f64)> = findings.iter().filter(is_known).filter_map(gain).collect();
     let relations: BTreeSet<&str> = gains.iter().map(|gain| gain.0).collect();
-    let median = super::sticks::median(gains.iter().map(|gain| gain.1).collect()).filter(|times| *times > 0.0);
+    let median = median(gains.iter().map(|gain| gain.1).collect()).filter(|times| *times > 0.0);
     let Some(times) = median.filter(|_| relations.len() > 1) else { return findings };
     let is_one = (times - 1.0).abs() < OTHER_TIME;
     if is_one || gains.iter().any(|gain| (gain.1 / times - 1.0).abs() > SAME) {
@@ -165,5 +165,5 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
 }
 
 fn step(verdict: Verdict, times: f64, message: String, set: Option<&str>) -> Finding {
-    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..super::finding(TIME_STEP, verdict, message, set) }
+    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..finding(TIME_STEP, verdict, message, set) }
 }

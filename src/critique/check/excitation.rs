@@ -1,8 +1,8 @@
 //! What the flights contain: how far each state and control moves, for how long, and whether the columns of the baseline can be
 //! told apart. A coefficient can be no better than this.
 
-use super::of_all;
-use super::report::{Finding, Subject, Verdict};
+use super::finding::{Finding, Subject, Verdict};
+use super::flights::of_all;
 use crate::blocks::BLOCK_S;
 use crate::flight::{Column, Flight};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};

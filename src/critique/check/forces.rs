@@ -4,9 +4,9 @@
 //! rotor's thrust is along the body's z axis, so the two are small. And: with free coefficients on gravity and −ω × v, are they 1? Drag and trim
 //! are fitted beside them; what else acts on the helicopter biases a coefficient by some per cent, a wrong convention by 1 or more.
 
+use super::finding::{Finding, Subject, Verdict};
 use super::increments::{Instant, Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Subject, Verdict};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{cross, gravity_body, rotate_back};

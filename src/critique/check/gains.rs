@@ -3,9 +3,9 @@
 //! Of the heading the angle is asked by which it is turned. This is what flight test calls data compatibility (Klein & Morelli 2006, ch. 10), one
 //! linear regression a relation. Other readings of whole relations are in `relations`.
 
+use super::finding::{Finding, Subject, Verdict, finding};
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Subject, Verdict};
 use super::unexplained::{Fit, Left};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
@@ -264,7 +264,7 @@ fn constant(name: &str, estimate: Estimate, least: f64, unit: &str, says: String
         interval: Some([low, high]),
         expected: Some(0.0),
         unit: unit.into(),
-        ..super::finding(name, verdict, message, set.as_deref())
+        ..finding(name, verdict, message, set.as_deref())
     }
 }
 

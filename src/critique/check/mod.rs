@@ -13,6 +13,8 @@ mod clocks;
 mod dropouts;
 mod evidence;
 mod excitation;
+mod finding;
+mod flights;
 mod forces;
 mod gains;
 mod increments;
@@ -22,6 +24,7 @@ mod odd;
 mod regression;
 mod relations;
 mod report;
+mod robust;
 mod sticks;
 mod streams;
 #[cfg(feature = "files")]
@@ -31,7 +34,8 @@ mod trims;
 mod unexplained;
 
 pub use excitation::{Collinearity, Excitation};
-pub use report::{CheckReport, Finding, Subject, Verdict};
+pub use finding::{Finding, Subject, Verdict};
+pub use report::CheckReport;
 #[cfg(feature = "files")]
 pub use suggestion::{Open, Suggestion};
 pub use timing::DelayProfile;
@@ -40,16 +44,14 @@ use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Targets};
 use crate::physics::Model;
 use evidence::Evidence;
-
+use finding::{RELATIONS, finding};
+use flights::{CONTROLS, of_all};
 use odd::{Odd, Own};
 use std::collections::BTreeSet;
 use sticks::Sticks;
 
-const CONTROLS: [Column; 4] = [Column::U1, Column::U2, Column::U3, Column::U4];
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
-/// Relations whose readings say how a log is written.
-const RELATIONS: [&str; 4] = ["position_rate", "attitude_rate", "velocity_targets", "rate_targets"];
 /// Share of the samples that may exceed it: glitches and full deflections are no other scale.
 const RARE_SHARE: f64 = 0.01;
 
@@ -234,21 +236,6 @@ const fn other_order(order: QuaternionOrder) -> &'static str {
     }
 }
 
-fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> Finding {
-    Finding {
-        name: name.into(),
-        subject: Subject::Conventions,
-        verdict,
-        measured: None,
-        interval: None,
-        expected: None,
-        unit: "1".into(),
-        message,
-        set: set.map(Into::into),
-        flights: Vec::new(),
-    }
-}
-
 /// A coefficient along z that a wrong stick, or wrong cells of it, explain.
 fn not_judged(finding: Finding) -> Finding {
     if finding.verdict != Verdict::Fault || !finding.name.ends_with("_z") {
@@ -293,33 +280,6 @@ fn origin(flights: &[Flight]) -> Finding {
         ),
     };
     finding("targets", Verdict::Ok, message, None)
-}
-
-/// So many flights are named.
-const NAMED: usize = 4;
-
-/// Names, of many the first few.
-fn named(names: &[&str]) -> String {
-    match names.len().checked_sub(NAMED) {
-        None | Some(0) => names.join(", "),
-        Some(more) => format!("{} and {more} more", names[..NAMED].join(", ")),
-    }
-}
-
-/// The rule of `dataset.toml` that leaves flights out.
-fn left_out(names: &[&str]) -> String {
-    format!("leave_out = [{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
-}
-
-/// A column of all flights with their steps; each flight leaves the memory behind it.
-fn of_all<'f>(flights: impl IntoIterator<Item = &'f Flight>, column: Column) -> impl Iterator<Item = (f64, f64)> {
-    flights.into_iter().flat_map(move |flight| {
-        let left = std::iter::from_fn(move || {
-            flight.rest();
-            None
-        });
-        flight.column(column).iter().map(|value| (*value, flight.step_s)).chain(left)
-    })
 }
 
 /// Ranges that no aircraft of this kind leaves.

@@ -5,9 +5,9 @@
 //! are linear in δ. An attitude that is off shows the same δ in both; a turned gyro or velocity sensor in one. Offsets of v and ω are fitted beside it: at
 //! a constant speed they look the same; and a delay of the attitude, which in a steady roll does.
 
+use super::finding::{Finding, Verdict, finding};
 use super::increments::{Motion, Vector};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Verdict};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::cross;
 
@@ -180,6 +180,6 @@ fn of_angle(angle: Estimate, verdict: Verdict, message: String, set: Option<Stri
         interval: Some(angle.interval),
         expected: Some(0.0),
         unit: "rad".into(),
-        ..super::finding(NAME, verdict, message, set.as_deref())
+        ..finding(NAME, verdict, message, set.as_deref())
     }
 }

@@ -3,17 +3,15 @@
 
 use super::clocks::CLOCK;
 use super::evidence::Evidence;
+use super::finding::{Finding, RELATIONS, Subject, Verdict, finding};
+use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, TOGETHER};
-use super::report::{Finding, Subject, Verdict};
-use super::sticks::median;
+use super::robust::{NORMAL, median};
 use super::timing::Timing;
 use super::unexplained::Left;
-use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A flight by itself is believed where twice its interval says so: there are many flights and many relations.
-pub(super) const WIDER: f64 = 2.0;
 /// A gain that certainly differs from 1 by this much is that of another reading.
 const OFF: f64 = 0.2;
 /// Streams this much apart change verdicts: lags of rotor and servo are as long. s
@@ -22,18 +20,12 @@ pub(super) const LATE_S: f64 = 0.03;
 const LATER_S: f64 = 0.05;
 /// Delays of flights that differ by so many times what they scatter are not those of what is flown.
 const APART: f64 = 3.0;
-/// From a median absolute deviation to the standard deviation of normal numbers.
-pub(super) const NORMAL: f64 = 1.4826;
-/// Flights at least in which a single stick is late or scaled, or a clock another: there are many flights and many sticks, and manoeuvres do the like.
-pub(super) const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
 const SCALED: f64 = 0.04;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
 const EXPLAINED: f64 = 0.5;
 /// Fall of the logarithm of the squared error that a shift of a stream has to bring in a single flight.
 const CONVINCING_FALL: f64 = 1.0;
-/// Where more than this share of the flights breaks a relation, it is the set that does.
-pub(super) const MOST: f64 = 0.8;
 /// Coefficients of gravity agree with a unit of length to this factor.
 const NEAR_UNIT: f64 = 1.25;
 
@@ -118,7 +110,7 @@ pub(super) fn late_controls(timing: &Timing) -> Vec<Finding> {
     }
     let mean_s = -late.iter().filter_map(|finding| finding.measured).sum::<f64>() / late.len() as f64;
     let message = format!("the controls come late: they are recorded {:.0} ms after they act", 1e3 * mean_s);
-    vec![super::finding("controls_late", Verdict::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
+    vec![finding("controls_late", Verdict::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
 }
 
 /// What breaks with the others, and in which flights.
@@ -209,17 +201,6 @@ const CONTROLS: &str = "control_delay";
 /// How findings of single sticks begin.
 const STICK: &str = "delay_";
 pub(super) const LATERAL: &str = "lateral_force";
-
-/// A fault of some flights.
-pub(super) fn in_flights(name: &str, indices: &[usize], message: &str, flights: &[Flight]) -> Finding {
-    let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
-    let message = format!("in {} of {} flights ({}): {message}", indices.len(), flights.len(), named(&names));
-    Finding {
-        set: Some(left_out(&names)),
-        flights: names.into_iter().map(str::to_owned).collect(),
-        ..super::finding(name, Verdict::Fault, message, None)
-    }
-}
 
 /// Flights by what is wrong in them, where others keep the relation.
 fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
@@ -364,7 +345,7 @@ pub(super) fn lengths(coefficients: &[Finding]) -> Option<Finding> {
     };
     let value = 0.5 * (both[0].0 + both[1].0);
     let found = LENGTHS.into_iter().find(|(unit, ..)| is_near(*unit));
-    let mut finding = super::finding("lengths", Verdict::Ok, "gravity has the size that it has in metres".into(), None);
+    let mut finding = finding("lengths", Verdict::Ok, "gravity has the size that it has in metres".into(), None);
     finding.measured = Some(value);
     finding.expected = Some(1.0);
     if let Some((_, name, unit)) = found {

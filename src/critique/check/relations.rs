@@ -4,8 +4,8 @@
 //! and f. If another reading leaves less than half of the error, consistently over blocks, the log is in that other reading: no
 //! aerodynamics enters, so nothing but a convention can do that. Gains of single axes are in `gains`.
 
+use super::finding::{Finding, Subject, Verdict};
 use super::increments::{Instant, Motion, Vector};
-use super::report::{Finding, Subject, Verdict};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};

@@ -5,11 +5,11 @@
 //! Each axis is a regression of its change over a piece on its own state, all four sticks and 1, all integrated over the piece. Nothing is differentiated, and the
 //! recorded accelerations are not looked at: a stream of theirs that is late says nothing about sticks.
 
-use super::finding;
+use super::finding::{Finding, Verdict, finding};
+use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::Motion;
-use super::odd::{FEWEST, MOST, WIDER, in_flights};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Verdict};
+use super::robust::median;
 use super::unexplained::{Fit, Left};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
@@ -346,15 +346,4 @@ fn joined(names: &[&str]) -> String {
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
         names => names.join(", "),
     }
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
-/// The lower quartile: what is usual where half of the flights may be faulty upwards.
-pub(super) fn lower_quartile(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 4).copied()
 }

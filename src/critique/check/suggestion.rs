@@ -4,7 +4,8 @@
 //! Findings speak of columns as the program has them, in its axes and units, and of flights as they were read: a description that states something
 //! already is what they come on top of. What cannot be said so, or leaves a choice, is left to a person.
 
-use super::report::{CheckReport, Finding, Verdict};
+use super::finding::{Finding, Verdict};
+use super::report::CheckReport;
 use crate::critique::wrap::wrapped;
 use crate::flight::{Axes, Column, Description, Frame, Schema, Source, TargetKind, Targets, column_names, columns_of};
 use crate::formula::Formula;
@@ -356,7 +357,7 @@ fn comment(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::Subject;
+    use super::super::finding::Subject;
     use super::*;
 
     /// A report with these faults: a line and the flights that it is about.

@@ -4,9 +4,9 @@
 //! rate and not with its square; the minimum is refined by a parabola, and its interval is from leaving out one block at a time
 //! (jackknife). A flight whose step differs from the first's is left out.
 
+use super::finding::{Finding, Subject, Verdict};
 use super::increments::Motion;
 use super::regression::BlockRegression;
-use super::report::{Finding, Subject, Verdict};
 use super::sticks::{EXPLAINED, STICKS};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};

@@ -1,11 +1,11 @@
 //! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, and one that stands elsewhere in some flights
 //! than in the others for the same answer. Signs, gains and order of the sticks are the business of `sticks`.
 
-use super::CONTROLS;
+use super::finding::{Finding, Verdict};
+use super::flights::{CONTROLS, in_flights};
 use super::increments::SHORT_BLOCK_S;
-use super::odd::{NORMAL, in_flights};
-use super::report::{Finding, Verdict};
-use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks, median};
+use super::robust::{NORMAL, median};
+use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks};
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 

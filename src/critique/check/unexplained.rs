@@ -6,11 +6,11 @@
 //! in its own unit and as a share of what moves, has something that they have not. Of a relation that is pure mechanics this is a fault of the log. An
 //! axis that answers to nothing may also be an aircraft that lost its rotor speed, so that is a warning.
 
+use super::finding::{Finding, Verdict};
+use super::flights::{MOST, in_flights};
 use super::increments::SHORT_BLOCK_S;
-use super::odd::{MOST, in_flights};
 use super::regression::BlockRegression;
-use super::report::{Finding, Verdict};
-use super::sticks::lower_quartile;
+use super::robust::lower_quartile;
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
