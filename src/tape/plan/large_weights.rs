@@ -1,7 +1,7 @@
 //! Which weights are large: so large that operations on them take some samples at once, and that their gradients are made once from all
 //! samples of a step. Where their other buffers lie is the plan's; the arithmetic is that of `ops` and of the session.
 
-use super::shapes_of;
+use super::orders::shapes_of;
 use crate::tape::graph::{Graph, Source, Var};
 use crate::tape::op::{Op, WEIGHT};
 use phyture_kernels::Real;

@@ -2,8 +2,10 @@
 
 use super::super::graph::{Graph, Source};
 use super::super::op::{Memory, WEIGHT};
-use super::large_weights::Bundles;
-use super::{Kept, LargeWeight, Layout, Piece, Role, Step, operation, shapes_of};
+use super::large_weights::{Bundles, LargeWeight};
+use super::layout::Layout;
+use super::orders::{operation, shapes_of};
+use super::step::{Kept, Piece, Role, Step};
 use phyture_kernels::{Real, Write};
 use std::ops::Range;
 use std::sync::Arc;
