@@ -1,7 +1,7 @@
 //! Which register and which tile of accumulators each float type has at each level. The registers themselves are in `vector`, the choice of a level
 //! in `level`.
 
-use crate::level::{Plain, Tiled};
+use crate::instruction_set::{Plain, Tiled};
 #[cfg(not(target_arch = "x86_64"))]
 use crate::vector::Array;
 use crate::vector::Vector;
@@ -65,21 +65,21 @@ macro_rules! registers {
             type Neon = std::arch::aarch64::$neon;
             registers!(@tiles plain_tile plain_tall_tile Plain $plain);
             #[cfg(target_arch = "x86_64")]
-            registers!(@tiles avx2_tile avx2_tall_tile crate::level::Avx2 $avx2_tile);
+            registers!(@tiles avx2_tile avx2_tall_tile crate::instruction_set::Avx2 $avx2_tile);
             #[cfg(target_arch = "x86_64")]
-            registers!(@tiles avx512_tile avx512_tall_tile crate::level::Avx512 $avx512_tile);
+            registers!(@tiles avx512_tile avx512_tall_tile crate::instruction_set::Avx512 $avx512_tile);
             #[cfg(target_arch = "aarch64")]
-            registers!(@tiles neon_tile neon_tall_tile crate::level::Neon $neon_tile);
+            registers!(@tiles neon_tile neon_tall_tile crate::instruction_set::Neon $neon_tile);
         }
     };
-    (@tiles $wide:ident $tall:ident $level:path [$rows:literal x $columns:literal, $tall_rows:literal x $tall_columns:literal]) => {
+    (@tiles $wide:ident $tall:ident $isa:path [$rows:literal x $columns:literal, $tall_rows:literal x $tall_columns:literal]) => {
         #[inline(always)]
         fn $wide<K: Tiled<Self>>(kernel: K) {
-            kernel.run::<$level, $rows, $columns>();
+            kernel.run::<$isa, $rows, $columns>();
         }
         #[inline(always)]
         fn $tall<K: Tiled<Self>>(kernel: K) {
-            kernel.run::<$level, $tall_rows, $tall_columns>();
+            kernel.run::<$isa, $tall_rows, $tall_columns>();
         }
     };
 }

@@ -84,7 +84,7 @@ mod instructions {
     macro_rules! register {
         ($register:ident of $lanes:literal $t:ident: $splat:ident $load:ident $store:ident $add:ident $mul_add:expr) => {
             // SAFETY, of every block here: the instructions exist. A kernel meets this type only as the register of its level, and a
-            // level's kernel runs only inside the function of level.rs that enables the level's instructions, after the processor
+            // level's kernel runs only inside the function of instruction_set.rs that enables the level's instructions, after the processor
             // reported them. Pointers are the caller's to vouch for.
             impl Vector<$t> for arch::$register {
                 const LANES: usize = $lanes;

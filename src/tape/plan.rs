@@ -9,10 +9,10 @@
 //! Points 1 and 2 are in `plan/orders`, point 3 in `plan/steps`, point 4 in `plan/layout`. A plan holds no numbers; `session` replays it.
 
 use super::graph::{Graph, Var};
-use super::op::BUNDLE;
+use super::op::MICRO_BATCH;
 use super::slab::alignment;
 use crate::error::{Error, Result};
-use large_weights::{Bundles, complement};
+use large_weights::{MicroBatches, complement};
 use layout::Layout;
 use orders::Orders;
 use phyture_kernels::Real;
@@ -41,7 +41,7 @@ pub(crate) struct Plan<T> {
     pub loss: Option<(usize, usize)>,
     pub slab_len: usize,
     /// Samples that are in flight together on one worker.
-    pub bundle: usize,
+    pub micro_batch: usize,
     /// Packed weights of the forward and of the backward list, one after another in the order of the list.
     pub packed_len: [usize; 2],
     pub parameter_len: usize,
@@ -81,7 +81,7 @@ impl<T: Real> Plan<T> {
         self.summed.iter().map(|(range, _)| range.len()).sum()
     }
 
-    /// Numbers from one sample's slab to the next one's in a bundle.
+    /// Numbers from one sample's slab to the next one's in a micro-batch.
     pub const fn lane_len(&self) -> usize {
         self.slab_len.next_multiple_of(alignment::<T>())
     }
@@ -89,14 +89,14 @@ impl<T: Real> Plan<T> {
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
         let orders = Orders::of(graph, loss, outputs)?;
         let layout = Layout::of(graph, &orders, loss, outputs)?;
-        let bundles = Bundles::of(graph, &orders.forward, &orders.backward);
-        let mut large_weights = bundles.large_weights(graph);
+        let micro_batches = MicroBatches::of(graph, &orders.forward, &orders.backward);
+        let mut large_weights = micro_batches.large_weights(graph);
         let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
-        let mut steps = Steps::new(graph, &layout, &bundles, &summed);
+        let mut steps = Steps::new(graph, &layout, &micro_batches, &summed);
         let (forward, forward_packed) = steps.list(&orders.forward, Direction::Forward);
         let (mut backward, backward_packed) = steps.list(&orders.backward, Direction::Backward);
         let kept = steps.keep(&orders.backward, &mut backward, &mut large_weights);
-        let is_bundled = forward.iter().any(|step| step.bundled);
+        let is_micro_batched = forward.iter().any(|step| step.micro_batched);
         Ok(Self {
             stretches: [&forward, &backward].map(|steps| stretches(steps)),
             forward,
@@ -106,7 +106,7 @@ impl<T: Real> Plan<T> {
             input_gradients: layout.input_gradients(graph),
             loss: loss.map(|loss| (layout.value(loss.0).start, layout.gradient(loss.0).start)),
             slab_len: layout.slab_len,
-            bundle: if is_bundled { BUNDLE } else { 1 },
+            micro_batch: if is_micro_batched { MICRO_BATCH } else { 1 },
             packed_len: [forward_packed, backward_packed],
             parameter_len: graph.parameter_count(),
             unreached: steps.unreached(),

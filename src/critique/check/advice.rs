@@ -67,14 +67,14 @@ fn starts_word(text: &str, at: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::finding::{Subject, Verdict};
+    use super::super::finding::{Severity, Subject};
     use super::*;
 
     fn heeded(set: &str, stated: &[(&str, &str)]) -> (Option<String>, String) {
         let mut finding = Finding {
             name: "a".into(),
             subject: Subject::Conventions,
-            verdict: Verdict::Fault,
+            verdict: Severity::Fault,
             measured: None,
             interval: None,
             expected: None,

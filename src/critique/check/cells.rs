@@ -1,7 +1,7 @@
 //! Cells that cannot be: for moments, values far outside of what their column does in all flights. Nothing is mended here; the finding prints the
 //! rule for `dataset.toml` that does.
 
-use super::finding::{Finding, Subject, Verdict};
+use super::finding::{Finding, Severity, Subject};
 use super::flights::{CONTROLS, named, of_all};
 use crate::flight::{Column, Flight};
 
@@ -111,7 +111,7 @@ fn finding(column: Column, spikes: &Spikes, flights: &[Flight]) -> Finding {
     Finding {
         name: format!("spikes_{name}"),
         subject: Subject::Conventions,
-        verdict: Verdict::Fault,
+        verdict: Severity::Fault,
         measured: Some(spikes.cells as f64),
         interval: None,
         expected: Some(0.0),

@@ -1,7 +1,7 @@
 //! Samples that a recorder dropped and filled with the last ones: all that is measured stands still for a while and then jumps. A single column
 //! that stands still is the business of `streams`.
 
-use super::finding::{Finding, Verdict, finding};
+use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, in_flights, named};
 use super::robust::median;
 use crate::flight::{Column, Flight};
@@ -37,13 +37,13 @@ pub(super) fn findings(flights: &[Flight]) -> Option<Finding> {
         100.0 * share
     );
     let indices: Vec<usize> = lost.iter().map(|one| one.flight).collect();
-    let verdict = if share > MUCH { Verdict::Fault } else { Verdict::Warning };
+    let verdict = if share > MUCH { Severity::Fault } else { Severity::Warning };
     if indices.len() as f64 > MOST * flights.len() as f64 {
         return Some(finding("dropouts", verdict, message, None));
     }
     let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
     Some(match verdict {
-        Verdict::Fault => in_flights("dropouts", &indices, &message, flights),
+        Severity::Fault => in_flights("dropouts", &indices, &message, flights),
         _ => finding("dropouts", verdict, format!("in {}: {message}", named(&names)), None),
     })
 }

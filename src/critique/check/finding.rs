@@ -22,7 +22,7 @@ pub enum Subject {
 /// Outcome of one check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum Severity {
     /// As expected.
     Ok,
     /// The data do not say.
@@ -41,7 +41,7 @@ pub struct Finding {
     /// What it is about.
     pub subject: Subject,
     /// Outcome.
-    pub verdict: Verdict,
+    pub verdict: Severity,
     /// Measured value, if it is a number.
     pub measured: Option<f64>,
     /// 95 % interval of the value, from blocks of 10 s.
@@ -59,7 +59,7 @@ pub struct Finding {
     pub flights: Vec<String>,
 }
 
-impl Verdict {
+impl Severity {
     /// Word for tables.
     pub const fn word(self) -> &'static str {
         match self {
@@ -92,7 +92,7 @@ impl fmt::Display for Finding {
 }
 
 /// A finding on conventions that brings no number.
-pub(super) fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> Finding {
+pub(super) fn finding(name: &str, verdict: Severity, message: String, set: Option<&str>) -> Finding {
     Finding {
         name: name.into(),
         subject: Subject::Conventions,

@@ -1,6 +1,6 @@
 //! Some flights among all of a set: how many say something, and a finding that names them. What single flights say is measured elsewhere.
 
-use super::finding::{Finding, Verdict, finding};
+use super::finding::{Finding, Severity, finding};
 use crate::flight::{Column, Flight};
 
 pub(super) const CONTROLS: [Column; 4] = [Column::U1, Column::U2, Column::U3, Column::U4];
@@ -18,7 +18,7 @@ pub(super) fn in_flights(name: &str, indices: &[usize], message: &str, flights: 
     Finding {
         set: Some(left_out(&names)),
         flights: names.into_iter().map(str::to_owned).collect(),
-        ..finding(name, Verdict::Fault, message, None)
+        ..finding(name, Severity::Fault, message, None)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sticks that a log cuts off: their values pile up at an end that is not the end of their travel, and while they stand there the axis goes on
 //! answering. A stick that stands at its real end moves its axis no further.
 
-use super::finding::{Finding, Verdict, finding};
+use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, WIDER, in_flights};
 use super::increments::{Motion, length_s};
 use super::regression::BlockRegression;
@@ -83,7 +83,7 @@ fn cut_off(stick: usize, each: &[(usize, Piled)], flights: &[Flight], except: &B
     let indices: Vec<usize> = piled.iter().map(|entry| entry.0).collect();
     let is_set = indices.len() as f64 > MOST * flights.len() as f64;
     Some(if is_set {
-        finding(&format!("cut_off_{name}"), Verdict::Fault, message, None)
+        finding(&format!("cut_off_{name}"), Severity::Fault, message, None)
     } else {
         in_flights(&format!("cut_off_{name}"), &indices, &message, flights)
     })

@@ -34,7 +34,7 @@ mod trims;
 mod unexplained;
 
 pub use excitation::{Collinearity, Excitation};
-pub use finding::{Finding, Subject, Verdict};
+pub use finding::{Finding, Severity, Subject};
 pub use report::CheckReport;
 #[cfg(feature = "files")]
 pub use suggestion::{Open, Suggestion};
@@ -71,7 +71,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     findings.iter_mut().for_each(|finding| advice::heed(finding, &data.source));
 
     CheckReport {
-        fault: findings.iter().any(|finding| finding.verdict == Verdict::Fault),
+        fault: findings.iter().any(|finding| finding.verdict == Severity::Fault),
         summary: summary(&findings),
         flights: data.flights.len(),
         duration_s: data.duration_s(),
@@ -116,7 +116,7 @@ impl Gathered {
         let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
         let poor = streams::findings(&data.flights).into_iter().chain(spikes);
         let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).collect();
-        let faults = poor.iter().filter(|finding| finding.verdict == Verdict::Fault);
+        let faults = poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
         let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(unfit).collect();
@@ -150,17 +150,17 @@ impl Gathered {
         findings.extend(self.poor.iter().chain(&self.odd).cloned());
         findings.extend(self.together.kinematics(0.0));
         // Of the attitude the relations know more than the force does.
-        let is_read = |finding: &Finding| finding.verdict == Verdict::Fault && RELATIONS[..2].contains(&finding.name.as_str());
+        let is_read = |finding: &Finding| finding.verdict == Severity::Fault && RELATIONS[..2].contains(&finding.name.as_str());
         let known: Vec<Option<String>> =
             findings.iter().filter(|finding| is_read(finding)).map(|finding| finding.set.clone()).collect();
         let lateral = self.together.forces.lateral();
-        let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Verdict::Fault;
+        let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Severity::Fault;
         findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
-            let faults = of_sticks.iter().filter(|finding| finding.verdict == Verdict::Fault);
+            let faults = of_sticks.iter().filter(|finding| finding.verdict == Severity::Fault);
             let named: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
             let is_known = |flight: &usize| named.contains(&data.flights[*flight].name);
             let known = (0..data.flights.len()).filter(is_known).chain(self.unjudged.iter().copied()).collect();
@@ -169,7 +169,7 @@ impl Gathered {
             findings.extend(cut_off);
         }
         // What thrust does along z is known from the collective alone.
-        let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
+        let unsure = findings.iter().any(|finding| finding.verdict == Severity::Fault);
         findings.extend(places(self.together.forces.coefficients(), unsure));
         let rest = data.flights.iter().enumerate().filter(|(flight, _)| !self.except.contains(flight));
         findings.extend(plausibility(&rest.map(|entry| entry.1).collect::<Vec<_>>()));
@@ -221,8 +221,8 @@ fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
 
 /// Coefficients of gravity and of the Coriolis term; where a unit of length explains their size, that unit in their place.
 fn places(coefficients: Vec<Finding>, unsure: bool) -> Vec<Finding> {
-    if let Some(lengths) = odd::lengths(&coefficients).filter(|lengths| lengths.verdict == Verdict::Fault) {
-        let others = coefficients.into_iter().filter(|finding| finding.verdict != Verdict::Fault);
+    if let Some(lengths) = odd::lengths(&coefficients).filter(|lengths| lengths.verdict == Severity::Fault) {
+        let others = coefficients.into_iter().filter(|finding| finding.verdict != Severity::Fault);
         return others.chain([lengths]).collect();
     }
     coefficients.into_iter().map(|finding| if unsure { not_judged(finding) } else { finding }).collect()
@@ -238,11 +238,11 @@ const fn other_order(order: QuaternionOrder) -> &'static str {
 
 /// A coefficient along z that a wrong stick, or wrong cells of it, explain.
 fn not_judged(finding: Finding) -> Finding {
-    if finding.verdict != Verdict::Fault || !finding.name.ends_with("_z") {
+    if finding.verdict != Severity::Fault || !finding.name.ends_with("_z") {
         return finding;
     }
     let message = "not judged, since it rests on the sticks, and something is wrong with these".into();
-    Finding { verdict: Verdict::Undetermined, message, set: None, ..finding }
+    Finding { verdict: Severity::Undetermined, message, set: None, ..finding }
 }
 
 /// What rests on a reading that is known to be wrong is not judged.
@@ -262,11 +262,11 @@ fn symptom(finding: Finding) -> Finding {
     ]
     .iter()
     .any(|start| finding.name.starts_with(start));
-    if is_reading || is_known || finding.verdict < Verdict::Warning {
+    if is_reading || is_known || finding.verdict < Severity::Warning {
         return finding;
     }
     let message = "not judged before what is wrong above is mended".into();
-    Finding { verdict: Verdict::Undetermined, message, set: None, flights: Vec::new(), ..finding }
+    Finding { verdict: Severity::Undetermined, message, set: None, flights: Vec::new(), ..finding }
 }
 
 /// Where the accelerations come from.
@@ -279,7 +279,7 @@ fn origin(flights: &[Flight]) -> Finding {
             flights.len()
         ),
     };
-    finding("targets", Verdict::Ok, message, None)
+    finding("targets", Severity::Ok, message, None)
 }
 
 /// Ranges that no aircraft of this kind leaves.
@@ -294,7 +294,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
     if pitch > std::f64::consts::FRAC_PI_2 + 0.01 {
         let message =
             format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
-        findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
+        findings.push(finding("angle_range", Severity::Fault, message, Some("[units] angles = \"deg\"")));
     }
     let beyond = |column: Column| {
         let samples: usize = flights.iter().map(|flight| flight.len()).sum();
@@ -314,7 +314,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
             }
             _ => "[columns] u1 = \"u1 / 1000\" or the like, with the file's names",
         };
-        findings.push(finding("control_range", Verdict::Warning, message, Some(set)));
+        findings.push(finding("control_range", Severity::Warning, message, Some(set)));
     }
     let with_height: Vec<&Flight> = flights.iter().copied().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
@@ -329,7 +329,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
         );
         findings.push(finding(
             "height_sign",
-            Verdict::Warning,
+            Severity::Warning,
             message,
             Some("[columns] z = \"-z\", with the file's name, if z is height"),
         ));
@@ -338,13 +338,13 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
 }
 
 fn summary(findings: &[Finding]) -> String {
-    let of = |verdict: Verdict| findings.iter().filter(move |finding| finding.verdict == verdict);
-    let names = |verdict: Verdict| of(verdict).map(|finding| finding.name.as_str()).collect::<Vec<_>>().join(", ");
-    if let Some(first) = of(Verdict::Fault).next() {
-        return format!("Convention fault ({}): {}.", names(Verdict::Fault), first.message);
+    let of = |verdict: Severity| findings.iter().filter(move |finding| finding.verdict == verdict);
+    let names = |verdict: Severity| of(verdict).map(|finding| finding.name.as_str()).collect::<Vec<_>>().join(", ");
+    if let Some(first) = of(Severity::Fault).next() {
+        return format!("Convention fault ({}): {}.", names(Severity::Fault), first.message);
     }
-    match of(Verdict::Warning).count() {
+    match of(Severity::Warning).count() {
         0 => "No convention fault, no warning.".into(),
-        _ => format!("No convention fault; warnings: {}.", names(Verdict::Warning)),
+        _ => format!("No convention fault; warnings: {}.", names(Severity::Warning)),
     }
 }

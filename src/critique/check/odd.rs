@@ -3,7 +3,7 @@
 
 use super::clocks::CLOCK;
 use super::evidence::Evidence;
-use super::finding::{Finding, RELATIONS, Subject, Verdict, finding};
+use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, TOGETHER};
 use super::robust::{NORMAL, median};
@@ -92,7 +92,7 @@ pub(super) fn late_streams(timing: &Timing) -> Vec<Finding> {
                     finding.message,
                     1e3 * late_s.abs()
                 );
-                Finding { verdict: Verdict::Fault, message, set: Some(format!("[late] {stream} = {late_s:.3}")), ..finding }
+                Finding { verdict: Severity::Fault, message, set: Some(format!("[late] {stream} = {late_s:.3}")), ..finding }
             }
             None => finding,
         }
@@ -106,11 +106,11 @@ pub(super) fn late_controls(timing: &Timing) -> Vec<Finding> {
     let late: Vec<&Finding> =
         sticks.iter().filter(|finding| finding.measured.is_some_and(|at_s| at_s < 0.0) && contradicts(finding)).collect();
     if late.len() < 2 || late.len() < sticks.len() {
-        return late.into_iter().map(|finding| Finding { verdict: Verdict::Fault, ..finding.clone() }).collect();
+        return late.into_iter().map(|finding| Finding { verdict: Severity::Fault, ..finding.clone() }).collect();
     }
     let mean_s = -late.iter().filter_map(|finding| finding.measured).sum::<f64>() / late.len() as f64;
     let message = format!("the controls come late: they are recorded {:.0} ms after they act", 1e3 * mean_s);
-    vec![finding("controls_late", Verdict::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
+    vec![finding("controls_late", Severity::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
 }
 
 /// What breaks with the others, and in which flights.
@@ -128,7 +128,7 @@ impl Odd {
         }
         let mut by_name: BTreeMap<&str, Vec<(usize, &Finding)>> = BTreeMap::new();
         for own in each {
-            for finding in own.findings.iter().filter(|finding| finding.verdict != Verdict::Undetermined) {
+            for finding in own.findings.iter().filter(|finding| finding.verdict != Severity::Undetermined) {
                 by_name.entry(&finding.name).or_default().push((own.flight, finding));
             }
         }
@@ -164,7 +164,7 @@ impl Odd {
             odd.extend(name, apart.into_iter().map(|shift| (shift.flights, shift.message)).collect(), flights);
             odd.findings.extend(vague.into_iter().map(|shift| {
                 let message = format!("{}, or the sticks move so otherwise there that they look so", shift.message);
-                Finding { verdict: Verdict::Warning, ..in_flights(name, &shift.flights, &message, flights) }
+                Finding { verdict: Severity::Warning, ..in_flights(name, &shift.flights, &message, flights) }
             }));
         }
         odd
@@ -184,13 +184,13 @@ pub(super) fn is_misread(each: &[&Own], all: &Evidence) -> bool {
         all.other_reading(place).is_some_and(|reading| most(agree(reading)))
     };
     let columns = all.kinematics(0.0);
-    let faults = columns.iter().filter(|finding| finding.verdict == Verdict::Fault && finding.measured.is_some());
+    let faults = columns.iter().filter(|finding| finding.verdict == Severity::Fault && finding.measured.is_some());
     let is_of_column = |finding: &Finding| {
         let own = each.iter().filter_map(|own| own.findings.iter().find(|other| other.name == finding.name));
-        let told: Vec<&Finding> = own.filter(|own| own.verdict != Verdict::Undetermined).collect();
-        told.len() > 1 && told.iter().filter(|own| own.verdict == Verdict::Fault).count() as f64 > MOST * told.len() as f64
+        let told: Vec<&Finding> = own.filter(|own| own.verdict != Severity::Undetermined).collect();
+        told.len() > 1 && told.iter().filter(|own| own.verdict == Severity::Fault).count() as f64 > MOST * told.len() as f64
     };
-    let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Verdict::Fault;
+    let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Severity::Fault;
     let is_turned = all.forces.lateral().is_some_and(|finding| turned(&finding));
     (0..all.relations.len()).any(is_common)
         || faults.into_iter().any(is_of_column)
@@ -205,7 +205,7 @@ pub(super) const LATERAL: &str = "lateral_force";
 /// Flights by what is wrong in them, where others keep the relation.
 fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
     let (faulty, sound): (Vec<_>, Vec<_>) = of_flights.iter().partition(|(_, finding)| contradicts(finding));
-    let sound = sound.iter().filter(|(_, finding)| finding.verdict != Verdict::Fault).count();
+    let sound = sound.iter().filter(|(_, finding)| finding.verdict != Severity::Fault).count();
     if faulty.len() as f64 > MOST * (faulty.len() + sound) as f64 {
         return Vec::new();
     }
@@ -274,14 +274,14 @@ fn ratios(of_flights: &[(usize, &Finding)]) -> Vec<(usize, f64)> {
 
 /// Whether a flight by itself contradicts what is expected beyond doubt.
 fn contradicts(finding: &Finding) -> bool {
-    let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Verdict::Fault };
+    let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Severity::Fault };
     let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
     match finding.subject {
-        Subject::Timing => finding.verdict >= Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
+        Subject::Timing => finding.verdict >= Severity::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
         Subject::Conventions | Subject::Excitation if finding.expected == Some(0.0) => {
-            finding.verdict == Verdict::Fault && (low > 0.0 || high < 0.0)
+            finding.verdict == Severity::Fault && (low > 0.0 || high < 0.0)
         }
-        Subject::Conventions | Subject::Excitation => finding.verdict == Verdict::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
+        Subject::Conventions | Subject::Excitation => finding.verdict == Severity::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
     }
 }
 
@@ -345,11 +345,11 @@ pub(super) fn lengths(coefficients: &[Finding]) -> Option<Finding> {
     };
     let value = 0.5 * (both[0].0 + both[1].0);
     let found = LENGTHS.into_iter().find(|(unit, ..)| is_near(*unit));
-    let mut finding = finding("lengths", Verdict::Ok, "gravity has the size that it has in metres".into(), None);
+    let mut finding = finding("lengths", Severity::Ok, "gravity has the size that it has in metres".into(), None);
     finding.measured = Some(value);
     finding.expected = Some(1.0);
     if let Some((_, name, unit)) = found {
-        finding.verdict = Verdict::Fault;
+        finding.verdict = Severity::Fault;
         finding.message = format!("gravity has the size that it has where all lengths are in {name}");
         finding.set = Some(format!("[units] position = \"{unit}\", velocity = \"{unit}/s\", acceleration = \"{unit}/s^2\""));
     }

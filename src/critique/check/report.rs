@@ -1,7 +1,7 @@
 //! What a check says of a whole set: its findings, the tables beside them, and the same as aligned text. No measuring here.
 
 use super::excitation::{Collinearity, Excitation};
-use super::finding::{Finding, Subject, Verdict};
+use super::finding::{Finding, Severity, Subject};
 use super::timing::DelayProfile;
 use crate::critique::wrap::wrapped;
 use crate::flight::Targets;
@@ -36,7 +36,7 @@ pub struct CheckReport {
 impl CheckReport {
     /// Flights that some finding of a fault names: they are read otherwise than the rest.
     pub fn suspects(&self) -> Vec<String> {
-        let faults = self.findings.iter().filter(|finding| finding.verdict == Verdict::Fault);
+        let faults = self.findings.iter().filter(|finding| finding.verdict == Severity::Fault);
         let mut names: Vec<String> = faults.flat_map(|finding| finding.flights.iter().cloned()).collect();
         names.sort_unstable();
         names.dedup();

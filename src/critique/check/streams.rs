@@ -1,7 +1,7 @@
 //! Streams that hold less than the log they stand in: a value frozen for seconds, one held from each sample of a slower stream to the next, one
 //! rounded coarsely, one with more noise in some flights than in the others. All are seen in a column by itself, without physics.
 
-use super::finding::{Finding, Verdict, finding};
+use super::finding::{Finding, Severity, finding};
 use super::flights::{CONTROLS, MOST, in_flights, of_all};
 use super::robust::{lower_quartile, median};
 use crate::flight::{Column, Flight};
@@ -79,7 +79,7 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let rounded: Vec<(Column, Finding)> =
         grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
     // Steps of rounding look like noise.
-    let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Verdict::Fault);
+    let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Severity::Fault);
     let noisy = NOISY.into_iter().chain(CONTROLS).filter(present).filter(is_smooth).filter_map(|column| noise(flights, column));
     let noisy: Vec<Finding> =
         noisy.chain(CONTROLS.into_iter().filter(is_smooth).filter_map(|column| rough(flights, column))).collect();
@@ -153,7 +153,7 @@ impl Rests {
         let set = (POSITION.contains(&column) || column == Column::Yaw).then_some(missing.as_str());
         match such.as_slice() {
             [] => None,
-            _ if is_set => Some(finding(&format!("frozen_{name}"), Verdict::Fault, message, set)),
+            _ if is_set => Some(finding(&format!("frozen_{name}"), Severity::Fault, message, set)),
             some => Some(in_flights(&format!("frozen_{name}"), some, &message, flights)),
         }
     }
@@ -199,7 +199,7 @@ fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Findin
     );
     match hold.flights.as_slice() {
         [] => {
-            let verdict = if matters { Verdict::Fault } else { Verdict::Warning };
+            let verdict = if matters { Severity::Fault } else { Severity::Warning };
             Some(finding(&name, verdict, message, Some(&format!("resample_hz = {rate_hz:.3}"))))
         }
         some => matters.then(|| in_flights(&name, some, &message, flights)),
@@ -241,7 +241,7 @@ impl Grains {
         );
         let is_coarse = share(step) > COARSE && share(step).is_finite();
         if such.len() as f64 > MOST * self.telling as f64 {
-            let verdict = if is_coarse { Verdict::Fault } else { Verdict::Warning };
+            let verdict = if is_coarse { Severity::Fault } else { Severity::Warning };
             return Some(finding(&format!("rounding_{name}"), verdict, message, None));
         }
         let indices: Vec<usize> = such.into_iter().map(|entry| entry.0).collect();
@@ -304,7 +304,7 @@ fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
          as behind a lag",
         100.0 * share
     );
-    let verdict = if size > SWAMPED * deviation { Verdict::Fault } else { Verdict::Warning };
+    let verdict = if size > SWAMPED * deviation { Severity::Fault } else { Severity::Warning };
     (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
 }
 

@@ -4,7 +4,7 @@
 //! Findings speak of columns as the program has them, in its axes and units, and of flights as they were read: a description that states something
 //! already is what they come on top of. What cannot be said so, or leaves a choice, is left to a person.
 
-use super::finding::{Finding, Verdict};
+use super::finding::{Finding, Severity};
 use super::report::CheckReport;
 use crate::critique::wrap::wrapped;
 use crate::flight::{Axes, Column, Description, Frame, Schema, Source, TargetKind, Targets, column_names, columns_of};
@@ -47,7 +47,7 @@ impl CheckReport {
     /// What mends the faults that were found in flights of this source. `None` where nothing is at fault, or where the source has a description that is
     /// none.
     pub fn suggestion(&self, source: &Source) -> Option<Suggestion> {
-        let mut faults = self.findings.iter().filter(|finding| finding.verdict == Verdict::Fault).peekable();
+        let mut faults = self.findings.iter().filter(|finding| finding.verdict == Severity::Fault).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
         let (mut mends, mut open) = (Vec::new(), Vec::new());
@@ -365,7 +365,7 @@ mod tests {
         let finding = |(place, (line, flights)): (usize, &(&str, &[&str]))| Finding {
             name: format!("fault_{place}"),
             subject: Subject::Conventions,
-            verdict: Verdict::Fault,
+            verdict: Severity::Fault,
             measured: None,
             interval: None,
             expected: None,

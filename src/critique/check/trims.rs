@@ -1,7 +1,7 @@
 //! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, and one that stands elsewhere in some flights
 //! than in the others for the same answer. Signs, gains and order of the sticks are the business of `sticks`.
 
-use super::finding::{Finding, Verdict};
+use super::finding::{Finding, Severity};
 use super::flights::{CONTROLS, in_flights};
 use super::increments::SHORT_BLOCK_S;
 use super::robust::{NORMAL, median};
@@ -104,7 +104,7 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
     );
     let mut indices: Vec<usize> = fewer.iter().map(|trim| trim.flight).collect();
     indices.sort_unstable();
-    Some(Finding { verdict: Verdict::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
+    Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
 }
 
 /// The smaller of two groups of trims far apart, and by how much it differs; `None` where there is one group.

@@ -40,9 +40,9 @@ mod selection;
 pub mod sentences;
 mod significance;
 mod signs;
+mod stepwise_stlsq;
 mod suggest;
 mod text;
-mod textbook;
 mod verdict;
 
 pub use account::{together, weigh};
@@ -54,6 +54,6 @@ pub use report::{
 };
 pub use search::Options;
 pub use signs::number_remark;
+pub use stepwise_stlsq::{Named, stepwise_and_stlsq};
 pub use text::LoopText;
-pub use textbook::{Named, textbook};
 pub use verdict::{Outcome, diagnose};

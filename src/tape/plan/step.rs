@@ -46,7 +46,7 @@ pub(crate) struct Step<T> {
     /// The weight's place in the flat slab, and its packed form's place in that of the pass; `None` if nothing is packed.
     pub packed: Option<(Range<usize>, Range<usize>)>,
     /// Whether the operation takes some samples at once.
-    pub bundled: bool,
+    pub micro_batched: bool,
     /// In the backward list, for the gradient of a large weight.
     pub kept: Option<Kept>,
 }
