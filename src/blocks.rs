@@ -5,7 +5,7 @@
 //! windows into blocks and turns block sums into a mean and its 95 % interval. It does not know what is averaged.
 
 use crate::flight::{Flight, Window};
-use crate::student::{quantile_975, upper_quantile};
+use crate::student_t::{quantile_975, upper_quantile};
 
 /// Length of a block, s. Longer than the manoeuvres and the slow attitude and speed modes of a small helicopter (1 s to 5 s).
 pub const BLOCK_S: f64 = 10.0;

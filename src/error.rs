@@ -3,7 +3,7 @@
 //! Every variant carries its operands and its message tells the person what to do next. Messages about input name the file,
 //! the line (1-based, the header is line 1), the column, what was found and what was expected.
 
-use phyture_kernels::level::{ENVIRONMENT_VARIABLE, LevelError};
+use phyture_kernels::instruction_set::{ENVIRONMENT_VARIABLE, InstructionSetError};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -113,7 +113,7 @@ pub enum Error {
 
 impl Error {
     /// An instruction set was asked for that is not there.
-    pub(crate) fn level(error: LevelError) -> Self {
+    pub(crate) fn level(error: InstructionSetError) -> Self {
         Self::Config {
             place: "environment".into(),
             field: ENVIRONMENT_VARIABLE.into(),

@@ -23,7 +23,7 @@ pub mod protocol;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod sim;
-pub mod student;
+pub mod student_t;
 pub mod suggest;
 pub mod tape;
 pub mod train;

@@ -2,7 +2,7 @@
 #![cfg(feature = "files")]
 
 use phyture::Error;
-use phyture::critique::check::{Verdict, check};
+use phyture::critique::check::{Severity, check};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::write::data_set_csv;
 use phyture::flight::{Column, DataSet, Flight, Targets};
@@ -117,7 +117,7 @@ fn assert_named(name: &str, says: &str, change: impl Fn(&mut [Vec<f64>; Column::
         let flights = some(|index| index % every == 0, &change)?;
         let count = flights.len().div_ceil(every);
         let report = check(&DataSet { flights, ..DataSet::default() }, None);
-        let finding = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Verdict::Fault);
+        let finding = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Severity::Fault);
         let finding = finding.unwrap_or_else(|| panic!("no {name} in\n{report}"));
         assert!(finding.message.contains(says), "{report}");
         assert!(every == 1 || finding.flights.len() * 2 > count, "{report}");
@@ -163,7 +163,7 @@ fn assert_flights(name: &str, which: impl Fn(usize) -> bool, change: impl Fn(&mu
     let flights = some(&which, change)?;
     let changed: Vec<String> = (0..flights.len()).filter(|&index| which(index)).map(|index| flights[index].name.clone()).collect();
     let report = check(&DataSet { flights, ..DataSet::default() }, None);
-    let found = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Verdict::Fault);
+    let found = report.findings.iter().find(|finding| finding.name == name && finding.verdict == Severity::Fault);
     let found = found.unwrap_or_else(|| panic!("no {name} in\n{report}"));
     assert!(2 * found.flights.len() >= changed.len() && found.flights.iter().all(|flight| changed.contains(flight)), "{report}");
     Ok(())
@@ -270,7 +270,7 @@ fn knots_and_a_heading_alone_in_degrees_are_mended() -> Outcome {
 /// Messages of the faults that are claimed.
 fn faults(flights: Vec<Flight>) -> Vec<String> {
     let set = DataSet { flights, ..DataSet::default() };
-    let is_fault = |finding: &phyture::critique::check::Finding| finding.verdict == Verdict::Fault;
+    let is_fault = |finding: &phyture::critique::check::Finding| finding.verdict == Severity::Fault;
     check(&set, None).findings.into_iter().filter(is_fault).map(|finding| finding.message).collect()
 }
 
@@ -367,7 +367,7 @@ fn a_trim_of_a_stick_is_a_warning_with_its_size() -> Outcome {
     let set = DataSet { flights, ..DataSet::default() };
     let report = check(&set, None);
     let finding = report.findings.iter().find(|finding| finding.name == "trim_u1").ok_or("no finding")?;
-    assert_eq!(finding.verdict, Verdict::Warning);
+    assert_eq!(finding.verdict, Severity::Warning);
     assert!(finding.message.contains("u1 stands 0.2"), "{}", finding.message);
     assert!(!report.fault, "{}", report.summary);
     Ok(())
@@ -415,7 +415,7 @@ fn controls_that_were_joined_a_sample_late_in_some_logs_are_moved_back_there() -
     assert_eq!(stamps(agile(|_| true)?), []);
     let names = ["flight_1".to_owned(), "flight_3".to_owned()];
     let line = "[[late_in]] flights = [\"flight_1\", \"flight_3\"], controls = 0.01";
-    assert_eq!(stamps(agile(|index| index % 2 == 1)?), [(Verdict::Warning, names.to_vec(), line.to_owned())]);
+    assert_eq!(stamps(agile(|index| index % 2 == 1)?), [(Severity::Warning, names.to_vec(), line.to_owned())]);
 
     let folder = tempfile::tempdir()?;
     let path = folder.path();

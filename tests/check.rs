@@ -1,6 +1,6 @@
 //! The check of conventions and timing: flights with one thing wrong each are named, clean ones pass.
 
-use phyture::critique::check::{CheckReport, Finding, Verdict, check};
+use phyture::critique::check::{CheckReport, Finding, Severity, check};
 use phyture::flight::attitude::{
     Axes, QuaternionOrder, cross, euler_rates, euler_to_quaternion, gravity_body, quaternion_to_euler, rotate,
     rotation_body_to_inertial,
@@ -158,7 +158,7 @@ fn missing_physics_is_no_convention_fault() -> phyture::Result<()> {
     let report = check(&simulate(&late)?, None);
     assert!(finding(&report, "control_delay").measured.is_some_and(|delay_s| delay_s > STEP_S), "{report}");
     let shifted = check(&simulate(&bare().hide("sync", 1.0)?)?, None);
-    assert_eq!(finding(&shifted, "rates_offset").verdict, Verdict::Warning, "{shifted}");
+    assert_eq!(finding(&shifted, "rates_offset").verdict, Severity::Warning, "{shifted}");
     Ok(())
 }
 
@@ -170,11 +170,11 @@ fn a_clean_log_passes_and_its_terms_are_found() {
     for name in
         ["position_rate", "attitude_rate", "velocity_targets", "rate_targets", "lateral_force", "rates_offset", "targets_offset"]
     {
-        assert_eq!(finding(&report, name).verdict, Verdict::Ok, "{report}");
+        assert_eq!(finding(&report, name).verdict, Severity::Ok, "{report}");
     }
     for name in ["gravity_x", "gravity_y", "attitude_rate_x", "velocity_targets_y"] {
         let finding = finding(&report, name);
-        assert_eq!(finding.verdict, Verdict::Ok, "{report}");
+        assert_eq!(finding.verdict, Severity::Ok, "{report}");
     }
 }
 
@@ -187,7 +187,7 @@ fn planted(targets: Targets, plant: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> 
 
 fn assert_fault(report: &CheckReport, name: &str, says: &str) {
     let finding = finding(report, name);
-    assert!(report.fault && finding.verdict == Verdict::Fault && finding.message.contains(says), "{name}: {says}\n{report}");
+    assert!(report.fault && finding.verdict == Severity::Fault && finding.message.contains(says), "{name}: {says}\n{report}");
     assert!(finding.set.is_some());
 }
 
@@ -214,7 +214,7 @@ fn targets_that_are_not_the_derivative_of_body_velocity_are_named() {
         });
     });
     assert_fault(&specific_force, "velocity_targets", "specific force");
-    assert_eq!(finding(&specific_force, "gravity_x").verdict, Verdict::Undetermined, "a symptom of the same");
+    assert_eq!(finding(&specific_force, "gravity_x").verdict, Severity::Undetermined, "a symptom of the same");
     let without_gravity = planted(Targets::Recorded, |columns| {
         let copy = columns.clone();
         each(columns, V_DOT, |k, target| {
@@ -315,7 +315,7 @@ fn a_quaternion_in_the_other_order_is_named_in_both_directions_and_in_other_axes
     let mut right = data(2, 0, Targets::Recorded, |_| ());
     right.source.quaternion = Some(QuaternionOrder::ScalarLast);
     let report = check(&right, None);
-    assert!(!report.fault && finding(&report, "lateral_force").verdict == Verdict::Ok, "{report}");
+    assert!(!report.fault && finding(&report, "lateral_force").verdict == Severity::Ok, "{report}");
 }
 
 #[test]
@@ -334,7 +334,7 @@ fn columns_that_are_off_by_a_unit_are_told_which() {
     ] {
         let report = planted(Targets::Recorded, times(of, factor));
         let found = finding(&report, name);
-        assert!(found.verdict == Verdict::Fault && found.set.as_deref() == Some(advice), "{advice}\n{report}");
+        assert!(found.verdict == Severity::Fault && found.set.as_deref() == Some(advice), "{advice}\n{report}");
     }
     let percent = planted(Targets::Recorded, times(&[Column::U1, Column::U2, Column::U3, Column::U4], 100.0));
     assert_eq!(finding(&percent, "control_range").set.as_deref(), Some("[units] controls = \"%\""), "{percent}");
@@ -385,7 +385,7 @@ fn shifted_streams_are_measured() {
         }
     });
     let rates = finding(&report, "rates_offset");
-    assert!(rates.verdict == Verdict::Warning && rates.message.contains("later than the attitude by 20 ms"), "{report}");
+    assert!(rates.verdict == Severity::Warning && rates.message.contains("later than the attitude by 20 ms"), "{report}");
     assert!(!report.fault, "{report}");
 }
 
@@ -400,8 +400,8 @@ fn angular_targets_that_come_late_are_told_from_the_linear_ones() {
     });
     let angular = finding(&report, "angular_targets_offset");
     let near = angular.measured.is_some_and(|offset_s| (offset_s - 0.05).abs() < STEP_S);
-    assert!(near && angular.verdict == Verdict::Fault && angular.message.contains("later than the rates by"), "{report}");
-    assert_eq!(finding(&report, "targets_offset").verdict, Verdict::Ok, "{report}");
+    assert!(near && angular.verdict == Severity::Fault && angular.message.contains("later than the rates by"), "{report}");
+    assert_eq!(finding(&report, "targets_offset").verdict, Severity::Ok, "{report}");
 }
 
 /// What the check makes of four flights of which some have other values in some columns.
@@ -453,7 +453,7 @@ fn sticks_that_are_exchanged_reversed_scaled_or_missing_are_named_with_their_fli
         // A sign or a unit that all flights share is nobody's business but the calibration's.
         for by in [-1.0, 0.3] {
             let report = changed(&[0, 1, 2, 3], of(by));
-            assert!(!report.fault && finding(&report, "sticks").verdict == Verdict::Ok, "{name} {by}: {report}");
+            assert!(!report.fault && finding(&report, "sticks").verdict == Severity::Ok, "{name} {by}: {report}");
         }
     }
 }
@@ -532,7 +532,7 @@ fn frozen_held_and_rounded_streams_are_named() {
     let report = changed(&[0, 1, 2, 3], never);
     assert_fault(&report, "frozen_y", "y is frozen: it keeps one value for up to 50.0 s");
     assert_eq!(finding(&report, "frozen_y").set.as_deref(), Some("ignore = [\"y\"], missing = [\"y\"]"));
-    assert_eq!(report.findings.iter().filter(|finding| finding.verdict == Verdict::Fault).count(), 3, "{report}");
+    assert_eq!(report.findings.iter().filter(|finding| finding.verdict == Severity::Fault).count(), 3, "{report}");
     let held = |of: [Column; 3], samples: usize| {
         move |flight: &Flight, column: Column| {
             let values = flight.column(column);
@@ -542,7 +542,7 @@ fn frozen_held_and_rounded_streams_are_named() {
     let every = [0, 1, 2, 3];
     assert_fault(&changed(&every, held(V, 20)), "held_vx", "vx, vy, vz come at 5.000 Hz and are held in between");
     let report = changed(&every, held([Column::X, Column::Y, Column::Z], 20));
-    assert!(finding(&report, "held_x").verdict == Verdict::Warning && !report.fault, "{report}");
+    assert!(finding(&report, "held_x").verdict == Severity::Warning && !report.fault, "{report}");
     let rounded = |step: f64| {
         move |flight: &Flight, column: Column| {
             (column == Column::U1).then(|| flight.column(column).iter().map(|value| (value / step).round() * step).collect())
@@ -550,7 +550,7 @@ fn frozen_held_and_rounded_streams_are_named() {
     };
     let report = changed(&every, rounded(0.1));
     let coarse = finding(&report, "rounding_u1");
-    assert!(report.fault && coarse.verdict == Verdict::Fault && coarse.message.contains("u1 is rounded to 0.100"), "{report}");
+    assert!(report.fault && coarse.verdict == Severity::Fault && coarse.message.contains("u1 is rounded to 0.100"), "{report}");
     let report = changed(&every, rounded(0.002));
     assert!(!report.fault && !report.findings.iter().any(|finding| finding.name == "rounding_u1"), "{report}");
 }
@@ -573,7 +573,7 @@ fn cells_that_cannot_be_are_counted_with_the_rule_that_mends_them() {
     let rule = finding(&report, "spikes_u4").set.clone().unwrap();
     assert!(rule.starts_with("[[repair]] columns = [\"u4\"], valid = [\"value > ") && rule.contains("max_gap_s = 0.105"), "{rule}");
     // The sticks are told as they are, and nothing else is blamed for the cells.
-    assert!(!report.findings.iter().any(|finding| finding.verdict == Verdict::Fault && finding.name != "spikes_u4"), "{report}");
+    assert!(!report.findings.iter().any(|finding| finding.verdict == Severity::Fault && finding.name != "spikes_u4"), "{report}");
     // A full deflection is none, however short.
     assert!(!changed(&[2], filled(1.0)).findings.iter().any(|finding| finding.name == "spikes_u4"));
 }
@@ -594,14 +594,14 @@ fn the_delay_of_the_controls_is_measured() {
 #[test]
 fn still_controls_are_said_and_little_data_gives_no_verdict() {
     let still = planted(Targets::Recorded, |columns| columns[Column::U3 as usize].fill(0.1));
-    assert_eq!(finding(&still, "excitation_u3").verdict, Verdict::Warning);
+    assert_eq!(finding(&still, "excitation_u3").verdict, Severity::Warning);
     let mut short =
         data(1, 0, Targets::Recorded, |columns| columns[Column::Roll as usize].iter_mut().for_each(|value| *value = -*value));
     short.flights.truncate(1);
     short.flights = short.flights.iter().filter_map(|flight| flight.slice(0..2000, "short")).collect();
     let report = check(&short, None);
     assert!(!report.fault, "{report}");
-    assert_eq!(finding(&report, "attitude_rate").verdict, Verdict::Undetermined);
+    assert_eq!(finding(&report, "attitude_rate").verdict, Severity::Undetermined);
     let empty = check(&DataSet::default(), None);
     assert!(!empty.fault && !empty.to_string().is_empty());
 }

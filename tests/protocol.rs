@@ -41,7 +41,7 @@ fn model() -> Result<Model> {
 fn perform(plan: &Plan, flights: &[Flight], model: &Model, method: &str) -> Result<Outcome> {
     let working = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
     let run = Run { method: method.into(), division: Division::Benchmark, treatment: Treatment::Plain, seed: 1 };
-    Experiment::new(plan, flights, model, Threads(2)).perform(&run, working.path(), &mut |_| true)
+    Experiment::new(plan, flights, model, Threads(2)).run(&run, working.path(), &mut |_| true)
 }
 
 /// The flights with other accelerations in the test part.
@@ -98,7 +98,7 @@ fn the_loop_adds_what_is_hidden_and_noise_and_wrong_coefficients_cost() -> Resul
         treatment: Treatment::CoefficientsOff(30),
         seed: 0,
     };
-    let off = Experiment::new(&plan, &flights, &model, Threads(2)).perform(&off, working.path(), &mut |_| true)?;
+    let off = Experiment::new(&plan, &flights, &model, Threads(2)).run(&off, working.path(), &mut |_| true)?;
     assert!(error(&off, Condition::Clean) > error(&baseline, Condition::Clean));
     Ok(())
 }
@@ -115,7 +115,7 @@ fn a_damaged_checkpoint_is_kept_and_told_and_the_run_begins_anew() -> Result<()>
     for number in [1, 2] {
         std::fs::write(working.join("checkpoint.phyture"), damaged).map_err(Error::io(&working))?;
         let experiment = Experiment::new(&plan, &flights, &model, Threads(2));
-        let outcome = experiment.perform(&run, &working, &mut |_| true)?;
+        let outcome = experiment.run(&run, &working, &mut |_| true)?;
         assert_eq!(outcome.conditions, undamaged.conditions);
         let kept = place.path().join(format!("key.damaged-checkpoint-{number}"));
         assert_eq!(std::fs::read(&kept).map_err(Error::io(&kept))?, damaged);
@@ -126,7 +126,7 @@ fn a_damaged_checkpoint_is_kept_and_told_and_the_run_begins_anew() -> Result<()>
     }
     // A sound one is gone on with, without a word.
     let experiment = Experiment::new(&plan, &flights, &model, Threads(2));
-    experiment.perform(&run, &working, &mut |_| true)?;
+    experiment.run(&run, &working, &mut |_| true)?;
     assert!(experiment.take_notes().is_empty());
     Ok(())
 }

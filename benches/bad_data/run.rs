@@ -210,7 +210,7 @@ fn judge(line: &mut Line, set: &DataSet, searches: bool) -> CheckReport {
     let report = check(set, Some(&model()));
     line.check_s = begun.elapsed().as_secs_f64();
     let of = |verdict| report.findings.iter().filter(move |finding| finding.verdict == verdict).map(said).collect();
-    (line.faults, line.warnings) = (of(check::Verdict::Fault), of(check::Verdict::Warning));
+    (line.faults, line.warnings) = (of(check::Severity::Fault), of(check::Severity::Warning));
     line.notes.clone_from(&set.notes);
     if report.fault {
         line.verdict = CONVENTION_FAULT.into();

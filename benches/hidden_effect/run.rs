@@ -1,7 +1,7 @@
 //! Runs cases and writes a line for each.
 
 use crate::cases::{ALIENS, CONFUSABLE, FOREIGN, PAIRS, SINGLES, SIZES, Single};
-use phyture::critique::diagnose::{Diagnosis, Met, Options, diagnose, met, textbook};
+use phyture::critique::diagnose::{Diagnosis, Met, Options, diagnose, met, stepwise_and_stlsq};
 use phyture::flight::split::Split;
 use phyture::flight::{Column, DataSet, Flight};
 use phyture::formula::Formula;
@@ -167,7 +167,7 @@ impl Bench<'_> {
         };
         if part == "textbook" {
             for dynamic in [true, false] {
-                let (stepwise, sparse) = textbook(&set.flights, &model(), &split.training, dynamic)?;
+                let (stepwise, sparse) = stepwise_and_stlsq(&set.flights, &model(), &split.training, dynamic)?;
                 line.stepwise.push(stepwise);
                 line.sparse.push(sparse);
             }

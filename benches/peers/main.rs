@@ -9,7 +9,7 @@ use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
 use phyture_kernels::adam::Adam;
 use phyture_kernels::random::Stream;
-use phyture_kernels::{Level, peak};
+use phyture_kernels::{InstructionSet, peak};
 use std::time::Instant;
 
 /// Steps before the first timed one.
@@ -31,11 +31,11 @@ fn peak_mib() -> Option<f64> {
 }
 
 /// Peak of multiply-adds, 10⁹ operations a second, of this many threads together (0: all cores).
-fn peak_gflops(level: Level, threads: usize) -> f64 {
+fn peak_gflops(isa: InstructionSet, threads: usize) -> f64 {
     let threads = if threads == 0 { std::thread::available_parallelism().map_or(1, usize::from) } else { threads };
     std::thread::scope(|scope| {
-        let others: Vec<_> = (1..threads).map(|_| scope.spawn(|| peak::f32_gflops(level))).collect();
-        let own = peak::f32_gflops(level);
+        let others: Vec<_> = (1..threads).map(|_| scope.spawn(|| peak::f32_gflops(isa))).collect();
+        let own = peak::f32_gflops(isa);
         own + others.into_iter().filter_map(|other| other.join().ok()).sum::<f64>()
     })
 }
@@ -50,8 +50,8 @@ fn run() -> Result<String, String> {
         return Err(usage.into());
     }
     let text = |error: phyture::Error| error.to_string();
-    let level = Level::detect().map_err(|error| error.to_string())?;
-    let (alone, before) = (peak_gflops(level, 1), peak_gflops(level, threads));
+    let isa = InstructionSet::detect().map_err(|error| error.to_string())?;
+    let (alone, before) = (peak_gflops(isa, 1), peak_gflops(isa, threads));
     let config: Architecture = match case.strip_prefix("peer-") {
         Some(kind) => {
             let sizes = serde_json::json!({ "kind": kind, "history": history, "dropout": 0.0 });
@@ -89,9 +89,9 @@ fn run() -> Result<String, String> {
         }
     }
     seconds.drain(..WARM_UP);
-    let after = peak_gflops(level, threads);
+    let after = peak_gflops(isa, threads);
     let line = serde_json::json!({
-        "seconds": seconds, "peak_mib": peak_mib(), "parameters": parameters.len(), "level": level.name(),
+        "seconds": seconds, "peak_mib": peak_mib(), "parameters": parameters.len(), "level": isa.name(),
         "peak_gflops_alone": alone, "peak_gflops": [before, after],
         "version": format!("phyture {}", env!("CARGO_PKG_VERSION")),
     });

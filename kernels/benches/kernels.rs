@@ -11,7 +11,7 @@ use phyture_kernels::conv1d::{self, Epilogue, Geometry, Weight};
 use phyture_kernels::dropout::{self, Mask};
 use phyture_kernels::random::Stream;
 use phyture_kernels::{
-    Level, Rows, RowsMut, Write, adam, gemm as own_gemm, layer_norm, moving_average, peak, reference, sci, temporal,
+    InstructionSet, Rows, RowsMut, Write, adam, gemm as own_gemm, layer_norm, moving_average, peak, reference, sci, temporal,
 };
 
 /// Numbers in [−1, 1).
@@ -33,20 +33,20 @@ fn compare(criterion: &mut Criterion, name: &str, shape: &str, operations: u64, 
 }
 
 /// The best level and the plain one; one row if they are the same.
-fn levels() -> Vec<Level> {
-    let best = Level::detect().unwrap_or(Level::PLAIN);
-    if best == Level::PLAIN { vec![best] } else { vec![best, Level::PLAIN] }
+fn levels() -> Vec<InstructionSet> {
+    let best = InstructionSet::detect().unwrap_or(InstructionSet::PLAIN);
+    if best == InstructionSet::PLAIN { vec![best] } else { vec![best, InstructionSet::PLAIN] }
 }
 
 /// A row for each level, made by `row`.
-fn each_level<'a>(row: impl Fn(Level) -> Box<dyn FnMut() + 'a>) -> Vec<Contender<'a>> {
-    levels().into_iter().map(|level| (level.name(), row(level))).collect()
+fn each_level<'a>(row: impl Fn(InstructionSet) -> Box<dyn FnMut() + 'a>) -> Vec<Contender<'a>> {
+    levels().into_iter().map(|isa| (isa.name(), row(isa))).collect()
 }
 
 /// What shares of the peak are shares of, measured before everything else.
 fn say_peak(_: &mut Criterion) {
-    let level = levels()[0];
-    println!("multiply-add peak at level {level}: {:.1} GFLOP/s", peak::f32_gflops(level));
+    let isa = levels()[0];
+    println!("multiply-add peak at level {isa}: {:.1} GFLOP/s", peak::f32_gflops(isa));
 }
 
 /// Strides of a and b, by row and by column of each.
@@ -90,16 +90,16 @@ fn products(criterion: &mut Criterion) {
         let (a, b) = (&*numbers(1, m * k).leak(), &*numbers(2, k * n).leak());
         let views = (Rows::packed(a, m, k), Rows::packed(b, k, n), Rows::packed(a, k, m), Rows::packed(b, n, k));
         let (shape, operations) = (format!("{m}x{k}x{n}"), (2 * m * k * n) as u64);
-        type Form = fn(Level, Rows<'_, f32>, Rows<'_, f32>, RowsMut<'_, f32>, Write, &mut [f32]);
+        type Form = fn(InstructionSet, Rows<'_, f32>, Rows<'_, f32>, RowsMut<'_, f32>, Write, &mut [f32]);
         let forms: [(&str, Form, _, _); 3] = [
             ("gemm_ab", own_gemm::ab, views.0, views.1),
             ("gemm_atb", own_gemm::atb, views.2, views.1),
             ("gemm_abt", own_gemm::abt, views.0, views.3),
         ];
         for (name, form, a_view, b_view) in forms {
-            let mut rows = each_level(|level| {
+            let mut rows = each_level(|isa| {
                 let (mut c, mut scratch) = (vec![0.0; m * n], vec![0.0; own_gemm::scratch_len(m, k, n)]);
-                Box::new(move || form(level, a_view, b_view, RowsMut::packed(black_box(&mut c), m, n), Write::Set, &mut scratch))
+                Box::new(move || form(isa, a_view, b_view, RowsMut::packed(black_box(&mut c), m, n), Write::Set, &mut scratch))
             });
             // Element (i, p) of a and (p, j) of b, by their distances.
             let strides = match name {
@@ -131,18 +131,18 @@ fn convolution(criterion: &mut Criterion) {
         let (x, weight, dz) = (numbers(1, rows * WIDTH), numbers(2, 5 * WIDTH * WIDTH), numbers(3, after * WIDTH));
         let (x, weight, dz) = (Rows::packed(&x, rows, WIDTH), &weight[..], Rows::packed(&dz, after, WIDTH));
         let (shape, operations) = (format!("{rows}x{WIDTH}x5"), (2 * after * 5 * WIDTH * WIDTH) as u64);
-        let packed = |level, transposed: bool| {
+        let packed = |isa, transposed: bool| {
             let mut packed = vec![0.0; conv1d::packed_len(geometry, WIDTH, WIDTH)];
             let pack = if transposed { conv1d::pack_transposed } else { conv1d::pack };
-            pack(level, geometry, (WIDTH, WIDTH), weight, &mut packed);
+            pack(isa, geometry, (WIDTH, WIDTH), weight, &mut packed);
             packed
         };
-        let mut contenders = each_level(|level| {
-            let (mut y, packed) = (vec![0.0; after * WIDTH], packed(level, false));
+        let mut contenders = each_level(|isa| {
+            let (mut y, packed) = (vec![0.0; after * WIDTH], packed(isa, false));
             let mut scratch = vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)];
             Box::new(move || {
                 conv1d::forward(
-                    level,
+                    isa,
                     geometry,
                     x,
                     Weight::Packed(&packed),
@@ -159,12 +159,12 @@ fn convolution(criterion: &mut Criterion) {
             Box::new(move || reference::conv1d(geometry, x, weight, None, RowsMut::packed(black_box(&mut y), after, WIDTH))),
         ));
         compare(criterion, "conv1d_forward", &shape, operations, contenders);
-        let mut contenders = each_level(|level| {
-            let packed = packed(level, true);
+        let mut contenders = each_level(|isa| {
+            let packed = packed(isa, true);
             let (mut dx, mut scratch) = (vec![0.0; rows * WIDTH], vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)]);
             Box::new(move || {
                 conv1d::backward_input(
-                    level,
+                    isa,
                     geometry,
                     dz,
                     Weight::Packed(&packed),
@@ -182,9 +182,9 @@ fn convolution(criterion: &mut Criterion) {
             }),
         ));
         compare(criterion, "conv1d_backward_input", &shape, operations, contenders);
-        let mut contenders = each_level(|level| {
+        let mut contenders = each_level(|isa| {
             let (mut dw, mut scratch) = (vec![0.0; 5 * WIDTH * WIDTH], vec![0.0; conv1d::scratch_len(geometry, WIDTH, WIDTH)]);
-            Box::new(move || conv1d::backward_weight(level, geometry, x, dz, black_box(&mut dw), Write::Set, &mut scratch))
+            Box::new(move || conv1d::backward_weight(isa, geometry, x, dz, black_box(&mut dw), Write::Set, &mut scratch))
         });
         let mut dw = vec![0.0_f32; 5 * WIDTH * WIDTH];
         contenders.push(("reference", Box::new(move || reference::conv1d_backward_weight(geometry, x, dz, black_box(&mut dw)))));
@@ -202,11 +202,11 @@ fn attention_maps(criterion: &mut Criterion) {
         let scratch = || vec![0.0; attention::scratch_len(HEADS, rows, rows, WIDTH / HEADS)];
         for (kind, dropout) in [("", None), ("_dropout", Some(Mask::new(Stream::new(1, 2, 3, 4), 0.2)))] {
             let (shape, operations) = (format!("{rows}x{HEADS}x{}", WIDTH / HEADS), (4 * rows * rows * WIDTH) as u64);
-            let mut contenders = each_level(|level| {
+            let mut contenders = each_level(|isa| {
                 let (mut o, mut lse, mut scratch) = (vec![0.0; rows * WIDTH], vec![0.0; HEADS * rows], scratch());
                 Box::new(move || {
                     let o = RowsMut::packed(black_box(&mut o), rows, WIDTH);
-                    attention::forward(level, HEADS, q, k, v, dropout, o, &mut lse, &mut scratch);
+                    attention::forward(isa, HEADS, q, k, v, dropout, o, &mut lse, &mut scratch);
                 })
             });
             if with_reference {
@@ -223,14 +223,14 @@ fn attention_maps(criterion: &mut Criterion) {
             let best = levels()[0];
             attention::forward(best, HEADS, q, k, v, dropout, RowsMut::packed(&mut o, rows, WIDTH), &mut lse, &mut scratch());
             let (o, lse) = (&o, &lse);
-            let mut contenders = each_level(|level| {
+            let mut contenders = each_level(|isa| {
                 let mut gradients = [(); 3].map(|()| vec![0.0_f32; rows * WIDTH]);
                 let mut scratch = scratch();
                 Box::new(move || {
                     let [dq, dk, dv] = black_box(&mut gradients).each_mut().map(|x| RowsMut::packed(x, rows, WIDTH));
                     let gradients = Gradients { dq, dk, dv, write_q: Write::Set, write_k: Write::Set, write_v: Write::Set };
                     attention::backward(
-                        level,
+                        isa,
                         HEADS,
                         q,
                         k,
@@ -272,25 +272,25 @@ fn pointwise(criterion: &mut Criterion) {
     let output = || vec![0.0_f32; ROWS * WIDTH];
     let moments = || [vec![0.0_f32; ROWS], vec![0.0_f32; ROWS]];
 
-    let mut rows = each_level(|level| {
+    let mut rows = each_level(|isa| {
         let (mut y, [mut mean, mut rstd]) = (output(), moments());
-        Box::new(move || layer_norm::forward(level, x, gamma, gamma, 1e-5, write(&mut y), &mut mean, &mut rstd))
+        Box::new(move || layer_norm::forward(isa, x, gamma, gamma, 1e-5, write(&mut y), &mut mean, &mut rstd))
     });
     let (mut y, [mut mean, mut rstd]) = (output(), moments());
     rows.push(("reference", Box::new(move || reference::layer_norm(x, gamma, gamma, 1e-5, write(&mut y), &mut mean, &mut rstd))));
     compare(criterion, "layer_norm", &shape, elements, rows);
 
-    let mut rows = each_level(|level| {
+    let mut rows = each_level(|isa| {
         let (mut y, mut scratch) = (output(), vec![0.0; moving_average::scratch_len(ROWS, WIDTH)]);
-        Box::new(move || moving_average::forward(level, 25, x, write(&mut y), &mut scratch))
+        Box::new(move || moving_average::forward(isa, 25, x, write(&mut y), &mut scratch))
     });
     let mut y = output();
     rows.push(("reference", Box::new(move || reference::moving_average(25, x, write(&mut y)))));
     compare(criterion, "moving_average", &shape, elements, rows);
 
-    let mut rows = each_level(|level| {
+    let mut rows = each_level(|isa| {
         let mut y = output();
-        Box::new(move || activation::forward(level, Activation::Tanh, x, write(&mut y)))
+        Box::new(move || activation::forward(isa, Activation::Tanh, x, write(&mut y)))
     });
     let mut y = output();
     rows.push((
@@ -303,32 +303,30 @@ fn pointwise(criterion: &mut Criterion) {
     ));
     compare(criterion, "tanh", &shape, elements, rows);
 
-    let rows = each_level(|level| {
+    let rows = each_level(|isa| {
         let mut y = output();
-        Box::new(move || sci::scale(level, x, s, write(&mut y)))
+        Box::new(move || sci::scale(isa, x, s, write(&mut y)))
     });
     compare(criterion, "sci_scale", &shape, elements, rows);
 
-    let rows = each_level(|level| {
+    let rows = each_level(|isa| {
         let (mut y, mask) = (output(), Mask::new(Stream::new(1, 2, 3, 4), 0.2));
-        Box::new(move || dropout::forward(level, mask, x, write(&mut y)))
+        Box::new(move || dropout::forward(isa, mask, x, write(&mut y)))
     });
     compare(criterion, "dropout", &shape, elements, rows);
 
     let weight = numbers(4, ROWS);
     let weight = &weight[..];
-    let rows = each_level(|level| {
+    let rows = each_level(|isa| {
         let (mut y, mut scratch) = (vec![0.0_f32; WIDTH], vec![0.0; temporal::scratch_len(ROWS, 1, WIDTH)]);
-        Box::new(move || temporal::forward(level, x, weight, None, RowsMut::packed(black_box(&mut y), 1, WIDTH), &mut scratch))
+        Box::new(move || temporal::forward(isa, x, weight, None, RowsMut::packed(black_box(&mut y), 1, WIDTH), &mut scratch))
     });
     compare(criterion, "temporal", &shape, elements, rows);
 
-    let rows = each_level(|level| {
+    let rows = each_level(|isa| {
         let gradient = numbers(5, ROWS * WIDTH);
         let [mut theta, mut first, mut second] = [output(), output(), output()];
-        Box::new(move || {
-            adam::step(level, &adam::Adam::default(), 3, 1.0, &gradient, black_box(&mut theta), &mut first, &mut second)
-        })
+        Box::new(move || adam::step(isa, &adam::Adam::default(), 3, 1.0, &gradient, black_box(&mut theta), &mut first, &mut second))
     });
     compare(criterion, "adam", &shape, elements, rows);
 }

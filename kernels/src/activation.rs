@@ -15,8 +15,8 @@
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 
 use crate::elementary::{erf, exp, sigmoid, tanh};
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Which function.
@@ -131,9 +131,9 @@ fn derivative<T: Real, I: Isa>(kind: Activation, saved: T) -> T {
 }
 
 /// y = f(x), both `[n, C]`.
-pub fn forward<T: Real>(level: Level, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn forward<T: Real>(isa: InstructionSet, kind: Activation, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
-    T::activation_forward(level, Forward { kind, x, y });
+    T::activation_forward(isa, Forward { kind, x, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -154,10 +154,17 @@ impl<T: Real> Kernel for Forward<'_, T> {
 }
 
 /// dx {=, +=} dy∘f′, all `[n, C]`; `saved` is x or y as [`Activation::saves`] says.
-pub fn backward<T: Real>(level: Level, kind: Activation, saved: Rows<'_, T>, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
+pub fn backward<T: Real>(
+    isa: InstructionSet,
+    kind: Activation,
+    saved: Rows<'_, T>,
+    dy: Rows<'_, T>,
+    dx: RowsMut<'_, T>,
+    write: Write,
+) {
     same_shape(&saved, &dy);
     same_shape(&dy, &dx.view());
-    T::activation_backward(level, Backward { kind, saved, dy, dx, write });
+    T::activation_backward(isa, Backward { kind, saved, dy, dx, write });
 }
 
 pub(crate) struct Backward<'a, T> {
@@ -229,14 +236,14 @@ mod tests {
         let dx_expected = Matrix::filled(shape, 0, 0, |i, j| {
             T::of(reference::activation_derivative(kind, x.view().row(i)[j].f64()) * dy.view().row(i)[j].f64())
         });
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut y = Matrix::<T>::poisoned(seed, shape);
-            forward(level, kind, x.view(), y.view_mut());
+            forward(isa, kind, x.view(), y.view_mut());
             y.check_gaps();
-            assert_near(&format!("{kind:?} at {level}"), &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
+            assert_near(&format!("{kind:?} at {isa}"), &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
             let saved = if kind.saves() == Saves::Input { x.view() } else { y.view() };
-            check_writes(&format!("{kind:?} backward at {level}"), &dx_expected, Tolerance::Close, |dx, write| {
-                backward(level, kind, saved, dy.view(), dx, write);
+            check_writes(&format!("{kind:?} backward at {isa}"), &dx_expected, Tolerance::Close, |dx, write| {
+                backward(isa, kind, saved, dy.view(), dx, write);
             });
         }
     }

@@ -5,7 +5,7 @@
 //! ```
 
 use crate::Real;
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 
 /// The constants of a step. The default is PyTorch's: 1e-3, 0.9, 0.999, 1e-8.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,7 +28,7 @@ impl Default for Adam {
 
 /// Step number `step` (1 is the first). `gradient` is multiplied by `scale` on reading (1, or one over a number of samples).
 pub fn step<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     adam: &Adam,
     step: u64,
     scale: f64,
@@ -43,7 +43,7 @@ pub fn step<T: Real>(
     let correction1 = 1.0 - adam.beta1.powf(step as f64);
     let correction2 = 1.0 - adam.beta2.powf(step as f64);
     T::adam_step(
-        level,
+        isa,
         Step {
             scale: T::of(scale),
             beta1: T::of(adam.beta1),
@@ -99,14 +99,14 @@ mod tests {
 
     fn check<T: Real>(len: usize, start: usize, scale: f64, seed: u64) {
         let adam = Adam::default();
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let (mut theta, mut m, mut v) = (numbers::<T>(seed, len), vec![T::ZERO; len], vec![T::ZERO; len]);
             let widen = |x: &[T]| x.iter().map(|x| x.f64()).collect::<Vec<f64>>();
             let mut expected = (widen(&theta), widen(&m), widen(&v));
             let start = start.min(len);
             for t in 1..=10 {
                 let gradient = numbers::<T>(seed + t, len);
-                step(level, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
+                step(isa, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
                 let moments = expected.1.iter_mut().zip(&mut expected.2);
                 for ((theta, (m, v)), g) in expected.0.iter_mut().zip(moments).zip(&gradient).skip(start) {
                     (*theta, *m, *v) = reference::adam(&adam, t, *theta, g.f64() * scale, *m, *v);
@@ -130,7 +130,7 @@ mod tests {
     #[test]
     fn the_first_step_is_one_learning_rate_against_the_sign_of_the_gradient() {
         let (mut theta, mut m, mut v) = ([1.0_f64, 1.0], [0.0; 2], [0.0; 2]);
-        step(Level::PLAIN, &Adam::default(), 1, 1.0, &[3.0, -40.0], &mut theta, &mut m, &mut v);
+        step(InstructionSet::PLAIN, &Adam::default(), 1, 1.0, &[3.0, -40.0], &mut theta, &mut m, &mut v);
         assert_near("parameters", &theta, &[1.0 - 1e-3, 1.0 + 1e-3], Tolerance::Close);
     }
 }

@@ -14,7 +14,7 @@
 
 use crate::dropout::{Keep, Mask, MaskLanes};
 use crate::elementary::power_of_two;
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, Store};
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -163,7 +163,7 @@ impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
 /// # Panics
 /// If shapes disagree, `heads` does not divide the width, or there is no key.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     heads: usize,
     q: Rows<'_, T>,
     k: Rows<'_, T>,
@@ -174,7 +174,7 @@ pub fn forward<T: Real>(
     scratch: &mut [T],
 ) {
     assert_eq!(q.rows(), o.rows(), "attention: rows of q and o");
-    forward_rows(level, heads, q, k, v, dropout, 0, o, log_sum_exp, scratch);
+    forward_rows(isa, heads, q, k, v, dropout, 0, o, log_sum_exp, scratch);
 }
 
 /// Rows `first…` of what [`forward`] gives, as many as o `[≤ queries − first, heads·d_k]` has, with their rows of `log_sum_exp`; q, k, v
@@ -183,7 +183,7 @@ pub fn forward<T: Real>(
 /// # Panics
 /// As [`forward`].
 pub fn forward_rows<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     heads: usize,
     q: Rows<'_, T>,
     k: Rows<'_, T>,
@@ -196,7 +196,7 @@ pub fn forward_rows<T: Real>(
 ) {
     assert!(first + o.rows() <= q.rows(), "attention: rows of o");
     let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp);
-    T::attention_forward(level, Forward { shape, q, k, v, dropout, first, o, log_sum_exp, scratch });
+    T::attention_forward(isa, Forward { shape, q, k, v, dropout, first, o, log_sum_exp, scratch });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -362,13 +362,13 @@ mod tests {
         let mut expected = (query(), key(), key());
         let views = (expected.0.view_mut(), expected.1.view_mut(), expected.2.view_mut());
         reference::attention_backward(heads, q.view(), k.view(), v.view(), dropout, d_o.view(), views.0, views.1, views.2);
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
             let (mut o, mut lse) = (query(), vec![T::NAN; heads * queries]);
-            forward(level, heads, q.view(), k.view(), v.view(), dropout, o.view_mut(), &mut lse, &mut scratch);
+            forward(isa, heads, q.view(), k.view(), v.view(), dropout, o.view_mut(), &mut lse, &mut scratch);
             o.check_gaps();
-            assert_near(&format!("o at {level}"), &o.to_vec(), &o_expected.to_vec(), Tolerance::Close);
-            assert_near(&format!("log-sum-exp at {level}"), &lse, &lse_expected, Tolerance::Close);
+            assert_near(&format!("o at {isa}"), &o.to_vec(), &o_expected.to_vec(), Tolerance::Close);
+            assert_near(&format!("log-sum-exp at {isa}"), &lse, &lse_expected, Tolerance::Close);
             for write in WRITES {
                 let mut found = if write == Write::Set { (query(), key(), key()) } else { expected.clone() };
                 let gradients = Gradients {
@@ -379,13 +379,13 @@ mod tests {
                     write_k: write,
                     write_v: write,
                 };
-                backward(level, heads, q.view(), k.view(), v.view(), dropout, o.view(), &lse, d_o.view(), gradients, &mut scratch);
+                backward(isa, heads, q.view(), k.view(), v.view(), dropout, o.view(), &lse, d_o.view(), gradients, &mut scratch);
                 let times = if write == Write::Set { T::ONE } else { T::of(2.0) };
                 let pairs = [(&found.0, &expected.0, "dq"), (&found.1, &expected.1, "dk"), (&found.2, &expected.2, "dv")];
                 for (found, expected, name) in pairs {
                     found.check_gaps();
                     let expected: Vec<T> = expected.to_vec().iter().map(|x| *x * times).collect();
-                    assert_near(&format!("{name} at {level}, {write:?}"), &found.to_vec(), &expected, Tolerance::Close);
+                    assert_near(&format!("{name} at {isa}, {write:?}"), &found.to_vec(), &expected, Tolerance::Close);
                 }
             }
         }
@@ -418,19 +418,19 @@ mod tests {
         let q = Matrix::<T>::random(1, (queries, width));
         let (k, v) = (Matrix::<T>::random(2, (keys, width)), Matrix::<T>::random(3, (keys, width)));
         for dropout in [None, Some(Mask::new(Stream::new(4, 0, 0, 0), 0.2))] {
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
                 let found = |step: usize, scratch: &mut [T]| {
                     let (mut o, mut lse) = (Matrix::<T>::poisoned(5, (queries, width)), vec![T::NAN; queries * heads]);
                     for (first, lse) in (0..queries).step_by(step).zip(lse.chunks_mut(step * heads)) {
                         let o = o.view_mut().range(first, queries.min(first + step));
-                        forward_rows(level, heads, q.view(), k.view(), v.view(), dropout, first, o, lse, scratch);
+                        forward_rows(isa, heads, q.view(), k.view(), v.view(), dropout, first, o, lse, scratch);
                     }
                     o.check_gaps();
                     (bits(&o.to_vec()), bits(&lse))
                 };
                 let (whole, pieces) = (found(queries, &mut scratch), found(step, &mut scratch));
-                assert!(pieces == whole, "{queries} queries in pieces of {step} at {level}");
+                assert!(pieces == whole, "{queries} queries in pieces of {step} at {isa}");
             }
         }
     }
@@ -448,7 +448,7 @@ mod tests {
             (vec![0.0; rows.0 * width], vec![0.0; rows.0], vec![0.0; scratch_len(1, rows.0, rows.1, width)]);
         let keys = |x| Rows::packed(x, rows.1, width);
         let o_view = RowsMut::packed(&mut o, rows.0, width);
-        forward(Level::PLAIN, 1, Rows::packed(q, rows.0, width), keys(k), keys(v), None, o_view, &mut lse, &mut scratch);
+        forward(InstructionSet::PLAIN, 1, Rows::packed(q, rows.0, width), keys(k), keys(v), None, o_view, &mut lse, &mut scratch);
         (o, lse)
     }
 

@@ -8,17 +8,17 @@
 //! x, y `[n, C]` of one sample. A sample gives its moments; these are combined by the rule of Chan, Golub & LeVeque (1979), which does
 //! not lose digits to a large mean; then each sample is normalised on its own. The same in the backward pass with the two sums.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Mean and sum of squared distances from it of one sample, `[2, C]`.
 ///
 /// # Panics
 /// If lengths disagree.
-pub fn moments<T: Real>(level: Level, x: Rows<'_, T>, moments: &mut [T]) {
+pub fn moments<T: Real>(isa: InstructionSet, x: Rows<'_, T>, moments: &mut [T]) {
     assert_eq!(moments.len(), 2 * x.cols(), "batch norm: moments");
-    T::batch_norm_moments(level, Moments { x, moments });
+    T::batch_norm_moments(isa, Moments { x, moments });
 }
 
 pub(crate) struct Moments<'a, T> {
@@ -76,9 +76,16 @@ pub fn sum<T: Real>(parts: &[T], total: &mut [T]) {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, (mean, rstd): (&[T], &[T]), gamma: &[T], beta: &[T], y: RowsMut<'_, T>) {
+pub fn forward<T: Real>(
+    isa: InstructionSet,
+    x: Rows<'_, T>,
+    (mean, rstd): (&[T], &[T]),
+    gamma: &[T],
+    beta: &[T],
+    y: RowsMut<'_, T>,
+) {
     same_shape(&x, &y.view());
-    T::batch_norm_forward(level, Forward { x, mean, rstd, gamma, beta, y });
+    T::batch_norm_forward(isa, Forward { x, mean, rstd, gamma, beta, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -106,10 +113,10 @@ impl<T: Real> Kernel for Forward<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_sums<T: Real>(level: Level, x: Rows<'_, T>, (mean, rstd): (&[T], &[T]), dy: Rows<'_, T>, sums: &mut [T]) {
+pub fn backward_sums<T: Real>(isa: InstructionSet, x: Rows<'_, T>, (mean, rstd): (&[T], &[T]), dy: Rows<'_, T>, sums: &mut [T]) {
     same_shape(&x, &dy);
     assert_eq!(sums.len(), 2 * x.cols(), "batch norm: sums");
-    T::batch_norm_backward_sums(level, BackwardSums { x, mean, rstd, dy, sums });
+    T::batch_norm_backward_sums(isa, BackwardSums { x, mean, rstd, dy, sums });
 }
 
 pub(crate) struct BackwardSums<'a, T> {
@@ -141,7 +148,7 @@ impl<T: Real> Kernel for BackwardSums<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_input<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     (mean, rstd): (&[T], &[T]),
     gamma: &[T],
@@ -151,7 +158,7 @@ pub fn backward_input<T: Real>(
     write: Write,
 ) {
     same_shape(&dy, &dx.view());
-    T::batch_norm_backward_input(level, BackwardInput { x, mean, rstd, gamma, dy, sums, dx, write });
+    T::batch_norm_backward_input(isa, BackwardInput { x, mean, rstd, gamma, dy, sums, dx, write });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -217,27 +224,27 @@ mod tests {
                 expected[1][t * channels + c] = gamma * r * (dy - sum / n - normal * product / n);
             }
         }
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let gather = |work: &dyn Fn(usize, &mut [T])| {
                 let mut parts = vec![T::NAN; samples * 2 * channels];
                 parts.chunks_exact_mut(2 * channels).enumerate().for_each(|(sample, part)| work(sample, part));
                 parts
             };
             let mut total = vec![T::NAN; 2 * channels];
-            combine(&gather(&|sample, part| moments(level, x[sample].view(), part)), rows, &mut total);
+            combine(&gather(&|sample, part| moments(isa, x[sample].view(), part)), rows, &mut total);
             let (mean, variance) = total.split_at(channels);
             let rstd: Vec<T> = variance.iter().map(|variance| T::of(1.0 / (variance.f64() + EPSILON).sqrt())).collect();
             let mut sums = vec![T::NAN; 2 * channels];
-            sum(&gather(&|sample, part| backward_sums(level, x[sample].view(), (mean, &rstd), dy[sample].view(), part)), &mut sums);
+            sum(&gather(&|sample, part| backward_sums(isa, x[sample].view(), (mean, &rstd), dy[sample].view(), part)), &mut sums);
             for sample in 0..samples {
                 let own =
                     |values: &[f64]| Matrix::<T>::filled(shape, 0, 0, |t, c| T::of(values[(sample * rows + t) * channels + c]));
                 let mut y = Matrix::<T>::poisoned(seed, shape);
-                forward(level, x[sample].view(), (mean, &rstd), &gamma, &beta, y.view_mut());
+                forward(isa, x[sample].view(), (mean, &rstd), &gamma, &beta, y.view_mut());
                 assert_near("y", &y.to_vec(), &own(&expected[0]).to_vec(), Tolerance::Approximate);
                 check_writes("dx", &own(&expected[1]), Tolerance::Approximate, |dx, write| {
                     let sums = Some((sums.as_slice(), samples * rows));
-                    backward_input(level, x[sample].view(), (mean, &rstd), &gamma, dy[sample].view(), sums, dx, write);
+                    backward_input(isa, x[sample].view(), (mean, &rstd), &gamma, dy[sample].view(), sums, dx, write);
                 });
             }
         }

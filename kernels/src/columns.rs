@@ -3,24 +3,24 @@
 //! The function comes from the caller and is compiled into the loop, once a level. It sees one sample at a time and nothing is fused, so
 //! all levels give the same bits. Not here: what the functions are, and anything that remembers earlier samples.
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 
 /// out = f(x), element by element.
 ///
 /// # Panics
 /// If the lengths differ.
-pub fn map(level: Level, f: impl Fn(f64) -> f64, x: &[f64], out: &mut [f64]) {
+pub fn map(isa: InstructionSet, f: impl Fn(f64) -> f64, x: &[f64], out: &mut [f64]) {
     assert_eq!(x.len(), out.len(), "columns of one length");
-    level.run(Map { f, x, out });
+    isa.run(Map { f, x, out });
 }
 
 /// out = f(x, y), element by element.
 ///
 /// # Panics
 /// If the lengths differ.
-pub fn zip(level: Level, f: impl Fn(f64, f64) -> f64, x: &[f64], y: &[f64], out: &mut [f64]) {
+pub fn zip(isa: InstructionSet, f: impl Fn(f64, f64) -> f64, x: &[f64], y: &[f64], out: &mut [f64]) {
     assert!(x.len() == out.len() && y.len() == out.len(), "columns of one length");
-    level.run(Zip { f, x, y, out });
+    isa.run(Zip { f, x, y, out });
 }
 
 struct Map<'a, F> {
@@ -66,11 +66,11 @@ mod tests {
             let (x, y) = (numbers::<f64>(seed, len), numbers::<f64>(seed + 1, len));
             let product = |x: f64, y: f64| x * y + x / y;
             let root = |x: f64| x.abs().sqrt() - x;
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut out = vec![f64::NAN; len];
-                zip(level, product, &x, &y, &mut out);
+                zip(isa, product, &x, &y, &mut out);
                 prop_assert!(out.iter().zip(x.iter().zip(&y)).all(|(out, (x, y))| out.to_bits() == product(*x, *y).to_bits()));
-                map(level, root, &x, &mut out);
+                map(isa, root, &x, &mut out);
                 prop_assert!(out.iter().zip(&x).all(|(out, x)| out.to_bits() == root(*x).to_bits()));
             }
         }
@@ -79,6 +79,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "of one length")]
     fn a_shorter_operand_is_refused() {
-        zip(Level::PLAIN, |x, y| x + y, &[1.0, 2.0], &[1.0], &mut [0.0; 2]);
+        zip(InstructionSet::PLAIN, |x, y| x + y, &[1.0, 2.0], &[1.0], &mut [0.0; 2]);
     }
 }

@@ -6,10 +6,10 @@
 //!
 //! To add a kernel: one line in the table below.
 
-use crate::level::Level;
+use crate::instruction_set::InstructionSet;
 use crate::{
     activation, adam, attention, batch_norm, conv1d, conv1d_general, dropout, elementary, fold, gemm, layer_norm, linear, loss,
-    lstm, moving_average, pool, prob_sparse, rows, sci, spectrum, temporal, temporal_each, weight_norm,
+    lstm, moving_average, pool, prob_sparse, sci, spectrum, strided, temporal, temporal_each, weight_norm,
 };
 
 macro_rules! kernels {
@@ -17,8 +17,8 @@ macro_rules! kernels {
         /// The kernels of one float type. A supertrait of [`Real`](crate::Real); not for use outside this crate.
         #[expect(private_interfaces, reason = "the kernels' types are this crate's own; nobody else can call these")]
         pub trait Compiled: Sized {
-            $(#[doc(hidden)] fn $loop(level: Level, kernel: $loop_module::$loop_kernel<'_, Self>);)*
-            $(#[doc(hidden)] fn $tile(level: Level, kernel: $tile_module::$tile_kernel<'_, Self>);)*
+            $(#[doc(hidden)] fn $loop(isa: InstructionSet, kernel: $loop_module::$loop_kernel<'_, Self>);)*
+            $(#[doc(hidden)] fn $tile(isa: InstructionSet, kernel: $tile_module::$tile_kernel<'_, Self>);)*
         }
         kernels!(@for f32 loops { $($loop: $loop_module::$loop_kernel,)* } tiles { $($tile: $tile_module::$tile_kernel,)* });
         kernels!(@for f64 loops { $($loop: $loop_module::$loop_kernel,)* } tiles { $($tile: $tile_module::$tile_kernel,)* });
@@ -26,8 +26,8 @@ macro_rules! kernels {
     (@for $t:ident loops { $($loop:ident: $loop_module:ident::$loop_kernel:ident,)* } tiles { $($tile:ident: $tile_module:ident::$tile_kernel:ident,)* }) => {
         #[expect(private_interfaces, reason = "as above")]
         impl Compiled for $t {
-            $(#[inline(never)] fn $loop(level: Level, kernel: $loop_module::$loop_kernel<'_, Self>) { level.run(kernel); })*
-            $(#[inline(never)] fn $tile(level: Level, kernel: $tile_module::$tile_kernel<'_, Self>) { level.run_tiled::<Self, _>(kernel); })*
+            $(#[inline(never)] fn $loop(isa: InstructionSet, kernel: $loop_module::$loop_kernel<'_, Self>) { isa.run(kernel); })*
+            $(#[inline(never)] fn $tile(isa: InstructionSet, kernel: $tile_module::$tile_kernel<'_, Self>) { isa.run_tiled::<Self, _>(kernel); })*
         }
     };
 }
@@ -46,9 +46,9 @@ kernels! {
         linear_sum_rows: linear::SumRows,
         loss_gradient: loss::Gradient,
         moving_average: moving_average::Average,
-        rows_scale: rows::Scale,
-        rows_combine: rows::Combine,
-        rows_inner: rows::Inner,
+        rows_scale: strided::Scale,
+        rows_combine: strided::Combine,
+        rows_inner: strided::Inner,
         sci_scale: sci::Scale,
         sci_backward: sci::Backward,
         temporal_weighted_sum: temporal::WeightedSum,

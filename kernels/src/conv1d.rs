@@ -9,18 +9,18 @@
 //! product, so that neither it nor its gradient is ever transposed (PyTorch keeps `[out, in, taps]`). The padded sequence is never made:
 //! the product reads shifted rows of x where they lie.
 //!
-//! Kernels of 3 and 5 taps between many channels take the shorter way of `six_points`: the same sums in another order.
+//! Kernels of 3 and 5 taps between many channels take the shorter way of `winograd`: the same sums in another order.
 //!
 //! Here: shapes and the forward product. f and dropout are in `epilogue`, gradients in `backward`, packed weights in `packing`.
 
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows};
 use crate::{Real, Rows, RowsMut};
 
 mod backward;
 mod epilogue;
 mod packing;
-mod six_points;
+mod winograd;
 
 pub(crate) use backward::{BackwardInput, BackwardWeight};
 pub use backward::{backward_bias, backward_input, backward_weight};
@@ -52,9 +52,9 @@ impl Geometry {
 pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
     let forward = packed_len(geometry, inputs, outputs);
     let backward = packed_len(geometry, outputs, inputs) + ends_len(geometry, inputs, outputs);
-    if six_points::applies(geometry, inputs, outputs) {
-        let product = six_points::product_scratch_len(inputs.max(outputs));
-        (forward.max(backward) + product).max(six_points::gradient_scratch_len(inputs, outputs))
+    if winograd::applies(geometry, inputs, outputs) {
+        let product = winograd::product_scratch_len(inputs.max(outputs));
+        (forward.max(backward) + product).max(winograd::gradient_scratch_len(inputs, outputs))
     } else {
         forward.max(backward)
     }
@@ -66,14 +66,14 @@ const fn ends_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
 }
 
 /// Where y may be cut for [`forward_rows`]: at multiples of this many rows, every row is computed by the same instructions as uncut.
-pub const CUT: usize = six_points::CUT;
+pub const CUT: usize = winograd::CUT;
 
 /// y = dropout(f(conv(x) + b)).
 ///
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
     weight: Weight<'_, T>,
@@ -83,7 +83,7 @@ pub fn forward<T: Real>(
     scratch: &mut [T],
 ) {
     assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
-    forward_rows(level, geometry, x, weight, bias, epilogue, 0, y, scratch);
+    forward_rows(isa, geometry, x, weight, bias, epilogue, 0, y, scratch);
 }
 
 /// Rows `first…` of what [`forward`] gives, as many as y `[≤ n′ − first, out]` has; x and the dropout mask are those of the whole.
@@ -91,7 +91,7 @@ pub fn forward<T: Real>(
 /// # Panics
 /// If shapes disagree.
 pub fn forward_rows<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
     weight: Weight<'_, T>,
@@ -107,11 +107,11 @@ pub fn forward_rows<T: Real>(
         Weight::Packed(packed) => (packed, scratch),
         Weight::Plain(weight) => {
             let (packed, rest) = scratch.split_at_mut(packed_len(geometry, x.cols(), y.cols()));
-            pack(level, geometry, (x.cols(), y.cols()), weight, packed);
+            pack(isa, geometry, (x.cols(), y.cols()), weight, packed);
             (&*packed, rest)
         }
     };
-    T::conv1d_forward(level, Forward { geometry, x, packed, bias, epilogue, first, y, scratch });
+    T::conv1d_forward(isa, Forward { geometry, x, packed, bias, epilogue, first, y, scratch });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -133,9 +133,9 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
         let (rows, inputs, outputs) = (self.y.rows(), self.x.cols(), self.y.cols());
         let shifted = Shifted { x: self.x, taps, left, first: self.first, rows };
         let mut sink = Finish::new(self.first, self.y, self.bias, self.epilogue);
-        if six_points::applies(self.geometry, inputs, outputs) {
-            let packed = &self.packed[..six_points::packed_len(inputs, outputs)];
-            return six_points::product::<T, I, _, _, MR, NR>(taps, &shifted, (rows, inputs), packed, &mut sink, self.scratch);
+        if winograd::applies(self.geometry, inputs, outputs) {
+            let packed = &self.packed[..winograd::packed_len(inputs, outputs)];
+            return winograd::product::<T, I, _, _, MR, NR>(taps, &shifted, (rows, inputs), packed, &mut sink, self.scratch);
         }
         let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
         tile::rows::<T, I, _, _, MR, NR>(&shifted, outputs, panels, &mut sink);
@@ -177,7 +177,7 @@ impl<T> LeftRows<T> for Shifted<'_, T> {
     }
 }
 
-impl<T> six_points::Sequence<T> for Shifted<'_, T> {
+impl<T> winograd::Sequence<T> for Shifted<'_, T> {
     #[inline(always)]
     fn row(&self, s: usize) -> &[T] {
         self.x.row(self.source(s, 0))
@@ -231,25 +231,25 @@ mod tests {
         reference::conv1d_backward_input(geometry, dz.view(), &weight, dx.view_mut());
         let mut dw = Matrix::<T>::poisoned(0, (1, weight.len()));
         reference::conv1d_backward_weight(geometry, x.view(), dz.view(), dw.view_mut().row_mut(0));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (after, outputs));
             let mut packed = vec![T::NAN; packed_len(geometry, inputs, outputs)];
-            pack(level, geometry, (inputs, outputs), &weight, &mut packed);
+            pack(isa, geometry, (inputs, outputs), &weight, &mut packed);
             for weight in [Weight::Plain(&weight), Weight::Packed(&packed)] {
-                forward(level, geometry, x.view(), weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+                forward(isa, geometry, x.view(), weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
                 y.check_gaps();
-                assert_near(&format!("forward at {level}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
+                assert_near(&format!("forward at {isa}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
             }
             let mut packed = vec![T::NAN; packed_len(geometry, outputs, inputs)];
-            pack_transposed(level, geometry, (inputs, outputs), &weight, &mut packed);
+            pack_transposed(isa, geometry, (inputs, outputs), &weight, &mut packed);
             for weight in [Weight::Plain(&weight), Weight::Packed(&packed)] {
-                check_writes(&format!("dx at {level}"), &dx, Tolerance::Close, |dx, write| {
-                    backward_input(level, geometry, dz.view(), weight, dx, write, &mut scratch);
+                check_writes(&format!("dx at {isa}"), &dx, Tolerance::Close, |dx, write| {
+                    backward_input(isa, geometry, dz.view(), weight, dx, write, &mut scratch);
                 });
             }
-            check_writes(&format!("dW at {level}"), &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
+            check_writes(&format!("dW at {isa}"), &dw, Tolerance::Close, |mut dw, write| {
+                backward_weight(isa, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
             });
         }
     }
@@ -259,19 +259,19 @@ mod tests {
         let after = geometry.output_rows(rows);
         let x = Matrix::<T>::random(seed, (rows, inputs));
         let (weight, bias) = (numbers::<T>(seed + 1, geometry.taps * inputs * outputs), numbers::<T>(seed + 2, outputs));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut found = |step: usize| {
                 let mut y = Matrix::<T>::poisoned(seed, (after, outputs));
                 for first in (0..after).step_by(step) {
                     let y = y.view_mut().range(first, after.min(first + step));
                     let weight = Weight::Plain(&weight);
-                    forward_rows(level, geometry, x.view(), weight, Some(&bias), epilogue, first, y, &mut scratch);
+                    forward_rows(isa, geometry, x.view(), weight, Some(&bias), epilogue, first, y, &mut scratch);
                 }
                 y.check_gaps();
                 bits(&y.to_vec())
             };
-            assert!(found(step) == found(after.max(1)), "{p:?} in pieces of {step} at {level}");
+            assert!(found(step) == found(after.max(1)), "{p:?} in pieces of {step} at {isa}");
         }
     }
 
@@ -297,13 +297,13 @@ mod tests {
             let after = geometry.output_rows(rows);
             let (x, dz) = (numbers::<f64>(seed, rows * inputs), numbers::<f64>(seed + 1, after * outputs));
             let weight = numbers::<f64>(seed + 2, geometry.taps * inputs * outputs);
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dx) = (vec![f64::NAN; dz.len()], vec![f64::NAN; x.len()]);
                 let x_view = Rows::packed(&x, rows, inputs);
-                forward(level, geometry, x_view, Weight::Plain(&weight), None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
+                forward(isa, geometry, x_view, Weight::Plain(&weight), None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
                 let dx_view = RowsMut::packed(&mut dx, rows, inputs);
-                backward_input(level, geometry, Rows::packed(&dz, after, outputs), Weight::Plain(&weight), dx_view, Write::Set, &mut scratch);
+                backward_input(isa, geometry, Rows::packed(&dz, after, outputs), Weight::Plain(&weight), dx_view, Write::Set, &mut scratch);
                 assert_near("<Ax, y> and <x, A'y>", &[inner(&y, &dz)], &[inner(&x, &dx)], Tolerance::Close);
             }
         }
@@ -327,8 +327,17 @@ mod tests {
         let mut scratch = vec![0.0; scratch_len(geometry, 7, 9).max(linear::scratch_len(30, 7, 9))];
         // The linear map keeps its weight the other way round.
         let turned: Vec<f64> = (0..7 * 9).map(|at| weight[at % 9 * 7 + at / 9]).collect();
-        forward(Level::PLAIN, geometry, x.view(), Weight::Plain(&turned), None, Epilogue::NONE, conv.view_mut(), &mut scratch);
-        linear::forward(Level::PLAIN, x.view(), &weight, None, map.view_mut(), &mut scratch);
+        forward(
+            InstructionSet::PLAIN,
+            geometry,
+            x.view(),
+            Weight::Plain(&turned),
+            None,
+            Epilogue::NONE,
+            conv.view_mut(),
+            &mut scratch,
+        );
+        linear::forward(InstructionSet::PLAIN, x.view(), &weight, None, map.view_mut(), &mut scratch);
         assert_near("conv1d with one tap", &conv.to_vec(), &map.to_vec(), Tolerance::Exact);
     }
 
@@ -343,15 +352,15 @@ mod tests {
             let exact: Vec<f64> = weight.iter().map(|w| f64::from(*w)).collect();
             let mut z = vec![0.0; rows * channels];
             reference::conv1d(geometry, Rows::packed(&x, rows, channels), &exact, None, RowsMut::packed(&mut z, rows, channels));
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let (mut y, mut scratch) =
                     (vec![f32::NAN; rows * channels], vec![f32::NAN; scratch_len(geometry, channels, channels)]);
                 let (x, to) = (Rows::packed(&single, rows, channels), RowsMut::packed(&mut y, rows, channels));
-                forward(level, geometry, x, Weight::Plain(&weight), None, Epilogue::NONE, to, &mut scratch);
+                forward(isa, geometry, x, Weight::Plain(&weight), None, Epilogue::NONE, to, &mut scratch);
                 let squares = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(|x| x * x).sum::<f64>().sqrt();
                 let error = squares(&mut y.iter().zip(&z).map(|(y, z)| f64::from(*y) - z)) / squares(&mut z.iter().copied());
-                println!("{taps} taps, level {level}: {error:.1e} of the root mean square");
-                assert!(error <= six_points::ROUNDING, "{taps} taps, level {level}: {error:e}");
+                println!("{taps} taps, level {isa}: {error:.1e} of the root mean square");
+                assert!(error <= winograd::ROUNDING, "{taps} taps, level {isa}: {error:e}");
             }
         }
     }

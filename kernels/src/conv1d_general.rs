@@ -19,7 +19,7 @@
 use crate::activation::{self, Activation};
 use crate::conv1d::Epilogue;
 use crate::dropout::Mask;
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows, Sink, Store};
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -110,7 +110,7 @@ fn check<T>(geometry: Geometry, x: (usize, usize), weight: &[T], y: (usize, usiz
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
     weight: &[T],
@@ -121,7 +121,7 @@ pub fn forward<T: Real>(
 ) {
     check(geometry, (x.rows(), x.cols()), weight, (y.rows(), y.cols()));
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d_general: length of the bias");
-    T::conv1d_general_forward(level, Forward { geometry, x, weight, bias, epilogue, y, scratch });
+    T::conv1d_general_forward(isa, Forward { geometry, x, weight, bias, epilogue, y, scratch });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -219,7 +219,7 @@ impl<T: Real> Sink<T> for Finish<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_input<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     dz: Rows<'_, T>,
     weight: &[T],
@@ -228,7 +228,7 @@ pub fn backward_input<T: Real>(
     scratch: &mut [T],
 ) {
     check(geometry, (dx.rows(), dx.cols()), weight, (dz.rows(), dz.cols()));
-    T::conv1d_general_backward_input(level, BackwardInput { geometry, dz, weight, dx, write, scratch });
+    T::conv1d_general_backward_input(isa, BackwardInput { geometry, dz, weight, dx, write, scratch });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -311,7 +311,7 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_weight<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
     dz: Rows<'_, T>,
@@ -322,7 +322,7 @@ pub fn backward_weight<T: Real>(
     check(geometry, (x.rows(), x.cols()), dweight, (dz.rows(), dz.cols()));
     let gradient = &mut scratch[..dweight.len()];
     gradient.fill(T::ZERO);
-    T::conv1d_general_backward_weight(level, BackwardWeight { geometry, x, dz, gradient });
+    T::conv1d_general_backward_weight(isa, BackwardWeight { geometry, x, dz, gradient });
     let (taps, inputs, outputs) = (geometry.taps, x.cols(), dz.cols());
     for (o, target) in dweight.chunks_exact_mut((inputs * taps).max(1)).enumerate() {
         for (c, target) in target.chunks_exact_mut(taps).enumerate() {
@@ -412,17 +412,17 @@ mod tests {
         let mut dx = Matrix::<T>::poisoned(seed, (n, inputs));
         let mut dw = Matrix::<T>::poisoned(0, (1, weight.len()));
         reference::conv1d_backward(geometry, x.view(), &weight, dz.view(), dx.view_mut(), dw.view_mut().row_mut(0));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (geometry.rows, outputs));
-            forward(level, geometry, x.view(), &weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+            forward(isa, geometry, x.view(), &weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
             y.check_gaps();
-            assert_near(&format!("forward at {level}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
-            check_writes(&format!("dx at {level}"), &dx, Tolerance::Close, |dx, write| {
-                backward_input(level, geometry, dz.view(), &weight, dx, write, &mut scratch);
+            assert_near(&format!("forward at {isa}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
+            check_writes(&format!("dx at {isa}"), &dx, Tolerance::Close, |dx, write| {
+                backward_input(isa, geometry, dz.view(), &weight, dx, write, &mut scratch);
             });
-            check_writes(&format!("dW at {level}"), &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
+            check_writes(&format!("dW at {isa}"), &dw, Tolerance::Close, |mut dw, write| {
+                backward_weight(isa, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
             });
         }
     }
@@ -448,11 +448,11 @@ mod tests {
                 .collect();
             for activation in [Activation::Relu, Activation::LeakyRelu { slope: 0.01 }, Activation::Tanh] {
                 let epilogue = Epilogue { activation, dropout: Some(Mask::new(Stream::new(seed, 1, 2, 3), 0.3)) };
-                for level in Level::available() {
+                for isa in InstructionSet::available() {
                     let mut scratch = vec![f32::NAN; scratch_len(geometry, channels, 3).max(conv1d::scratch_len(same, channels, 3))];
                     let [mut y, mut expected] = [(); 2].map(|()| Matrix::<f32>::poisoned(seed, (rows, 3)));
-                    forward(level, geometry, x.view(), &weight, None, epilogue, y.view_mut(), &mut scratch);
-                    conv1d::forward(level, same, x.view(), conv1d::Weight::Plain(&turned), None, epilogue, expected.view_mut(), &mut scratch);
+                    forward(isa, geometry, x.view(), &weight, None, epilogue, y.view_mut(), &mut scratch);
+                    conv1d::forward(isa, same, x.view(), conv1d::Weight::Plain(&turned), None, epilogue, expected.view_mut(), &mut scratch);
                     assert_near("conv1d and conv1d_general", &y.to_vec(), &expected.to_vec(), Tolerance::Exact);
                 }
             }

@@ -8,9 +8,9 @@
 //! element is dropped when its half, as a signed number, lies below a bound chosen so that the share is ⌊p·2¹⁶⌉/2¹⁶. The scale is
 //! the reciprocal of the keep probability that this bound realises, so that the mean of y over masks is exactly x.
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::random::{Stream, word};
-use crate::rows::same_shape;
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// A mask over a matrix of any shape: a rule, not a buffer.
@@ -156,15 +156,15 @@ impl<T: Real> Kernel for Apply<'_, T> {
 }
 
 /// y = m∘x / (1 − p), both `[n, C]`.
-pub fn forward<T: Real>(level: Level, mask: Mask, x: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn forward<T: Real>(isa: InstructionSet, mask: Mask, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &y.view());
-    T::dropout_apply(level, Apply { mask, x, y, write: Write::Set });
+    T::dropout_apply(isa, Apply { mask, x, y, write: Write::Set });
 }
 
 /// dx {=, +=} m∘dy / (1 − p), both `[n, C]`, with the mask of the forward pass.
-pub fn backward<T: Real>(level: Level, mask: Mask, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
+pub fn backward<T: Real>(isa: InstructionSet, mask: Mask, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write) {
     same_shape(&dy, &dx.view());
-    T::dropout_apply(level, Apply { mask, x: dy, y: dx, write });
+    T::dropout_apply(isa, Apply { mask, x: dy, y: dx, write });
 }
 
 #[cfg(test)]
@@ -184,12 +184,12 @@ mod tests {
             let x = Matrix::<f32>::random(seed, (rows, cols));
             let scale = mask.scale() as f32;
             let expected = Matrix::filled((rows, cols), 0, 0, |i, j| if mask.keeps(i, j) { x.view().row(i)[j] * scale } else { 0.0 });
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut y = Matrix::<f32>::poisoned(seed, (rows, cols));
-                forward(level, mask, x.view(), y.view_mut());
-                assert_eq!(y.to_vec(), expected.to_vec(), "level {level}");
+                forward(isa, mask, x.view(), y.view_mut());
+                assert_eq!(y.to_vec(), expected.to_vec(), "level {isa}");
                 y.check_gaps();
-                check_writes("backward", &expected, Tolerance::Close, |dx, write| backward(level, mask, x.view(), dx, write));
+                check_writes("backward", &expected, Tolerance::Close, |dx, write| backward(isa, mask, x.view(), dx, write));
             }
         }
 
@@ -208,8 +208,8 @@ mod tests {
             let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.3);
             let (x, dy) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
             let (mut y, mut dx) = (Matrix::<f64>::poisoned(1, (rows, cols)), Matrix::<f64>::poisoned(1, (rows, cols)));
-            forward(Level::PLAIN, mask, x.view(), y.view_mut());
-            backward(Level::PLAIN, mask, dy.view(), dx.view_mut(), Write::Set);
+            forward(InstructionSet::PLAIN, mask, x.view(), y.view_mut());
+            backward(InstructionSet::PLAIN, mask, dy.view(), dx.view_mut(), Write::Set);
             let sides = (inner(&y.to_vec(), &dy.to_vec()), inner(&x.to_vec(), &dx.to_vec()));
             assert_near("<Ax, y> and <x, A'y>", &[sides.0], &[sides.1], Tolerance::Close);
         }

@@ -14,7 +14,7 @@
 //! Not here: the functions over matrices (activation.rs, sci.rs).
 
 use crate::Real;
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 
 /// Constants and the bits of one float type.
 pub trait Elementary: Sized + 'static {
@@ -266,8 +266,8 @@ pub enum Function {
 }
 
 /// Replaces every number by the function of it.
-pub fn apply<T: Real>(level: Level, function: Function, values: &mut [T]) {
-    T::elementary_apply(level, Apply { function, values });
+pub fn apply<T: Real>(isa: InstructionSet, function: Function, values: &mut [T]) {
+    T::elementary_apply(isa, Apply { function, values });
 }
 
 pub(crate) struct Apply<'a, T> {
@@ -319,11 +319,11 @@ mod tests {
     }
 
     /// Largest distance from `exact` over `count` + 1 points of `[low, high]`, in units in the last place, and where.
-    fn worst<T: Real>(level: Level, function: Function, exact: impl Fn(f64) -> f64, low: f64, high: f64) -> (f64, f64) {
+    fn worst<T: Real>(isa: InstructionSet, function: Function, exact: impl Fn(f64) -> f64, low: f64, high: f64) -> (f64, f64) {
         let count = 400_000;
         let points: Vec<T> = (0..=count).map(|i| T::of(low + (high - low) * f64::from(i) / f64::from(count))).collect();
         let mut values = points.clone();
-        apply(level, function, &mut values);
+        apply(isa, function, &mut values);
         points.iter().zip(&values).fold((0.0, 0.0), |worst, (x, y)| {
             let found = ulps(*y, exact(x.f64()));
             assert!(!found.is_nan(), "{function:?}({x}) = {y}");
@@ -333,10 +333,10 @@ mod tests {
 
     /// In f64 the reference is rounded too: its own unit is part of the bound.
     fn check<T: Real>(function: Function, exact: impl Fn(f64) -> f64, low: f64, high: f64, bound: f64) {
-        for level in Level::available() {
-            let (found, at) = worst::<T>(level, function, &exact, low, high);
-            println!("{function:?} {} {level}: {found:.3} ULP at {at}", std::any::type_name::<T>());
-            assert!(found <= bound, "{function:?} at level {level}: {found} ULP at {at}");
+        for isa in InstructionSet::available() {
+            let (found, at) = worst::<T>(isa, function, &exact, low, high);
+            println!("{function:?} {} {isa}: {found:.3} ULP at {at}", std::any::type_name::<T>());
+            assert!(found <= bound, "{function:?} at level {isa}: {found} ULP at {at}");
         }
     }
 
@@ -360,22 +360,22 @@ mod tests {
 
     #[test]
     fn exp_of_negative_numbers_is_exp_without_subnormals() {
-        fn check<T: Real>(level: Level) {
+        fn check<T: Real>(isa: InstructionSet) {
             let low = T::EXP_SUBNORMAL.f64();
             let points: Vec<T> = (0..=100_000).map(|i| T::of(low * f64::from(i) / 100_000.0)).collect();
             let (mut found, mut expected) = (points.clone(), points);
-            level.run(Negative(&mut found));
-            apply(level, Function::Exp, &mut expected);
+            isa.run(Negative(&mut found));
+            apply(isa, Function::Exp, &mut expected);
             // Both round the same polynomial; the scaling by a power of two is exact.
-            assert!(found.iter().zip(&expected).all(|(a, b)| a.f64().to_bits() == b.f64().to_bits()), "level {level}");
+            assert!(found.iter().zip(&expected).all(|(a, b)| a.f64().to_bits() == b.f64().to_bits()), "level {isa}");
             let mut ends = [T::NEG_INFINITY, T::of(2.0 * low), T::ZERO, T::NAN];
-            level.run(Negative(&mut ends));
+            isa.run(Negative(&mut ends));
             assert_eq!(ends[..3].iter().map(|x| x.f64()).collect::<Vec<_>>(), [0.0, 0.0, 1.0]);
             assert!(ends[3].f64().is_nan(), "NaN is not hidden");
         }
-        for level in Level::available() {
-            check::<f32>(level);
-            check::<f64>(level);
+        for isa in InstructionSet::available() {
+            check::<f32>(isa);
+            check::<f64>(isa);
         }
     }
 
@@ -393,25 +393,25 @@ mod tests {
 
     #[test]
     fn powers_of_two_stay_within_their_bound() {
-        fn check<T: Real>(level: Level) {
+        fn check<T: Real>(isa: InstructionSet) {
             let low = T::LEAST_POWER.f64();
             let points: Vec<T> = (0..=400_000).map(|i| T::of(low + (20.0 - low) * f64::from(i) / 400_000.0)).collect();
             let mut found = points.clone();
-            level.run(Power(&mut found));
+            isa.run(Power(&mut found));
             let worst = points.iter().zip(&found).map(|(x, y)| ulps(*y, x.f64().exp2())).fold(0.0, f64::max);
-            println!("2^x {} {level}: {worst:.3} ULP", std::any::type_name::<T>());
-            assert!(worst <= 1.2, "level {level}: {worst} ULP");
+            println!("2^x {} {isa}: {worst:.3} ULP", std::any::type_name::<T>());
+            assert!(worst <= 1.2, "level {isa}: {worst} ULP");
             let mut ends = [T::NEG_INFINITY, T::of(2.0 * low), T::ZERO, T::NAN];
-            level.run(Power(&mut ends));
+            isa.run(Power(&mut ends));
             assert_eq!(ends[..3].iter().map(|x| x.f64()).collect::<Vec<_>>(), [low.exp2(), low.exp2(), 1.0]);
             assert!(ends[3].f64().is_nan(), "NaN is not hidden");
             let kept = [T::LEAST, T::ONE, T::NEG_INFINITY].map(|x| or_zero(x).f64());
             assert_eq!(kept, [low.exp2(), 1.0, f64::NEG_INFINITY]);
             assert!(or_zero(T::LEAST * T::of(-0.5)).f64().to_bits() == 0 && or_zero(T::NAN).f64().is_nan());
         }
-        for level in Level::available() {
-            check::<f32>(level);
-            check::<f64>(level);
+        for isa in InstructionSet::available() {
+            check::<f32>(isa);
+            check::<f64>(isa);
         }
     }
 
@@ -438,10 +438,10 @@ mod tests {
 
     #[test]
     fn ends_of_the_line() {
-        fn ends<T: Real>(level: Level, subnormal: f64) {
+        fn ends<T: Real>(isa: InstructionSet, subnormal: f64) {
             let value = |function, x: f64| {
                 let mut values = [T::of(x); 17];
-                apply(level, function, &mut values);
+                apply(isa, function, &mut values);
                 let [first, ..] = values.map(T::f64);
                 // The sign and payload of NaN are nobody's promise.
                 assert!(values.iter().all(|v| v.f64().to_bits() == first.to_bits() || (v.f64().is_nan() && first.is_nan())));
@@ -461,9 +461,9 @@ mod tests {
                 assert!(value(function, f64::NAN).is_nan(), "{function:?}(NaN)");
             }
         }
-        for level in Level::available() {
-            ends::<f32>(level, -100.0);
-            ends::<f64>(level, -740.0);
+        for isa in InstructionSet::available() {
+            ends::<f32>(isa, -100.0);
+            ends::<f64>(isa, -740.0);
         }
     }
 }

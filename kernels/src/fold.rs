@@ -11,9 +11,9 @@
 //! The image is copied once between zeros; then the k columns of one kernel row lie side by side, and a kernel row is one stretch of
 //! k·in numbers of a matrix product. Kernel rows that only ever meet zeros (|a − h| ≥ R) are left out, which is exact.
 
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows, Store};
-use crate::{Real, Rows, RowsMut, Write, rows};
+use crate::{Real, Rows, RowsMut, Write, strided};
 
 /// Period, length and kernel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -146,7 +146,7 @@ impl<T> LeftRows<T> for Unfolded<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     fold: Fold,
     x: Rows<'_, T>,
     weight: &[T],
@@ -159,11 +159,11 @@ pub fn forward<T: Real>(
     assert_eq!(bias.len(), outputs, "fold: length of the bias");
     let count = fold.positions().min(y.rows());
     let total = y.rows();
-    rows::fill(y.reborrow().range(count, total), T::ZERO);
+    strided::fill(y.reborrow().range(count, total), T::ZERO);
     let (image, panels) = scratch.split_at_mut(fold.padded() * inputs);
     surround(fold, &x, image);
     T::fold_product(
-        level,
+        isa,
         Product { fold, image, weight, bias: Some(bias), flipped: false, y: y.range(0, count), write: Write::Set, panels },
     );
 }
@@ -173,7 +173,7 @@ pub fn forward<T: Real>(
 /// # Panics
 /// If shapes disagree.
 pub fn backward_input<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     fold: Fold,
     dy: Rows<'_, T>,
     weight: &[T],
@@ -186,11 +186,11 @@ pub fn backward_input<T: Real>(
     let count = fold.positions().min(dx.rows());
     if write == Write::Set {
         let total = dx.rows();
-        rows::fill(dx.reborrow().range(count, total), T::ZERO);
+        strided::fill(dx.reborrow().range(count, total), T::ZERO);
     }
     let (image, panels) = scratch.split_at_mut(fold.padded() * outputs);
     surround(fold, &dy, image);
-    T::fold_product(level, Product { fold, image, weight, bias: None, flipped: true, y: dx.range(0, count), write, panels });
+    T::fold_product(isa, Product { fold, image, weight, bias: None, flipped: true, y: dx.range(0, count), write, panels });
 }
 
 /// y {=, +=} image ∗ W + b, or its adjoint: the kernel turned by half a circle, inputs and outputs exchanged.
@@ -237,7 +237,7 @@ impl<T: Real> Tiled<T> for Product<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_weight<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     fold: Fold,
     x: Rows<'_, T>,
     dy: Rows<'_, T>,
@@ -252,7 +252,7 @@ pub fn backward_weight<T: Real>(
         dweight.fill(T::ZERO);
     }
     let count = fold.positions().min(dy.rows());
-    T::fold_backward_weight(level, BackwardWeight { fold, image, inputs: x.cols(), dy: dy.range(0, count), dweight });
+    T::fold_backward_weight(isa, BackwardWeight { fold, image, inputs: x.cols(), dy: dy.range(0, count), dweight });
 }
 
 pub(crate) struct BackwardWeight<'a, T> {
@@ -287,9 +287,9 @@ impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
 }
 
 /// db {=, +=} the sum of the rows of dy inside the image.
-pub fn backward_bias<T: Real>(level: Level, fold: Fold, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
+pub fn backward_bias<T: Real>(isa: InstructionSet, fold: Fold, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     let count = fold.positions().min(dy.rows());
-    crate::linear::backward_bias(level, dy.range(0, count), dbias, write);
+    crate::linear::backward_bias(isa, dy.range(0, count), dbias, write);
 }
 
 #[cfg(test)]
@@ -306,20 +306,20 @@ mod tests {
         let (weight, bias) = (numbers::<T>(seed + 2, fold.kernel.pow(2) * inputs * outputs), numbers::<T>(seed + 3, outputs));
         let expected = reference::fold(fold, x.view(), &weight, &bias, dy.view());
         let of = |shape: (usize, usize), values: &[f64]| Matrix::<T>::filled(shape, 0, 0, |i, j| T::of(values[i * shape.1 + j]));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(fold.length, fold.kernel, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (rows.1, outputs));
-            forward(level, fold, x.view(), &weight, &bias, y.view_mut(), &mut scratch);
+            forward(isa, fold, x.view(), &weight, &bias, y.view_mut(), &mut scratch);
             y.check_gaps();
             assert_near("y", &y.to_vec(), &of((rows.1, outputs), &expected.y).to_vec(), Tolerance::Close);
             check_writes("dx", &of((rows.0, inputs), &expected.dx), Tolerance::Close, |dx, write| {
-                backward_input(level, fold, dy.view(), &weight, dx, write, &mut scratch);
+                backward_input(isa, fold, dy.view(), &weight, dx, write, &mut scratch);
             });
             check_writes("dW", &of((1, weight.len()), &expected.dweight), Tolerance::Close, |mut dw, write| {
-                backward_weight(level, fold, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
+                backward_weight(isa, fold, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
             });
             check_writes("db", &of((1, outputs), &expected.dbias), Tolerance::Close, |mut db, write| {
-                backward_bias(level, fold, dy.view(), db.row_mut(0), write);
+                backward_bias(isa, fold, dy.view(), db.row_mut(0), write);
             });
         }
     }

@@ -11,9 +11,9 @@
 //! packing would cost more than the product; and the tile is tall or wide as suits the result. Written for the sizes of this project:
 //! n from 6 to a few hundred, k up to a few thousand, any m.
 
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, Store};
-use crate::{Real, Rows, RowsMut, Write, sums};
+use crate::{Real, Rows, RowsMut, Write, row_reductions};
 
 /// Longest block of the summed index: a panel of 16 numbers a line is 16 KiB in f32 (8 numbers in f64), half the first-level cache.
 pub const LONGEST_BLOCK: usize = 256;
@@ -32,19 +32,19 @@ pub fn scratch_len(m: usize, k: usize, n: usize) -> usize {
 }
 
 /// c {=, +=} a·b; a `[m, k]`, b `[k, n]`, c `[m, n]`.
-pub fn ab<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
+pub fn ab<T: Real>(isa: InstructionSet, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.rows() == c.rows() && a.cols() == b.rows() && b.cols() == c.cols(), "a·b: shapes do not chain");
-    T::gemm_product(level, Product { a, b: Right::Plain(b), bias: None, c, write, scratch });
+    T::gemm_product(isa, Product { a, b: Right::Plain(b), bias: None, c, write, scratch });
 }
 
 /// c {=, +=} a·bᵀ; a `[m, k]`, b `[n, k]`, c `[m, n]`.
-pub fn abt<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
-    abt_bias(level, a, b, None, c, write, scratch);
+pub fn abt<T: Real>(isa: InstructionSet, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
+    abt_bias(isa, a, b, None, c, write, scratch);
 }
 
 /// c {=, +=} a·bᵀ + bias, bias `[n]` on every row.
 pub(crate) fn abt_bias<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     a: Rows<'_, T>,
     b: Rows<'_, T>,
     bias: Option<&[T]>,
@@ -54,14 +54,14 @@ pub(crate) fn abt_bias<T: Real>(
 ) {
     assert!(a.rows() == c.rows() && a.cols() == b.cols() && b.rows() == c.cols(), "a·bᵀ: shapes do not chain");
     assert!(bias.is_none_or(|bias| bias.len() == c.cols()), "a·bᵀ + bias: length of the bias");
-    T::gemm_product(level, Product { a, b: Right::Transposed(b), bias, c, write, scratch });
+    T::gemm_product(isa, Product { a, b: Right::Transposed(b), bias, c, write, scratch });
 }
 
 /// c {=, +=} aᵀ·b; a `[k, m]`, b `[k, n]`, c `[m, n]`.
-pub fn atb<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
+pub fn atb<T: Real>(isa: InstructionSet, a: Rows<'_, T>, b: Rows<'_, T>, c: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(a.cols() == c.rows() && a.rows() == b.rows() && b.cols() == c.cols(), "aᵀ·b: shapes do not chain");
     let _ = scratch;
-    T::gemm_transposed_product(level, TransposedProduct { a, b, c, write });
+    T::gemm_transposed_product(isa, TransposedProduct { a, b, c, write });
 }
 
 enum Right<'a, T> {
@@ -114,7 +114,7 @@ impl<T: Real> Product<'_, T> {
                 }
                 Right::Transposed(b) => {
                     for (j, c) in c.iter_mut().enumerate() {
-                        *c += sums::dot::<T, I>(a, b.row(j));
+                        *c += row_reductions::dot::<T, I>(a, b.row(j));
                     }
                 }
             }
@@ -210,17 +210,17 @@ mod tests {
         reference::gemm_ab(a.view(), b.view(), expected[0].view_mut());
         reference::gemm_atb(at.view(), b.view(), expected[1].view_mut());
         reference::gemm_abt(a.view(), bt.view(), expected[2].view_mut());
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(m, k, n)];
-            let what = |form: &str| format!("{form} {m} x {k} x {n} at level {level}");
+            let what = |form: &str| format!("{form} {m} x {k} x {n} at level {isa}");
             check_writes(&what("ab"), &expected[0], Tolerance::Close, |c, write| {
-                ab(level, a.view(), b.view(), c, write, &mut scratch)
+                ab(isa, a.view(), b.view(), c, write, &mut scratch)
             });
             check_writes(&what("atb"), &expected[1], Tolerance::Close, |c, write| {
-                atb(level, at.view(), b.view(), c, write, &mut scratch)
+                atb(isa, at.view(), b.view(), c, write, &mut scratch)
             });
             check_writes(&what("abt"), &expected[2], Tolerance::Close, |c, write| {
-                abt(level, a.view(), bt.view(), c, write, &mut scratch)
+                abt(isa, a.view(), bt.view(), c, write, &mut scratch)
             });
         }
     }
@@ -261,9 +261,9 @@ mod tests {
             let (row_a, row_b) = (k as isize, n as isize);
             matrixmultiply::sgemm(m, k, n, 1.0, a.as_ptr(), row_a, 1, b.as_ptr(), row_b, 1, 0.0, expected.as_mut_ptr(), row_b, 1);
         }
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let (mut c, mut scratch) = (vec![f32::NAN; m * n], vec![f32::NAN; scratch_len(m, k, n)]);
-            ab(level, Rows::packed(&a, m, k), Rows::packed(&b, k, n), RowsMut::packed(&mut c, m, n), Write::Set, &mut scratch);
+            ab(isa, Rows::packed(&a, m, k), Rows::packed(&b, k, n), RowsMut::packed(&mut c, m, n), Write::Set, &mut scratch);
             crate::testing::assert_near("ab against matrixmultiply", &c, &expected, Tolerance::Close);
         }
     }
@@ -276,7 +276,7 @@ mod tests {
         let hankel = Rows::new(&a, 9, 6, 3);
         reference::gemm_ab(hankel, b.view(), expected.view_mut());
         let mut scratch = vec![0.0; scratch_len(9, 6, 4)];
-        ab(Level::PLAIN, hankel, b.view(), c.view_mut(), Write::Set, &mut scratch);
+        ab(InstructionSet::PLAIN, hankel, b.view(), c.view_mut(), Write::Set, &mut scratch);
         crate::testing::assert_near("hankel", &c.to_vec(), &expected.to_vec(), Tolerance::Close);
     }
 }

@@ -72,7 +72,7 @@ mod tests {
     use crate::fold::{self, Fold};
     use crate::testing::{assert_near, inner, numbers};
     use crate::tolerance::Tolerance;
-    use crate::{Level, Rows, RowsMut};
+    use crate::{InstructionSet, Rows, RowsMut};
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(24))]
@@ -90,7 +90,7 @@ mod tests {
                 let mut y = vec![f64::NAN; length * outputs];
                 let mut scratch = vec![f64::NAN; fold::scratch_len(length, kernel, inputs, outputs)];
                 let to = RowsMut::packed(&mut y, length, outputs);
-                fold::forward(Level::PLAIN, fold, Rows::packed(&x, length, inputs), weight, &vec![0.0; outputs], to, &mut scratch);
+                fold::forward(InstructionSet::PLAIN, fold, Rows::packed(&x, length, inputs), weight, &vec![0.0; outputs], to, &mut scratch);
                 y
             };
             let mut expected = vec![0.0; length * outputs];

@@ -7,16 +7,16 @@
 //!
 //! x, y `[n, C]`; γ, β `[C]`; kept for the backward pass: μ, r `[n]`.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
-use crate::{Real, Rows, RowsMut, Write, sums};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
+use crate::{Real, Rows, RowsMut, Write, row_reductions};
 
 /// y, and `mean` and `rstd` `[n]` for the backward pass.
 ///
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     gamma: &[T],
     beta: &[T],
@@ -28,7 +28,7 @@ pub fn forward<T: Real>(
     same_shape(&x, &y.view());
     assert!(gamma.len() == x.cols() && beta.len() == x.cols(), "layer norm: length of gamma or beta");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    T::layer_norm_forward(level, Forward { x, gamma, beta, epsilon: T::of(epsilon), y, mean, rstd });
+    T::layer_norm_forward(isa, Forward { x, gamma, beta, epsilon: T::of(epsilon), y, mean, rstd });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -47,8 +47,8 @@ impl<T: Real> Kernel for Forward<'_, T> {
         let share = T::ONE / T::of(self.x.cols() as f64);
         for i in 0..self.x.rows() {
             let x = self.x.row(i);
-            let mean = sums::of::<T, I>(x, |x| x) * share;
-            let variance = sums::of_products::<T, I>(x, x, |x| x - mean, |x| x - mean) * share;
+            let mean = row_reductions::of::<T, I>(x, |x| x) * share;
+            let variance = row_reductions::of_products::<T, I>(x, x, |x| x - mean, |x| x - mean) * share;
             let rstd = T::ONE / (variance + self.epsilon).sqrt();
             for (((y, x), gamma), beta) in self.y.row_mut(i).iter_mut().zip(x).zip(self.gamma).zip(self.beta) {
                 *y = I::mul_add((*x - mean) * rstd, *gamma, *beta);
@@ -63,7 +63,7 @@ impl<T: Real> Kernel for Forward<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_input<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     gamma: &[T],
     mean: &[T],
@@ -76,7 +76,7 @@ pub fn backward_input<T: Real>(
     same_shape(&x, &dx.view());
     assert!(gamma.len() == x.cols(), "layer norm: length of gamma");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    T::layer_norm_backward_input(level, BackwardInput { x, gamma, mean, rstd, dy, dx, write });
+    T::layer_norm_backward_input(isa, BackwardInput { x, gamma, mean, rstd, dy, dx, write });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -96,13 +96,13 @@ impl<T: Real> Kernel for BackwardInput<'_, T> {
         let adds = self.write == Write::Add;
         for (i, (&mean, &rstd)) in self.mean.iter().zip(self.rstd).enumerate() {
             let (x, dy, dx) = (self.x.row(i), self.dy.row(i), self.dx.row_mut(i));
-            let mean_g = sums::dot::<T, I>(dy, self.gamma) * share;
+            let mean_g = row_reductions::dot::<T, I>(dy, self.gamma) * share;
             // mean(g·x̂) = r·(Σ g·x − μ·Σ g)/C would cancel; the sum takes x − μ at once.
             let mut mean_g_normal = T::ZERO;
             for ((dy, gamma), x) in dy.chunks(CHUNK).zip(self.gamma.chunks(CHUNK)).zip(x.chunks(CHUNK)) {
                 let mut g = [T::ZERO; CHUNK];
                 g.iter_mut().zip(dy).zip(gamma).for_each(|((g, dy), gamma)| *g = *dy * *gamma);
-                mean_g_normal += sums::of_products::<T, I>(x, &g[..x.len()], |x| (x - mean) * rstd, |g| g);
+                mean_g_normal += row_reductions::of_products::<T, I>(x, &g[..x.len()], |x| (x - mean) * rstd, |g| g);
             }
             mean_g_normal *= share;
             for (((dx, dy), gamma), x) in dx.iter_mut().zip(dy).zip(self.gamma).zip(x) {
@@ -122,7 +122,7 @@ const CHUNK: usize = 64;
 /// # Panics
 /// If shapes disagree.
 pub fn backward_parameters<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     mean: &[T],
     rstd: &[T],
@@ -134,7 +134,7 @@ pub fn backward_parameters<T: Real>(
     same_shape(&x, &dy);
     assert!(dgamma.len() == x.cols() && dbeta.len() == x.cols(), "layer norm: length of the gradients of gamma or beta");
     assert!(mean.len() == x.rows() && rstd.len() == x.rows(), "layer norm: length of mean or rstd");
-    T::layer_norm_backward_parameters(level, BackwardParameters { x, mean, rstd, dy, dgamma, dbeta, write });
+    T::layer_norm_backward_parameters(isa, BackwardParameters { x, mean, rstd, dy, dgamma, dbeta, write });
 }
 
 pub(crate) struct BackwardParameters<'a, T> {
@@ -195,22 +195,22 @@ mod tests {
             dgamma.row_mut(0),
             dbeta.row_mut(0),
         );
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut y = Matrix::<T>::poisoned(seed, (rows, cols));
             let (mut mean, mut rstd) = (vec![T::NAN; rows], vec![T::NAN; rows]);
-            forward(level, x.view(), &gamma, &beta, EPSILON, y.view_mut(), &mut mean, &mut rstd);
+            forward(isa, x.view(), &gamma, &beta, EPSILON, y.view_mut(), &mut mean, &mut rstd);
             y.check_gaps();
             assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
             check_writes("dx", &dx_expected, Tolerance::Close, |dx, write| {
-                backward_input(level, x.view(), &gamma, &mean, &rstd, dy.view(), dx, write);
+                backward_input(isa, x.view(), &gamma, &mean, &rstd, dy.view(), dx, write);
             });
             check_writes("dgamma", &parameters.0, Tolerance::Close, |mut dgamma, write| {
                 let mut dbeta = vec![T::ZERO; cols];
-                backward_parameters(level, x.view(), &mean, &rstd, dy.view(), dgamma.row_mut(0), &mut dbeta, write);
+                backward_parameters(isa, x.view(), &mean, &rstd, dy.view(), dgamma.row_mut(0), &mut dbeta, write);
             });
             check_writes("dbeta", &parameters.1, Tolerance::Close, |mut dbeta, write| {
                 let mut dgamma = vec![T::ZERO; cols];
-                backward_parameters(level, x.view(), &mean, &rstd, dy.view(), &mut dgamma, dbeta.row_mut(0), write);
+                backward_parameters(isa, x.view(), &mean, &rstd, dy.view(), &mut dgamma, dbeta.row_mut(0), write);
             });
         }
     }
@@ -227,12 +227,12 @@ mod tests {
         #[test]
         fn gradient_is_orthogonal_to_shift_and_stretch(cols in 8_usize..100, seed in 0_u64..1000) {
             let (x, dy, gamma, beta) = (numbers::<f64>(seed, cols), numbers::<f64>(seed + 1, cols), vec![1.0; cols], vec![0.0; cols]);
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let (mut y, mut dx, mut mean, mut rstd) = (vec![0.0; cols], vec![0.0; cols], [0.0], [0.0]);
                 let row = |x| Rows::packed(x, 1, cols);
-                forward(level, row(&x), &gamma, &beta, 0.0, RowsMut::packed(&mut y, 1, cols), &mut mean, &mut rstd);
+                forward(isa, row(&x), &gamma, &beta, 0.0, RowsMut::packed(&mut y, 1, cols), &mut mean, &mut rstd);
                 let dx_view = RowsMut::packed(&mut dx, 1, cols);
-                backward_input(level, row(&x), &gamma, &mean, &rstd, row(&dy), dx_view, Write::Set);
+                backward_input(isa, row(&x), &gamma, &mean, &rstd, row(&dy), dx_view, Write::Set);
                 let found = [inner(&dx, &gamma), inner(&dx, &y)];
                 assert_near("dx along 1 and along the normalised row", &found, &[0.0; 2], Tolerance::Close);
             }

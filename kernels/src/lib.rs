@@ -2,11 +2,11 @@
 //!
 //! Slices with shapes and row strides; no tape, no model, no input or output, no dependency (`matrixmultiply` is an oracle of
 //! tests and benches), but for `mapped`, a feature: memory that lies in a file. All `unsafe` of the project lives in this crate: the call of a kernel compiled for an instruction-set level
-//! ([`level`]), the registers of the innermost loops (`vector`), and their unchecked reads (`tile`), and that memory. Everything else is plain Rust,
+//! ([`instruction_set`]), the registers of the innermost loops (`vector`), and their unchecked reads (`tile`), and that memory. Everything else is plain Rust,
 //! compiled once a level and a float type, in `compiled`.
 //!
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
-//! of a sequence are views; the [`Level`] is the first argument, chosen once; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
+//! of a sequence are views; the [`InstructionSet`] is the first argument, chosen once; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
 
 #![expect(clippy::too_many_arguments, reason = "a kernel takes its sizes and buffers one by one, as BLAS does")]
 
@@ -24,8 +24,8 @@ pub mod encoding;
 pub mod fold;
 pub mod gemm;
 pub mod inception;
+pub mod instruction_set;
 pub mod layer_norm;
-pub mod level;
 pub mod linear;
 pub mod loss;
 pub mod lstm;
@@ -39,10 +39,11 @@ pub mod random;
 pub mod real;
 pub mod reference;
 pub mod reference_peers;
-pub mod rows;
+mod registers;
+mod row_reductions;
 pub mod sci;
 pub mod spectrum;
-mod sums;
+pub mod strided;
 pub mod temporal;
 pub mod temporal_each;
 #[cfg(test)]
@@ -52,9 +53,9 @@ pub mod tolerance;
 mod vector;
 pub mod weight_norm;
 
-pub use level::Level;
+pub use instruction_set::InstructionSet;
 pub use real::Real;
-pub use rows::{Rows, RowsMut};
+pub use strided::{Rows, RowsMut};
 pub use tolerance::Tolerance;
 
 /// How a kernel stores a gradient: the first writer of a buffer sets it, later ones add to it.

@@ -6,7 +6,7 @@
 //!
 //! x `[n, in]`, y `[n, out]`. The backward pass reads x and W.
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Rows, RowsMut, Write, gemm};
 
 /// Scratch, in numbers, that any function of this file needs for n = `rows`.
@@ -17,25 +17,46 @@ pub fn scratch_len(rows: usize, inputs: usize, outputs: usize) -> usize {
 }
 
 /// y = x·Wᵀ + b.
-pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, y: RowsMut<'_, T>, scratch: &mut [T]) {
+pub fn forward<T: Real>(
+    isa: InstructionSet,
+    x: Rows<'_, T>,
+    weight: &[T],
+    bias: Option<&[T]>,
+    y: RowsMut<'_, T>,
+    scratch: &mut [T],
+) {
     let weight = Rows::packed(weight, y.cols(), x.cols());
-    gemm::abt_bias(level, x, weight, bias, y, Write::Set, scratch);
+    gemm::abt_bias(isa, x, weight, bias, y, Write::Set, scratch);
 }
 
 /// dx {=, +=} dy·W.
-pub fn backward_input<T: Real>(level: Level, dy: Rows<'_, T>, weight: &[T], dx: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
-    gemm::ab(level, dy, Rows::packed(weight, dy.cols(), dx.cols()), dx, write, scratch);
+pub fn backward_input<T: Real>(
+    isa: InstructionSet,
+    dy: Rows<'_, T>,
+    weight: &[T],
+    dx: RowsMut<'_, T>,
+    write: Write,
+    scratch: &mut [T],
+) {
+    gemm::ab(isa, dy, Rows::packed(weight, dy.cols(), dx.cols()), dx, write, scratch);
 }
 
 /// dW {=, +=} dyᵀ·x, `[out, in]`.
-pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, dweight: &mut [T], write: Write, scratch: &mut [T]) {
-    gemm::atb(level, dy, x, RowsMut::packed(dweight, dy.cols(), x.cols()), write, scratch);
+pub fn backward_weight<T: Real>(
+    isa: InstructionSet,
+    x: Rows<'_, T>,
+    dy: Rows<'_, T>,
+    dweight: &mut [T],
+    write: Write,
+    scratch: &mut [T],
+) {
+    gemm::atb(isa, dy, x, RowsMut::packed(dweight, dy.cols(), x.cols()), write, scratch);
 }
 
 /// db {=, +=} Σ_rows dy, `[out]`.
-pub fn backward_bias<T: Real>(level: Level, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
+pub fn backward_bias<T: Real>(isa: InstructionSet, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     assert_eq!(dy.cols(), dbias.len(), "bias gradient");
-    T::linear_sum_rows(level, SumRows { x: dy, total: dbias, write });
+    T::linear_sum_rows(isa, SumRows { x: dy, total: dbias, write });
 }
 
 pub(crate) struct SumRows<'a, T> {
@@ -79,21 +100,19 @@ mod tests {
         let ones = Matrix::<T>::filled((rows, 1), 0, 0, |_, _| T::ONE);
         let mut db = Matrix::<T>::poisoned(0, (1, outputs));
         reference::gemm_atb(ones.view(), dy.view(), db.view_mut());
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(rows, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (rows, outputs));
-            forward(level, x.view(), &weight, Some(&bias), y.view_mut(), &mut scratch);
+            forward(isa, x.view(), &weight, Some(&bias), y.view_mut(), &mut scratch);
             assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
-            forward(level, x.view(), &weight, None, y.view_mut(), &mut scratch);
+            forward(isa, x.view(), &weight, None, y.view_mut(), &mut scratch);
             assert_near("y without bias", &y.to_vec(), &product.to_vec(), Tolerance::Close);
             y.check_gaps();
-            check_writes("dx", &dx, Tolerance::Close, |dx, write| {
-                backward_input(level, dy.view(), &weight, dx, write, &mut scratch)
-            });
+            check_writes("dx", &dx, Tolerance::Close, |dx, write| backward_input(isa, dy.view(), &weight, dx, write, &mut scratch));
             check_writes("dW", &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
+                backward_weight(isa, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
             });
-            check_writes("db", &db, Tolerance::Close, |mut db, write| backward_bias(level, dy.view(), db.row_mut(0), write));
+            check_writes("db", &db, Tolerance::Close, |mut db, write| backward_bias(isa, dy.view(), db.row_mut(0), write));
         }
     }
 

@@ -3,8 +3,8 @@
 //! With weight = 1/B it is the mean over samples of the squared norm over channels (paper eq. 13); with one over the number of
 //! elements, PyTorch's mean squared error. y, target `[n, C]`.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// weight·Σ (y − target)², summed in f64.
@@ -16,7 +16,7 @@ pub fn squared_error<T: Real>(y: Rows<'_, T>, target: Rows<'_, T>, weight: f64) 
 
 /// dy {=, +=} 2·weight·(y − target).
 pub fn squared_error_gradient<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     y: Rows<'_, T>,
     target: Rows<'_, T>,
     weight: f64,
@@ -25,7 +25,7 @@ pub fn squared_error_gradient<T: Real>(
 ) {
     same_shape(&y, &target);
     same_shape(&y, &dy.view());
-    T::loss_gradient(level, Gradient { y, target, factor: T::of(2.0 * weight), dy, write });
+    T::loss_gradient(isa, Gradient { y, target, factor: T::of(2.0 * weight), dy, write });
 }
 
 pub(crate) struct Gradient<'a, T> {
@@ -66,9 +66,9 @@ mod tests {
             let expected: f64 = y.to_vec().iter().zip(target.to_vec()).map(|(y, t)| weight * (y - t) * (y - t)).sum();
             assert_near("value", &[squared_error(y.view(), target.view(), weight)], &[expected], Tolerance::Close);
             let gradient = Matrix::filled((rows, cols), 0, 0, |i, j| 2.0 * weight * (y.view().row(i)[j] - target.view().row(i)[j]));
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 check_writes("gradient", &gradient, Tolerance::Close, |dy, write| {
-                    squared_error_gradient(level, y.view(), target.view(), weight, dy, write);
+                    squared_error_gradient(isa, y.view(), target.view(), weight, dy, write);
                 });
             }
         }

@@ -13,7 +13,7 @@
 //! steps and then forms every weight gradient as one product.
 
 use crate::elementary::{or_zero, sigmoid, tanh};
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Rows, RowsMut, Write, gemm, linear};
 
 /// Results of the vector–matrix product that are formed at a time: eight registers of 256 bits in f32.
@@ -52,7 +52,7 @@ pub const fn backward_scratch_len(hidden: usize) -> usize {
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     weights: Weights<'_, T>,
     h: RowsMut<'_, T>,
@@ -70,10 +70,10 @@ pub fn forward<T: Real>(
     let (bias, rest) = scratch.split_at_mut(wide);
     bias.iter_mut().zip(weights.input_bias).zip(weights.recurrent_bias).for_each(|((sum, a), b)| *sum = *a + *b);
     let (packed, rest) = rest.split_at_mut(packed_len(hidden, wide));
-    linear::forward(level, x, weights.input, Some(bias), gates.reborrow(), rest);
+    linear::forward(isa, x, weights.input, Some(bias), gates.reborrow(), rest);
     // W_hᵀ: element (j, o) is W_h[o, j].
     pack(packed, hidden, wide, |j, o| weights.recurrent[o * hidden + j]);
-    T::lstm_forward(level, Forward { packed, h, gates, cells });
+    T::lstm_forward(isa, Forward { packed, h, gates, cells });
 }
 
 /// Packs b `[depth, n]` into blocks of columns, the last one filled up with zeros.
@@ -145,7 +145,7 @@ impl<T: Real> Kernel for Forward<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_gates<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     recurrent: &[T],
     gates: Rows<'_, T>,
     cells: Rows<'_, T>,
@@ -159,7 +159,7 @@ pub fn backward_gates<T: Real>(
     let (packed, rest) = scratch.split_at_mut(packed_len(4 * hidden, hidden));
     let (dh, rest) = rest.split_at_mut(hidden);
     pack(packed, 4 * hidden, hidden, |o, j| recurrent[o * hidden + j]);
-    T::lstm_backward(level, Backward { packed, gates, cells, dy, dgates, dh, dc: &mut rest[..hidden] });
+    T::lstm_backward(isa, Backward { packed, gates, cells, dy, dgates, dh, dc: &mut rest[..hidden] });
 }
 
 pub(crate) struct Backward<'a, T> {
@@ -208,11 +208,11 @@ impl<T: Real> Kernel for Backward<'_, T> {
 }
 
 /// dW_h {=, +=} Σ_t dgates(t)·h(t−1)ᵀ, `[4h, h]`.
-pub fn backward_recurrent<T: Real>(level: Level, h: Rows<'_, T>, dgates: Rows<'_, T>, dweight: &mut [T], write: Write) {
+pub fn backward_recurrent<T: Real>(isa: InstructionSet, h: Rows<'_, T>, dgates: Rows<'_, T>, dweight: &mut [T], write: Write) {
     let (n, hidden) = (h.rows(), h.cols());
     let dweight = RowsMut::packed(dweight, dgates.cols(), hidden);
     let last = n.saturating_sub(1);
-    gemm::atb(level, dgates.range(1.min(n), n), h.range(0, last), dweight, write, &mut []);
+    gemm::atb(isa, dgates.range(1.min(n), n), h.range(0, last), dweight, write, &mut []);
 }
 
 #[cfg(test)]
@@ -234,18 +234,18 @@ mod tests {
         let dy = Matrix::<T>::random(seed + 5, (n, hidden));
         let expected = reference::lstm(x.view(), weights, dy.view());
         let of = |shape: (usize, usize), values: &[f64]| Matrix::<T>::filled(shape, 0, 0, |i, j| T::of(values[i * shape.1 + j]));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let [mut h, mut cells] = [(); 2].map(|()| Matrix::<T>::poisoned(seed, (n, hidden)));
             let [mut gates, mut dgates] = [(); 2].map(|()| Matrix::<T>::poisoned(seed, (n, wide)));
             let mut scratch = vec![T::NAN; forward_scratch_len(n, inputs, hidden).max(backward_scratch_len(hidden))];
-            forward(level, x.view(), weights, h.view_mut(), gates.view_mut(), cells.view_mut(), &mut scratch);
+            forward(isa, x.view(), weights, h.view_mut(), gates.view_mut(), cells.view_mut(), &mut scratch);
             assert_near("h", &h.to_vec(), &of((n, hidden), &expected.h).to_vec(), Tolerance::Close);
             scratch.fill(T::NAN);
-            backward_gates(level, &recurrent, gates.view(), cells.view(), dy.view(), dgates.view_mut(), &mut scratch);
+            backward_gates(isa, &recurrent, gates.view(), cells.view(), dy.view(), dgates.view_mut(), &mut scratch);
             assert_near("gates", &dgates.to_vec(), &of((n, wide), &expected.dgates).to_vec(), Tolerance::Approximate);
             [&h, &cells, &gates, &dgates].into_iter().for_each(Matrix::check_gaps);
             check_writes("dW_h", &of((1, wide * hidden), &expected.drecurrent), Tolerance::Approximate, |mut dw, write| {
-                backward_recurrent(level, h.view(), dgates.view(), dw.row_mut(0), write);
+                backward_recurrent(isa, h.view(), dgates.view(), dw.row_mut(0), write);
             });
         }
     }

@@ -7,8 +7,8 @@
 //! x, y `[n, C]`. The backward pass is the exact adjoint, the padding's share folded into the two end rows.
 //! A running sum over time, every channel a lane; it starts afresh every `RESTART` rows, so that rounding does not build up.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Rows after which the running sum is formed anew.
@@ -24,11 +24,11 @@ pub const fn scratch_len(rows: usize, channels: usize) -> usize {
 ///
 /// # Panics
 /// If `width` is even or 0, or the shapes differ.
-pub fn forward<T: Real>(level: Level, width: usize, x: Rows<'_, T>, y: RowsMut<'_, T>, scratch: &mut [T]) {
+pub fn forward<T: Real>(isa: InstructionSet, width: usize, x: Rows<'_, T>, y: RowsMut<'_, T>, scratch: &mut [T]) {
     assert!(width % 2 == 1, "a centred moving average has an odd width, not {width}");
     same_shape(&x, &y.view());
     T::moving_average(
-        level,
+        isa,
         Average { half: width / 2, ends: Ends::Repeated, x, y, write: Write::Set, sum: &mut scratch[..x.cols()] },
     );
 }
@@ -37,10 +37,10 @@ pub fn forward<T: Real>(level: Level, width: usize, x: Rows<'_, T>, y: RowsMut<'
 ///
 /// # Panics
 /// As [`forward`].
-pub fn backward<T: Real>(level: Level, width: usize, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
+pub fn backward<T: Real>(isa: InstructionSet, width: usize, dy: Rows<'_, T>, dx: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
     assert!(width % 2 == 1, "a centred moving average has an odd width, not {width}");
     same_shape(&dy, &dx.view());
-    T::moving_average(level, Average { half: width / 2, ends: Ends::Folded, x: dy, y: dx, write, sum: &mut scratch[..dy.cols()] });
+    T::moving_average(isa, Average { half: width / 2, ends: Ends::Folded, x: dy, y: dx, write, sum: &mut scratch[..dy.cols()] });
 }
 
 /// What lies beyond the ends.
@@ -130,14 +130,14 @@ mod tests {
         let (mut y_expected, mut dx_expected) = (Matrix::<T>::poisoned(seed, shape), Matrix::<T>::poisoned(seed, shape));
         reference::moving_average(width, x.view(), y_expected.view_mut());
         reference::moving_average_backward(width, x.view(), dx_expected.view_mut());
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(shape.0, shape.1)];
             let mut y = Matrix::<T>::poisoned(seed, shape);
-            forward(level, width, x.view(), y.view_mut(), &mut scratch);
+            forward(isa, width, x.view(), y.view_mut(), &mut scratch);
             y.check_gaps();
             assert_near("forward", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
             check_writes("backward", &dx_expected, Tolerance::Close, |dx, write| {
-                backward(level, width, x.view(), dx, write, &mut scratch);
+                backward(isa, width, x.view(), dx, write, &mut scratch);
             });
         }
     }
@@ -154,8 +154,8 @@ mod tests {
             let (x, dy) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
             let (mut y, mut dx) = (Matrix::<f64>::poisoned(1, (rows, cols)), Matrix::<f64>::poisoned(1, (rows, cols)));
             let mut scratch = vec![f64::NAN; scratch_len(rows, cols)];
-            forward(Level::PLAIN, 2 * half + 1, x.view(), y.view_mut(), &mut scratch);
-            backward(Level::PLAIN, 2 * half + 1, dy.view(), dx.view_mut(), Write::Set, &mut scratch);
+            forward(InstructionSet::PLAIN, 2 * half + 1, x.view(), y.view_mut(), &mut scratch);
+            backward(InstructionSet::PLAIN, 2 * half + 1, dy.view(), dx.view_mut(), Write::Set, &mut scratch);
             let sides = (inner(&y.to_vec(), &dy.to_vec()), inner(&x.to_vec(), &dx.to_vec()));
             assert_near("<Ax, y> and <x, A'y>", &[sides.0], &[sides.1], Tolerance::Close);
         }
@@ -164,9 +164,9 @@ mod tests {
     #[test]
     fn a_constant_stays_and_drift_stays_small() {
         let x = vec![0.1_f32; 5000];
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let (mut y, mut scratch) = (vec![f32::NAN; 5000], [f32::NAN; 1]);
-            forward(level, 25, Rows::packed(&x, 5000, 1), RowsMut::packed(&mut y, 5000, 1), &mut scratch);
+            forward(isa, 25, Rows::packed(&x, 5000, 1), RowsMut::packed(&mut y, 5000, 1), &mut scratch);
             assert_near("constant", &y, &x, Tolerance::Close);
         }
     }
@@ -174,6 +174,6 @@ mod tests {
     #[test]
     #[should_panic(expected = "odd width")]
     fn an_even_width_is_refused() {
-        forward(Level::PLAIN, 4, Rows::packed(&[0.0_f64; 3], 3, 1), RowsMut::packed(&mut [0.0; 3], 3, 1), &mut [0.0]);
+        forward(InstructionSet::PLAIN, 4, Rows::packed(&[0.0_f64; 3], 3, 1), RowsMut::packed(&mut [0.0; 3], 3, 1), &mut [0.0]);
     }
 }

@@ -5,7 +5,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::vector::Vector;
 
 /// Multiply-adds in a row of each accumulator, in one timed piece: about a millisecond.
@@ -18,14 +18,14 @@ const WIDTH: usize = 12;
 const PIECES: usize = 30;
 
 /// 10⁹ operations a second in f32, an addition and a multiplication counted as two.
-pub fn f32_gflops(level: Level) -> f64 {
-    (0..PIECES).map(|_| piece(level)).fold(0.0, f64::max)
+pub fn f32_gflops(isa: InstructionSet) -> f64 {
+    (0..PIECES).map(|_| piece(isa)).fold(0.0, f64::max)
 }
 
-fn piece(level: Level) -> f64 {
+fn piece(isa: InstructionSet) -> f64 {
     let mut sum = [0.0_f32; 2];
     let start = Instant::now();
-    level.run(Chain { result: &mut sum });
+    isa.run(Chain { result: &mut sum });
     let seconds = start.elapsed().as_secs_f64();
     let [result, lanes] = black_box(sum);
     assert!(result.is_finite(), "the chain converges to 1");
@@ -62,9 +62,9 @@ mod tests {
 
     #[test]
     fn every_level_has_a_peak() {
-        for level in Level::available() {
-            let found = f32_gflops(level);
-            println!("{level}: {found:.1} GFLOP/s");
+        for isa in InstructionSet::available() {
+            let found = f32_gflops(isa);
+            println!("{isa}: {found:.1} GFLOP/s");
             assert!(found > 0.0 && found.is_finite());
         }
     }

@@ -7,8 +7,8 @@
 //! x `[n, C]`, y `[rows, C]`. Beyond the ends a maximum sees −∞ and a mean sees zeros (and divides by the width all the same), as in
 //! PyTorch. The maximum's gradient goes to the first of several equal rows; it is found again from x and y.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::fill;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::fill;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// Windows.
@@ -59,9 +59,9 @@ fn check<T>(geometry: Geometry, x: &Rows<'_, T>, y: &Rows<'_, T>) {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn forward<T: Real>(level: Level, pool: Pool, geometry: Geometry, x: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn forward<T: Real>(isa: InstructionSet, pool: Pool, geometry: Geometry, x: Rows<'_, T>, y: RowsMut<'_, T>) {
     check(geometry, &x, &y.view());
-    T::pool_forward(level, Forward { pool, geometry, x, y });
+    T::pool_forward(isa, Forward { pool, geometry, x, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -103,7 +103,7 @@ impl<T: Real> Kernel for Forward<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     pool: Pool,
     geometry: Geometry,
     (x, y): (Rows<'_, T>, Rows<'_, T>),
@@ -116,7 +116,7 @@ pub fn backward<T: Real>(
     if write == Write::Set {
         fill(dx.reborrow(), T::ZERO);
     }
-    T::pool_backward(level, Backward { pool, geometry, x, y, rest: &mut scratch[..dy.cols()], dy, dx });
+    T::pool_backward(isa, Backward { pool, geometry, x, y, rest: &mut scratch[..dy.cols()], dy, dx });
 }
 
 pub(crate) struct Backward<'a, T> {
@@ -175,15 +175,15 @@ mod tests {
         for pool in [Pool::Max, Pool::Mean] {
             let (y_expected, dx) = reference::pool(geometry, pool == Pool::Max, x.view(), dy.view());
             let dx = Matrix::<T>::filled(shape, 0, 0, |i, j| T::of(dx[i * shape.1 + j]));
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut y = Matrix::<T>::poisoned(seed, after);
-                forward(level, pool, geometry, x.view(), y.view_mut());
+                forward(isa, pool, geometry, x.view(), y.view_mut());
                 y.check_gaps();
                 let expected: Vec<T> = y_expected.iter().map(|y| T::of(*y)).collect();
                 assert_near(&format!("{pool:?}"), &y.to_vec(), &expected, Tolerance::Close);
                 let mut scratch = vec![T::NAN; shape.1];
                 check_writes(&format!("d{pool:?}"), &dx, Tolerance::Close, |dx, write| {
-                    backward(level, pool, geometry, (x.view(), y.view()), dy.view(), dx, write, &mut scratch);
+                    backward(isa, pool, geometry, (x.view(), y.view()), dy.view(), dx, write, &mut scratch);
                 });
             }
         }

@@ -13,9 +13,9 @@
 //! With u = L_Q this is attention.
 
 use crate::elementary::exp;
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::random::Stream;
-use crate::rows::{copy, fill};
+use crate::strided::{copy, fill};
 use crate::{Real, Rows, RowsMut, Write, gemm};
 
 /// Heads, sampling factor, mask.
@@ -56,7 +56,7 @@ impl Sparse {
 /// # Panics
 /// If shapes disagree.
 pub fn forward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     sparse: Sparse,
     stream: Stream,
     q: Rows<'_, T>,
@@ -71,8 +71,8 @@ pub fn forward<T: Real>(
     assert!(q.cols() == heads * size && k.cols() == q.cols() && v.cols() == q.cols() && v.rows() == keys, "prob_sparse: shapes");
     assert!(!sparse.masked || queries == keys, "prob_sparse: a mask takes as many queries as keys");
     let (scores, scratch) = scratch.split_at_mut(heads * queries);
-    T::prob_sparse_scores(level, Scores { sparse, stream, q, k, scores: &mut *scores });
-    T::prob_sparse_rest(level, Rest { masked: sparse.masked, v, o: o.reborrow() });
+    T::prob_sparse_scores(isa, Scores { sparse, stream, q, k, scores: &mut *scores });
+    T::prob_sparse_rest(isa, Rest { masked: sparse.masked, v, o: o.reborrow() });
     let (chosen, probabilities) = kept.split_at_mut(heads * count);
     let (gathered, scratch) = scratch.split_at_mut(count * size);
     let (result, scratch) = scratch.split_at_mut(count * size);
@@ -82,11 +82,11 @@ pub fn forward<T: Real>(
         gather(q.columns(h * size, size), chosen, gathered);
         let gathered = Rows::packed(gathered, count, size);
         let mut map = RowsMut::packed(&mut probabilities[h * count * keys..][..count * keys], count, keys);
-        gemm::abt(level, gathered, k.columns(h * size, size), map.reborrow(), Write::Set, scratch);
+        gemm::abt(isa, gathered, k.columns(h * size, size), map.reborrow(), Write::Set, scratch);
         let scale = T::of(1.0 / (size as f64).sqrt());
-        T::prob_sparse_softmax(level, Softmax { scale, chosen: sparse.masked.then_some(&*chosen), map: map.reborrow() });
+        T::prob_sparse_softmax(isa, Softmax { scale, chosen: sparse.masked.then_some(&*chosen), map: map.reborrow() });
         let mut sums = RowsMut::packed(&mut *result, count, size);
-        gemm::ab(level, map.view(), v.columns(h * size, size), sums.reborrow(), Write::Set, scratch);
+        gemm::ab(isa, map.view(), v.columns(h * size, size), sums.reborrow(), Write::Set, scratch);
         for (place, i) in chosen.iter().enumerate() {
             o.row_mut(i.f64() as usize)[h * size..][..size].copy_from_slice(sums.view().row(place));
         }
@@ -223,7 +223,7 @@ impl<T: Real> Kernel for Softmax<'_, T> {
             for x in row.iter_mut() {
                 *x = exp::<T, I>((*x - most) * self.scale);
             }
-            let inverse = T::ONE / crate::sums::of::<T, I>(row, |x| x);
+            let inverse = T::ONE / crate::row_reductions::of::<T, I>(row, |x| x);
             row.iter_mut().for_each(|x| *x *= inverse);
         }
     }
@@ -246,7 +246,7 @@ pub struct Gradients<'a, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     sparse: Sparse,
     q: Rows<'_, T>,
     k: Rows<'_, T>,
@@ -271,7 +271,7 @@ pub fn backward<T: Real>(
     for (h, chosen) in chosen.chunks_exact(count).enumerate() {
         chosen.iter().for_each(|i| taken[h * queries + i.f64() as usize] = T::ZERO);
     }
-    T::prob_sparse_backward_rest(level, BackwardRest { sparse, others: taken, d_o, sum, dv: dv.reborrow() });
+    T::prob_sparse_backward_rest(isa, BackwardRest { sparse, others: taken, d_o, sum, dv: dv.reborrow() });
     let (gathered_q, scratch) = scratch.split_at_mut(count * size);
     let (gathered_o, scratch) = scratch.split_at_mut(count * size);
     let (result, scratch) = scratch.split_at_mut(count * size);
@@ -283,17 +283,17 @@ pub fn backward<T: Real>(
         gather(d_o.columns(start, width), chosen, gathered_o);
         let (q_rows, o_rows) = (Rows::packed(gathered_q, count, size), Rows::packed(gathered_o, count, size));
         let map = Rows::packed(&probabilities[h * count * keys..][..count * keys], count, keys);
-        gemm::atb(level, map, o_rows, dv.reborrow().columns(start, width), Write::Add, scratch);
+        gemm::atb(isa, map, o_rows, dv.reborrow().columns(start, width), Write::Add, scratch);
         let mut dscores = RowsMut::packed(&mut *dmap, count, keys);
-        gemm::abt(level, o_rows, v.columns(start, width), dscores.reborrow(), Write::Set, scratch);
-        T::prob_sparse_backward_softmax(level, BackwardSoftmax { scale, map, dmap: dscores.reborrow() });
-        gemm::atb(level, dscores.view(), q_rows, dk.reborrow().columns(start, width), Write::Add, scratch);
+        gemm::abt(isa, o_rows, v.columns(start, width), dscores.reborrow(), Write::Set, scratch);
+        T::prob_sparse_backward_softmax(isa, BackwardSoftmax { scale, map, dmap: dscores.reborrow() });
+        gemm::atb(isa, dscores.view(), q_rows, dk.reborrow().columns(start, width), Write::Add, scratch);
         let mut sums = RowsMut::packed(&mut *result, count, size);
-        gemm::ab(level, dscores.view(), k.columns(start, width), sums.reborrow(), Write::Set, scratch);
+        gemm::ab(isa, dscores.view(), k.columns(start, width), sums.reborrow(), Write::Set, scratch);
         for (place, i) in chosen.iter().enumerate() {
             let i = i.f64() as usize;
             let to = dq.reborrow().columns(start, width).range(i, i + 1);
-            copy(level, sums.view().range(place, place + 1), to, Write::Add);
+            copy(isa, sums.view().range(place, place + 1), to, Write::Add);
         }
     }
 }
@@ -357,7 +357,7 @@ impl<T: Real> Kernel for BackwardSoftmax<'_, T> {
     fn run<I: Isa>(mut self) {
         for i in 0..self.map.rows() {
             let (map, dmap) = (self.map.row(i), self.dmap.row_mut(i));
-            let mean = crate::sums::dot::<T, I>(map, dmap);
+            let mean = crate::row_reductions::dot::<T, I>(map, dmap);
             dmap.iter_mut().zip(map).for_each(|(d, p)| *d = self.scale * *p * (*d - mean));
         }
     }
@@ -376,11 +376,11 @@ mod tests {
         let (d, stream) = (sparse.heads * size, Stream::new(seed, 1, 2, 3));
         let (q, d_o) = (Matrix::<T>::random(seed, (queries, d)), Matrix::<T>::random(seed + 1, (queries, d)));
         let (k, v) = (Matrix::<T>::random(seed + 2, (keys, d)), Matrix::<T>::random(seed + 3, (keys, d)));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut kept = vec![T::NAN; sparse.kept_len(queries, keys)];
             let mut scratch = vec![T::NAN; sparse.scratch_len(queries, keys, d)];
             let mut o = Matrix::<T>::poisoned(seed, (queries, d));
-            forward(level, sparse, stream, q.view(), k.view(), v.view(), o.view_mut(), &mut kept, &mut scratch);
+            forward(isa, sparse, stream, q.view(), k.view(), v.view(), o.view_mut(), &mut kept, &mut scratch);
             o.check_gaps();
             let count = sparse.chosen(queries);
             let chosen: Vec<usize> = kept[..sparse.heads * count].iter().map(|i| i.f64() as usize).collect();
@@ -405,7 +405,7 @@ mod tests {
                     *[&mut dq, &mut dk, &mut dv][which] = target;
                     let gradients = Gradients { dq, dk, dv, writes };
                     scratch.fill(T::NAN);
-                    backward(level, sparse, q.view(), k.view(), v.view(), d_o.view(), &kept, gradients, &mut scratch);
+                    backward(isa, sparse, q.view(), k.view(), v.view(), d_o.view(), &kept, gradients, &mut scratch);
                 });
             }
         }

@@ -6,7 +6,7 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 
 use crate::compiled::Compiled;
 use crate::elementary::Elementary;
-use crate::vector::Registers;
+use crate::registers::Registers;
 
 /// f32 or f64: one generic source, two instantiations.
 #[rustfmt::skip]

@@ -5,23 +5,23 @@
 //! update:   y = a ± b;    da = dy,  db = ±dy
 //! ```
 //!
-//! All `[n, C]`, any strides. The update is [`crate::rows::add`] and [`crate::rows::subtract`]; its gradients are copies.
+//! All `[n, C]`, any strides. The update is [`crate::strided::add`] and [`crate::strided::subtract`]; its gradients are copies.
 
 use crate::elementary::exp;
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// y = x∘eˢ.
-pub fn scale<T: Real>(level: Level, x: Rows<'_, T>, s: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn scale<T: Real>(isa: InstructionSet, x: Rows<'_, T>, s: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&x, &s);
     same_shape(&x, &y.view());
-    T::sci_scale(level, Scale { x, s, y });
+    T::sci_scale(isa, Scale { x, s, y });
 }
 
 /// dx {=, +=} dy∘eˢ and ds {=, +=} dy∘x∘eˢ.
 pub fn scale_backward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     x: Rows<'_, T>,
     s: Rows<'_, T>,
     dy: Rows<'_, T>,
@@ -34,7 +34,7 @@ pub fn scale_backward<T: Real>(
     same_shape(&x, &dy);
     same_shape(&x, &dx.view());
     same_shape(&x, &ds.view());
-    T::sci_backward(level, Backward { x, s, dy, dx, write_x, ds, write_s });
+    T::sci_backward(isa, Backward { x, s, dy, dx, write_x, ds, write_s });
 }
 
 pub(crate) struct Scale<'a, T> {
@@ -95,19 +95,19 @@ mod tests {
         let y_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&x, i, j) * of(&s, i, j).exp()));
         let dx_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&dy, i, j) * of(&s, i, j).exp()));
         let ds_expected = Matrix::filled(shape, 0, 0, |i, j| T::of(of(&dy, i, j) * of(&x, i, j) * of(&s, i, j).exp()));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut y = Matrix::<T>::poisoned(seed, shape);
-            scale(level, x.view(), s.view(), y.view_mut());
+            scale(isa, x.view(), s.view(), y.view_mut());
             y.check_gaps();
             assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
             for other in crate::testing::WRITES {
                 check_writes("dx", &dx_expected, Tolerance::Close, |dx, write| {
                     let mut ds = Matrix::<T>::random(seed, shape);
-                    scale_backward(level, x.view(), s.view(), dy.view(), dx, write, ds.view_mut(), other);
+                    scale_backward(isa, x.view(), s.view(), dy.view(), dx, write, ds.view_mut(), other);
                 });
                 check_writes("ds", &ds_expected, Tolerance::Close, |ds, write| {
                     let mut dx = Matrix::<T>::random(seed, shape);
-                    scale_backward(level, x.view(), s.view(), dy.view(), dx.view_mut(), other, ds, write);
+                    scale_backward(isa, x.view(), s.view(), dy.view(), dx.view_mut(), other, ds, write);
                 });
             }
         }

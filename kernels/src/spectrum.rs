@@ -11,7 +11,7 @@
 
 use std::cmp::Ordering;
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Rows, RowsMut};
 
 /// Frequencies of a sequence of `n` rows: 1 to this; the mean is none.
@@ -59,10 +59,10 @@ impl Transform {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn amplitudes<T: Real>(level: Level, transform: &Transform, x: Rows<'_, T>, amplitudes: &mut [T], scratch: &mut [T]) {
+pub fn amplitudes<T: Real>(isa: InstructionSet, transform: &Transform, x: Rows<'_, T>, amplitudes: &mut [T], scratch: &mut [T]) {
     let (n, channels) = (x.rows(), x.cols());
     assert!(n == transform.n && amplitudes.len() == frequencies(n), "spectrum: number of rows or frequencies");
-    T::spectrum_amplitudes(level, Amplitudes { transform, x, amplitudes, scratch: &mut scratch[..4 * n * channels] });
+    T::spectrum_amplitudes(isa, Amplitudes { transform, x, amplitudes, scratch: &mut scratch[..4 * n * channels] });
 }
 
 pub(crate) struct Amplitudes<'a, T> {
@@ -138,7 +138,7 @@ fn pass<T: Real, I: Isa>(
 /// # Panics
 /// If shapes disagree.
 pub fn backward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     transform: &Transform,
     f: usize,
     (real, imaginary): (&[T], &[T]),
@@ -157,7 +157,7 @@ pub fn backward<T: Real>(
         let over = if size > T::ZERO { factor / size } else { T::ZERO };
         (unit_real[c], unit_imaginary[c]) = (*re * over, *im * over);
     }
-    T::spectrum_backward(level, Backward { circle: &transform.circle, f, real: unit_real, imaginary: unit_imaginary, dx });
+    T::spectrum_backward(isa, Backward { circle: &transform.circle, f, real: unit_real, imaginary: unit_imaginary, dx });
 }
 
 pub(crate) struct Backward<'a, T> {
@@ -213,9 +213,9 @@ mod tests {
     fn check<T: Real>(n: usize, channels: usize, seed: u64) {
         let (x, transform) = (Matrix::<T>::random(seed, (n, channels)), Transform::new(n));
         let count = frequencies(n);
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let (mut found, mut scratch) = (vec![T::NAN; count], vec![T::NAN; transform.scratch_len(channels)]);
-            amplitudes(level, &transform, x.view(), &mut found, &mut scratch);
+            amplitudes(isa, &transform, x.view(), &mut found, &mut scratch);
             let expected: Vec<T> = (1..=count).map(|f| T::of(reference::amplitude(x.view(), f).0)).collect();
             assert_near("amplitudes", &found, &expected, Tolerance::Close);
             let (real, rest) = scratch.split_at(n * channels);
@@ -224,7 +224,7 @@ mod tests {
                 let mut dx = Matrix::<T>::filled((n, channels), 0, 1, |_, _| T::ZERO);
                 let mut units = vec![T::NAN; 2 * channels];
                 let pair = (&real[row.clone()], &rest[row]);
-                backward(level, &transform, f, pair, T::of(1.5), dx.view_mut(), &mut units);
+                backward(isa, &transform, f, pair, T::of(1.5), dx.view_mut(), &mut units);
                 let expected: Vec<T> = reference::amplitude(x.view(), f).1.iter().map(|dx| T::of(1.5 * dx)).collect();
                 assert_near("gradient", &dx.to_vec(), &expected, Tolerance::Approximate);
             }

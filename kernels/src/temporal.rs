@@ -6,8 +6,8 @@
 //!
 //! x `[H, C]`, W `[P, H]`, b `[P]`, y `[P, C]`. The backward pass reads x and W.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::{Real, Rows, RowsMut, Write, gemm, sums};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::{Real, Rows, RowsMut, Write, gemm, row_reductions};
 
 /// Below this horizon P a product packed for many rows costs more than it saves; the usual P is 1.
 const SMALL: usize = 6;
@@ -23,7 +23,14 @@ pub fn scratch_len(history: usize, horizon: usize, channels: usize) -> usize {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option<&[T]>, mut y: RowsMut<'_, T>, scratch: &mut [T]) {
+pub fn forward<T: Real>(
+    isa: InstructionSet,
+    x: Rows<'_, T>,
+    weight: &[T],
+    bias: Option<&[T]>,
+    mut y: RowsMut<'_, T>,
+    scratch: &mut [T],
+) {
     assert!(bias.is_none_or(|bias| bias.len() == y.rows()), "temporal: length of the bias");
     assert!(x.cols() == y.cols() && weight.len() == y.rows() * x.rows(), "temporal: shapes do not chain");
     for p in 0..y.rows() {
@@ -31,9 +38,9 @@ pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: &[T], bias: Option
     }
     let weight = Rows::packed(weight, y.rows(), x.rows());
     if y.rows() < SMALL {
-        T::temporal_weighted_sum(level, WeightedSum { x, weight, y });
+        T::temporal_weighted_sum(isa, WeightedSum { x, weight, y });
     } else {
-        gemm::ab(level, weight, x, y, Write::Add, scratch);
+        gemm::ab(isa, weight, x, y, Write::Add, scratch);
     }
 }
 
@@ -62,22 +69,36 @@ impl<T: Real> Kernel for WeightedSum<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_input<T: Real>(level: Level, dy: Rows<'_, T>, weight: &[T], dx: RowsMut<'_, T>, write: Write, scratch: &mut [T]) {
+pub fn backward_input<T: Real>(
+    isa: InstructionSet,
+    dy: Rows<'_, T>,
+    weight: &[T],
+    dx: RowsMut<'_, T>,
+    write: Write,
+    scratch: &mut [T],
+) {
     assert!(dx.cols() == dy.cols() && weight.len() == dy.rows() * dx.rows(), "temporal: shapes do not chain");
-    gemm::atb(level, Rows::packed(weight, dy.rows(), dx.rows()), dy, dx, write, scratch);
+    gemm::atb(isa, Rows::packed(weight, dy.rows(), dx.rows()), dy, dx, write, scratch);
 }
 
 /// dW {=, +=} dy·xᵀ, `[P, H]`.
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: Rows<'_, T>, dweight: &mut [T], write: Write, scratch: &mut [T]) {
+pub fn backward_weight<T: Real>(
+    isa: InstructionSet,
+    x: Rows<'_, T>,
+    dy: Rows<'_, T>,
+    dweight: &mut [T],
+    write: Write,
+    scratch: &mut [T],
+) {
     assert!(x.cols() == dy.cols() && dweight.len() == dy.rows() * x.rows(), "temporal: shapes do not chain");
     let dweight = RowsMut::packed(dweight, dy.rows(), x.rows());
     if dy.rows() < SMALL {
-        T::temporal_row_dots(level, RowDots { x, dy, dweight, write });
+        T::temporal_row_dots(isa, RowDots { x, dy, dweight, write });
     } else {
-        gemm::abt(level, dy, x, dweight, write, scratch);
+        gemm::abt(isa, dy, x, dweight, write, scratch);
     }
 }
 
@@ -94,7 +115,7 @@ impl<T: Real> Kernel for RowDots<'_, T> {
     fn run<I: Isa>(mut self) {
         for p in 0..self.dy.rows() {
             for (t, dweight) in self.dweight.row_mut(p).iter_mut().enumerate() {
-                let value = sums::dot::<T, I>(self.dy.row(p), self.x.row(t));
+                let value = row_reductions::dot::<T, I>(self.dy.row(p), self.x.row(t));
                 *dweight = value + if self.write == Write::Add { *dweight } else { T::ZERO };
             }
         }
@@ -105,9 +126,9 @@ impl<T: Real> Kernel for RowDots<'_, T> {
 ///
 /// # Panics
 /// If lengths disagree.
-pub fn backward_bias<T: Real>(level: Level, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
+pub fn backward_bias<T: Real>(isa: InstructionSet, dy: Rows<'_, T>, dbias: &mut [T], write: Write) {
     assert_eq!(dy.rows(), dbias.len(), "temporal: length of the bias gradient");
-    T::temporal_row_sums(level, RowSums { dy, dbias, write });
+    T::temporal_row_sums(isa, RowSums { dy, dbias, write });
 }
 
 pub(crate) struct RowSums<'a, T> {
@@ -120,7 +141,7 @@ impl<T: Real> Kernel for RowSums<'_, T> {
     #[inline(always)]
     fn run<I: Isa>(self) {
         for (p, dbias) in self.dbias.iter_mut().enumerate() {
-            let value = sums::of::<T, I>(self.dy.row(p), |x| x);
+            let value = row_reductions::of::<T, I>(self.dy.row(p), |x| x);
             *dbias = value + if self.write == Write::Add { *dbias } else { T::ZERO };
         }
     }
@@ -149,18 +170,16 @@ mod tests {
         let ones = Matrix::<T>::filled((1, channels), 0, 0, |_, _| T::ONE);
         let mut db = Matrix::<T>::poisoned(0, (1, horizon));
         reference::gemm_abt(ones.view(), dy.view(), db.view_mut());
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(history, horizon, channels)];
             let mut y = Matrix::<T>::poisoned(seed, (horizon, channels));
-            forward(level, x.view(), &weight, Some(&bias), y.view_mut(), &mut scratch);
+            forward(isa, x.view(), &weight, Some(&bias), y.view_mut(), &mut scratch);
             assert_near("y", &y.to_vec(), &y_expected, Tolerance::Close);
-            check_writes("dx", &dx, Tolerance::Close, |dx, write| {
-                backward_input(level, dy.view(), &weight, dx, write, &mut scratch)
-            });
+            check_writes("dx", &dx, Tolerance::Close, |dx, write| backward_input(isa, dy.view(), &weight, dx, write, &mut scratch));
             check_writes("dW", &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(level, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
+                backward_weight(isa, x.view(), dy.view(), dw.row_mut(0), write, &mut scratch);
             });
-            check_writes("db", &db, Tolerance::Close, |mut db, write| backward_bias(level, dy.view(), db.row_mut(0), write));
+            check_writes("db", &db, Tolerance::Close, |mut db, write| backward_bias(isa, dy.view(), db.row_mut(0), write));
         }
     }
 

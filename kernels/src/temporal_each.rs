@@ -6,7 +6,7 @@
 //!
 //! x `[n, C]`, W `[C, n]`, b and y `[C]`. A few thousand products: what counts is that no transposed copy is made.
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Rows, RowsMut, Write};
 
 fn check<T>(x: (usize, usize), weight: &Rows<'_, T>, y: usize) {
@@ -17,9 +17,9 @@ fn check<T>(x: (usize, usize), weight: &Rows<'_, T>, y: usize) {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn forward<T: Real>(level: Level, x: Rows<'_, T>, weight: Rows<'_, T>, bias: &[T], y: &mut [T]) {
+pub fn forward<T: Real>(isa: InstructionSet, x: Rows<'_, T>, weight: Rows<'_, T>, bias: &[T], y: &mut [T]) {
     check((x.rows(), x.cols()), &weight, y.len());
-    T::temporal_each_forward(level, Forward { x, weight, bias, y });
+    T::temporal_each_forward(isa, Forward { x, weight, bias, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -45,9 +45,9 @@ impl<T: Real> Kernel for Forward<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_input<T: Real>(level: Level, weight: Rows<'_, T>, dy: &[T], dx: RowsMut<'_, T>, write: Write) {
+pub fn backward_input<T: Real>(isa: InstructionSet, weight: Rows<'_, T>, dy: &[T], dx: RowsMut<'_, T>, write: Write) {
     check((dx.rows(), dx.cols()), &weight, dy.len());
-    T::temporal_each_backward_input(level, BackwardInput { weight, dy, dx, write });
+    T::temporal_each_backward_input(isa, BackwardInput { weight, dy, dx, write });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -73,9 +73,9 @@ impl<T: Real> Kernel for BackwardInput<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_weight<T: Real>(level: Level, x: Rows<'_, T>, dy: &[T], dweight: RowsMut<'_, T>, write: Write) {
+pub fn backward_weight<T: Real>(isa: InstructionSet, x: Rows<'_, T>, dy: &[T], dweight: RowsMut<'_, T>, write: Write) {
     check((x.rows(), x.cols()), &dweight.view(), dy.len());
-    T::temporal_each_backward_weight(level, BackwardWeight { x, dy, dweight, write });
+    T::temporal_each_backward_weight(isa, BackwardWeight { x, dy, dweight, write });
 }
 
 pub(crate) struct BackwardWeight<'a, T> {
@@ -112,12 +112,12 @@ mod tests {
         let expected: Vec<T> = (0..channels).map(|c| T::of(bias[c].f64() + sum(c))).collect();
         let dx = Matrix::<T>::filled((n, channels), 0, 0, |t, c| weight.view().row(c)[t] * dy[c]);
         let dw = Matrix::<T>::filled((channels, n), 0, 0, |c, t| x.view().row(t)[c] * dy[c]);
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut y = vec![T::NAN; channels];
-            forward(level, x.view(), weight.view(), &bias, &mut y);
+            forward(isa, x.view(), weight.view(), &bias, &mut y);
             assert_near("y", &y, &expected, Tolerance::Close);
-            check_writes("dx", &dx, Tolerance::Close, |dx, write| backward_input(level, weight.view(), &dy, dx, write));
-            check_writes("dW", &dw, Tolerance::Close, |dw, write| backward_weight(level, x.view(), &dy, dw, write));
+            check_writes("dx", &dx, Tolerance::Close, |dx, write| backward_input(isa, weight.view(), &dy, dx, write));
+            check_writes("dW", &dw, Tolerance::Close, |dw, write| backward_weight(isa, x.view(), &dy, dw, write));
         }
     }
 

@@ -10,7 +10,7 @@
 //!
 //! Not here: blocking for the caches (gemm.rs), shapes, dispatch.
 
-use crate::level::{Isa, Tiled};
+use crate::instruction_set::{Isa, Tiled};
 use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 

@@ -7,18 +7,18 @@
 //!
 //! v, w `[out, n]`, g `[out]`: for a convolution n = in·taps. A direction of length 0 gives what is not a number, as in PyTorch.
 
-use crate::level::{Isa, Kernel, Level};
-use crate::rows::same_shape;
-use crate::{Real, Rows, RowsMut, Write, sums};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
+use crate::strided::same_shape;
+use crate::{Real, Rows, RowsMut, Write, row_reductions};
 
 /// w from v and g.
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn forward<T: Real>(level: Level, v: Rows<'_, T>, g: &[T], w: RowsMut<'_, T>) {
+pub fn forward<T: Real>(isa: InstructionSet, v: Rows<'_, T>, g: &[T], w: RowsMut<'_, T>) {
     same_shape(&v, &w.view());
     assert_eq!(v.rows(), g.len(), "weight norm: number of lengths");
-    T::weight_norm_forward(level, Forward { v, g, w });
+    T::weight_norm_forward(isa, Forward { v, g, w });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -32,7 +32,7 @@ impl<T: Real> Kernel for Forward<'_, T> {
     fn run<I: Isa>(mut self) {
         for (o, g) in self.g.iter().enumerate() {
             let v = self.v.row(o);
-            let factor = *g / sums::dot::<T, I>(v, v).sqrt();
+            let factor = *g / row_reductions::dot::<T, I>(v, v).sqrt();
             self.w.row_mut(o).iter_mut().zip(v).for_each(|(w, v)| *w = factor * *v);
         }
     }
@@ -42,11 +42,18 @@ impl<T: Real> Kernel for Forward<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_direction<T: Real>(level: Level, v: Rows<'_, T>, g: &[T], dw: Rows<'_, T>, dv: RowsMut<'_, T>, write: Write) {
+pub fn backward_direction<T: Real>(
+    isa: InstructionSet,
+    v: Rows<'_, T>,
+    g: &[T],
+    dw: Rows<'_, T>,
+    dv: RowsMut<'_, T>,
+    write: Write,
+) {
     same_shape(&v, &dw);
     same_shape(&v, &dv.view());
     assert_eq!(v.rows(), g.len(), "weight norm: number of lengths");
-    T::weight_norm_direction(level, Direction { v, g, dw, dv, write });
+    T::weight_norm_direction(isa, Direction { v, g, dw, dv, write });
 }
 
 pub(crate) struct Direction<'a, T> {
@@ -62,8 +69,8 @@ impl<T: Real> Kernel for Direction<'_, T> {
     fn run<I: Isa>(mut self) {
         for (o, g) in self.g.iter().enumerate() {
             let (v, dw) = (self.v.row(o), self.dw.row(o));
-            let square = sums::dot::<T, I>(v, v);
-            let (factor, along) = (*g / square.sqrt(), sums::dot::<T, I>(v, dw) / square);
+            let square = row_reductions::dot::<T, I>(v, v);
+            let (factor, along) = (*g / square.sqrt(), row_reductions::dot::<T, I>(v, dw) / square);
             let pairs = self.dv.row_mut(o).iter_mut().zip(v.iter().zip(dw));
             match self.write {
                 Write::Set => pairs.for_each(|(dv, (v, dw))| *dv = factor * (*dw - *v * along)),
@@ -77,10 +84,10 @@ impl<T: Real> Kernel for Direction<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree.
-pub fn backward_length<T: Real>(level: Level, v: Rows<'_, T>, dw: Rows<'_, T>, dg: &mut [T], write: Write) {
+pub fn backward_length<T: Real>(isa: InstructionSet, v: Rows<'_, T>, dw: Rows<'_, T>, dg: &mut [T], write: Write) {
     same_shape(&v, &dw);
     assert_eq!(v.rows(), dg.len(), "weight norm: number of lengths");
-    T::weight_norm_length(level, Length { v, dw, dg, write });
+    T::weight_norm_length(isa, Length { v, dw, dg, write });
 }
 
 pub(crate) struct Length<'a, T> {
@@ -95,7 +102,7 @@ impl<T: Real> Kernel for Length<'_, T> {
     fn run<I: Isa>(self) {
         for (o, dg) in self.dg.iter_mut().enumerate() {
             let (v, dw) = (self.v.row(o), self.dw.row(o));
-            let value = sums::dot::<T, I>(v, dw) / sums::dot::<T, I>(v, v).sqrt();
+            let value = row_reductions::dot::<T, I>(v, dw) / row_reductions::dot::<T, I>(v, v).sqrt();
             *dg = value + if self.write == Write::Add { *dg } else { T::ZERO };
         }
     }
@@ -116,14 +123,14 @@ mod tests {
         let mut dg = Matrix::<T>::poisoned(0, (1, shape.0));
         reference::weight_norm(v.view(), &g, w_expected.view_mut());
         reference::weight_norm_backward(v.view(), &g, dw.view(), dv.view_mut(), dg.view_mut().row_mut(0));
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let mut w = Matrix::<T>::poisoned(seed, shape);
-            forward(level, v.view(), &g, w.view_mut());
+            forward(isa, v.view(), &g, w.view_mut());
             w.check_gaps();
             assert_near("w", &w.to_vec(), &w_expected.to_vec(), Tolerance::Close);
-            check_writes("dv", &dv, Tolerance::Close, |dv, write| backward_direction(level, v.view(), &g, dw.view(), dv, write));
+            check_writes("dv", &dv, Tolerance::Close, |dv, write| backward_direction(isa, v.view(), &g, dw.view(), dv, write));
             check_writes("dg", &dg, Tolerance::Close, |mut dg, write| {
-                backward_length(level, v.view(), dw.view(), dg.row_mut(0), write);
+                backward_length(isa, v.view(), dw.view(), dg.row_mut(0), write);
             });
         }
     }

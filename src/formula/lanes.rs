@@ -53,11 +53,11 @@ impl Machine {
     /// [`Machine::inputs`].
     pub fn advance_lanes<'a>(&mut self, lanes: &mut Lanes, count: usize, input: &dyn Fn(usize) -> &'a [f64]) {
         self.evaluate(count, input, &mut |index, recalled| {
-            let Recalled { level, signal, number, tangents, out } = recalled;
+            let Recalled { isa, signal, number, tangents, out } = recalled;
             for (lane, memory) in lanes.memory[index].iter_mut().enumerate().take(count) {
                 let one = lane..lane + 1;
                 let tangents = tangents.map(|tangent| &tangent[one.clone()]);
-                memory.run(level, &signal[one.clone()], &number[one.clone()], tangents, &mut out[one]);
+                memory.run(isa, &signal[one.clone()], &number[one.clone()], tangents, &mut out[one]);
             }
         });
     }

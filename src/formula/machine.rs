@@ -6,7 +6,7 @@ use super::memory::{MAX_DELAY_SAMPLES, Memory};
 use super::operation::{History, Operation, whole_power_of_column};
 use super::{Formula, Value};
 use crate::error::{Error, Result};
-use phyture_kernels::Level;
+use phyture_kernels::InstructionSet;
 use std::borrow::Cow;
 
 /// Longest run of samples that is evaluated at once …
@@ -31,7 +31,7 @@ enum Step {
 
 /// The columns that an operator which remembers reads at the samples at hand, and the one that it fills.
 pub(super) struct Recalled<'a> {
-    pub level: Level,
+    pub isa: InstructionSet,
     pub signal: &'a [f64],
     /// Time or limit.
     pub number: &'a [f64],
@@ -51,7 +51,7 @@ pub struct Machine {
     /// Index in the graph's inputs of each column that is read; those of values that are given follow them.
     inputs: Vec<usize>,
     block: usize,
-    level: Level,
+    isa: InstructionSet,
     pub(super) step_s: f64,
 }
 
@@ -121,7 +121,7 @@ impl Machine {
             roots: Vec::new(),
             inputs: Vec::new(),
             block: 0,
-            level: Level::detect().map_err(Error::level)?,
+            isa: InstructionSet::detect().map_err(Error::level)?,
             step_s,
         };
         let mut slots = Slots { count: 0, free: Vec::new(), of: vec![None; graph.nodes.len()] };
@@ -216,8 +216,8 @@ impl Machine {
         let Self { memory, .. } = self;
         let mut memory = std::mem::take(memory);
         self.evaluate(samples, input, &mut |index, recalled| {
-            let Recalled { level, signal, number, tangents, out } = recalled;
-            memory[index].run(level, signal, number, tangents, out);
+            let Recalled { isa, signal, number, tangents, out } = recalled;
+            memory[index].run(isa, signal, number, tangents, out);
         });
         self.memory = memory;
     }
@@ -230,7 +230,7 @@ impl Machine {
         recall: &mut dyn FnMut(usize, Recalled<'_>),
     ) {
         assert!(samples <= self.block, "{samples} samples at once, at most {}", self.block);
-        let Self { steps, columns, level, .. } = self;
+        let Self { steps, columns, isa, .. } = self;
         for step in steps {
             let (Step::Input { out, .. }
             | Step::One { out, .. }
@@ -242,12 +242,12 @@ impl Machine {
             let column = |slot: Slot| &columns[slot as usize][..samples];
             match *step {
                 Step::Input { input: index, .. } => values.copy_from_slice(input(index as usize)),
-                Step::One { operation, x, .. } => operation.of_column(*level, column(x), values),
-                Step::Two { operation, x, y, .. } => operation.of_columns(*level, column(x), column(y), values),
-                Step::PowerInteger { x, exponent, .. } => whole_power_of_column(*level, exponent, column(x), values),
+                Step::One { operation, x, .. } => operation.of_column(*isa, column(x), values),
+                Step::Two { operation, x, y, .. } => operation.of_columns(*isa, column(x), column(y), values),
+                Step::PowerInteger { x, exponent, .. } => whole_power_of_column(*isa, exponent, column(x), values),
                 Step::Recall { memory: index, x, number, tangents, .. } => {
                     let (signal, number, tangents) = (column(x), column(number), tangents.map(column));
-                    recall(index as usize, Recalled { level: *level, signal, number, tangents, out: values });
+                    recall(index as usize, Recalled { isa: *isa, signal, number, tangents, out: values });
                 }
             }
             columns[out as usize] = result;

@@ -6,7 +6,7 @@
 
 use super::graph::Recall;
 use super::operation::History;
-use phyture_kernels::{Level, columns};
+use phyture_kernels::{InstructionSet, columns};
 
 impl History {
     /// Number of arguments.
@@ -138,7 +138,7 @@ impl Memory {
     }
 
     /// Takes samples in order. `number` is the time or limit, `tangents` are those of the signal and of that; they are read where they vary.
-    pub(super) fn run(&mut self, level: Level, signal: &[f64], number: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
+    pub(super) fn run(&mut self, isa: InstructionSet, signal: &[f64], number: &[f64], tangents: [&[f64]; 2], out: &mut [f64]) {
         let samples = out.iter_mut().zip(signal.iter().copied());
         match self {
             Self::Lag { approach, ramp, last } => {
@@ -189,12 +189,12 @@ impl Memory {
                 if *part == 0.0 {
                     out.copy_from_slice(near);
                 } else {
-                    columns::zip(level, |near, far| near + *part * (far - near), near, far, out);
+                    columns::zip(isa, |near, far| near + *part * (far - near), near, far, out);
                 }
             }
             Self::DelayByTime { whole, step_s, past } => {
                 let (near, far) = past.delayed(*whole, signal);
-                columns::zip(level, |near, far| (far - near) / *step_s, near, far, out);
+                columns::zip(isa, |near, far| (far - near) / *step_s, near, far, out);
             }
             Self::Rate { step_s, last } => {
                 for (out, x) in samples {
@@ -288,7 +288,7 @@ mod tests {
 
     fn recalled(recall: Recall, number: f64, step_s: f64, values: &[f64]) -> Vec<f64> {
         let mut out = vec![0.0; values.len()];
-        Memory::new(recall, Some(number), step_s).run(Level::PLAIN, values, &[], [&[], &[]], &mut out);
+        Memory::new(recall, Some(number), step_s).run(InstructionSet::PLAIN, values, &[], [&[], &[]], &mut out);
         out
     }
 
@@ -312,7 +312,7 @@ mod tests {
             let times: Vec<f64> = (0..=samples).map(|k| (1.0 + step_s * k as f64) / 4.0).collect();
             let mut out = vec![0.0; signal.len()];
             let mut memory = Memory::new(Recall::History(History::Lag), None, step_s);
-            memory.run(Level::PLAIN, &signal, &times, [&[], &[]], &mut out);
+            memory.run(InstructionSet::PLAIN, &signal, &times, [&[], &[]], &mut out);
             (out[samples] - 1.0 / 16.0).abs()
         };
         assert!(error(1e-3) < 1e-3 && error(1e-4) < 0.11 * error(1e-3), "{:e} {:e}", error(1e-3), error(1e-4));
@@ -323,7 +323,7 @@ mod tests {
         let values: Vec<f64> = (0..300).map(|k| (f64::from(k) * 0.13).sin()).collect();
         let mut out = vec![0.0; values.len()];
         let mut memory = Memory::new(Recall::History(History::Lag), None, STEP_S);
-        memory.run(Level::PLAIN, &values, &[0.04; 300], [&[], &[]], &mut out);
+        memory.run(InstructionSet::PLAIN, &values, &[0.04; 300], [&[], &[]], &mut out);
         assert_eq!(out, run(History::Lag, 0.04, &values));
     }
 

@@ -1,6 +1,6 @@
 //! The words of the grammar: operators and functions, their names, argument counts and what they compute. No parsing here.
 
-use phyture_kernels::{Level, columns};
+use phyture_kernels::{InstructionSet, columns};
 
 /// An operation without memory: its result depends on this sample's operands alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -262,25 +262,25 @@ impl Operation {
     }
 
     /// Of one column.
-    pub(super) fn of_column(self, level: Level, x: &[f64], out: &mut [f64]) {
-        with_unary!(self, f => columns::map(level, f, x, out));
+    pub(super) fn of_column(self, isa: InstructionSet, x: &[f64], out: &mut [f64]) {
+        with_unary!(self, f => columns::map(isa, f, x, out));
     }
 
     /// Of two columns.
-    pub(super) fn of_columns(self, level: Level, x: &[f64], y: &[f64], out: &mut [f64]) {
-        with_binary!(self, f => columns::zip(level, f, x, y, out));
+    pub(super) fn of_columns(self, isa: InstructionSet, x: &[f64], y: &[f64], out: &mut [f64]) {
+        with_binary!(self, f => columns::zip(isa, f, x, y, out));
     }
 }
 
 /// A whole power of a column, with the bits of [`f64::powi`]; those that are common vectorise.
-pub(super) fn whole_power_of_column(level: Level, exponent: i32, x: &[f64], out: &mut [f64]) {
+pub(super) fn whole_power_of_column(isa: InstructionSet, exponent: i32, x: &[f64], out: &mut [f64]) {
     match exponent {
-        2 => columns::map(level, |x| x * x, x, out),
-        3 => columns::map(level, |x| x * (x * x), x, out),
-        4 => columns::map(level, |x| (x * x) * (x * x), x, out),
-        -1 => columns::map(level, |x| 1.0 / x, x, out),
-        -2 => columns::map(level, |x| 1.0 / (x * x), x, out),
-        _ => columns::map(level, |x| x.powi(exponent), x, out),
+        2 => columns::map(isa, |x| x * x, x, out),
+        3 => columns::map(isa, |x| x * (x * x), x, out),
+        4 => columns::map(isa, |x| (x * x) * (x * x), x, out),
+        -1 => columns::map(isa, |x| 1.0 / x, x, out),
+        -2 => columns::map(isa, |x| 1.0 / (x * x), x, out),
+        _ => columns::map(isa, |x| x.powi(exponent), x, out),
     }
 }
 
@@ -303,13 +303,13 @@ mod tests {
     fn columns_are_numbers_one_by_one() {
         let (x, y) = ([0.5, -2.0, 3.0], [2.0, 0.25, -1.0]);
         let mut out = [0.0; 3];
-        for level in Level::available() {
-            Operation::Atan2.of_columns(level, &x, &y, &mut out);
+        for isa in InstructionSet::available() {
+            Operation::Atan2.of_columns(isa, &x, &y, &mut out);
             assert_eq!(out, std::array::from_fn(|index| Operation::Atan2.of_two(x[index], y[index])));
-            Operation::Tanh.of_column(level, &x, &mut out);
+            Operation::Tanh.of_column(isa, &x, &mut out);
             assert_eq!(out, x.map(f64::tanh));
             for exponent in -16..=16 {
-                whole_power_of_column(level, exponent, &x, &mut out);
+                whole_power_of_column(isa, exponent, &x, &mut out);
                 assert_eq!(out, x.map(|x| x.powi(exponent)), "{exponent}");
             }
         }

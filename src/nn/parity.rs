@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::tape::{Session, Threads};
 use phyture_kernels::Real;
 use phyture_kernels::adam::{self, Adam};
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -179,9 +179,9 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
         compared.insert(name, (parameter.to_file_order(session.gradients()), reference));
     }
     if file.tensors.keys().any(|name| name.starts_with("adam1.")) {
-        let level = Level::detect().unwrap_or(Level::PLAIN);
+        let isa = InstructionSet::detect().unwrap_or(InstructionSet::PLAIN);
         let (mut first, mut second) = (vec![T::ZERO; parameters.len()], vec![T::ZERO; parameters.len()]);
-        adam::step(level, &Adam::default(), 1, 1.0, session.gradients(), &mut parameters, &mut first, &mut second);
+        adam::step(isa, &Adam::default(), 1, 1.0, session.gradients(), &mut parameters, &mut first, &mut second);
         for parameter in with_gradient {
             let name = format!("adam1.param.{}", parameter.name);
             let reference = tensor(file, &name, &parameter.file_lengths())?;

@@ -7,7 +7,7 @@
 //! without that cluster: the cluster jackknife (MacKinnon, Nielsen & Webb 2023, J. Applied Econometrics 38:671, "CV3"), valid
 //! under any correlation within a cluster.
 
-use crate::student::quantile_975;
+use crate::student_t::quantile_975;
 use nalgebra::{DMatrix, DVector};
 
 /// Rows collected before they are reduced.

@@ -13,7 +13,7 @@ use crate::blocks::Blocks;
 use crate::error::{Error, Result};
 use crate::flight::attitude::rotation_vector;
 use crate::flight::{Flight, Span, Window};
-use crate::student::quantile_975;
+use crate::student_t::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
 

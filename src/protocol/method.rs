@@ -1,5 +1,5 @@
 //! What stands in the rows of the tables: every method by its identifier, with the sizes it is built at. How a row is computed is in
-//! `perform`.
+//! `experiment`.
 //!
 //! Every network takes history and inputs from the plan's Phy-Ture, so that all see the same rows. The peers have the widths that
 //! their authors (or, for the reconstructions, we) recommend; a plan with a narrower Phy-Ture than the paper's narrows all of them by

@@ -5,21 +5,21 @@
 //! moment. Nothing here parses a command line or draws a page.
 
 pub mod estimate;
+pub mod experiment;
 pub mod folder;
 pub mod method;
 pub mod outcome;
 pub mod paper;
-pub mod perform;
 pub mod plan;
 pub mod settings;
 pub mod slurm;
 pub mod table;
 pub mod text;
 
+pub use experiment::Experiment;
 pub use folder::{Folder, instruction_set};
 pub use method::{METHODS, Method, Predictor, method};
 pub use outcome::{Condition, Outcome, Segment, Trace};
-pub use perform::Experiment;
 pub use plan::{Division, Plan, Run, TableId, Treatment};
 pub use settings::Settings;
 pub use slurm::JobArray;

@@ -1,5 +1,5 @@
 //! Tables from outcomes: means and deviations over seeds. Arithmetic alone; how they are written is in `text`, what a run does in
-//! `perform`.
+//! `experiment`.
 
 use super::folder::Folder;
 use super::method::{Method, method};

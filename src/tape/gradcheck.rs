@@ -11,7 +11,7 @@ use super::slab::Slabs;
 use super::threads::Parallelism;
 use super::{DropoutKey, Fill, Graph, Parts, Session, Shape, Threads, Var};
 use crate::error::Error;
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Tolerance, Write};
 use std::fmt;
@@ -92,19 +92,19 @@ struct Trial<'a, T: Real> {
     op: &'a dyn Op<T>,
     shapes: Vec<Shape>,
     result: Shape,
-    level: Level,
+    isa: InstructionSet,
     stream: Option<Stream>,
 }
 
 impl<'a, T: Real> Trial<'a, T> {
-    fn new(op: &'a dyn Op<T>, operands: &[&[usize]], level: Level, stream: Option<Stream>) -> Result<Self, Disagreement> {
+    fn new(op: &'a dyn Op<T>, operands: &[&[usize]], isa: InstructionSet, stream: Option<Stream>) -> Result<Self, Disagreement> {
         let shapes = operands.iter().map(|lengths| Shape::new("gradient check", lengths)).collect::<Result<Vec<_>, _>>()?;
         let result = op.shape(&shapes)?;
-        Ok(Self { op, shapes, result, level, stream })
+        Ok(Self { op, shapes, result, isa, stream })
     }
 
     fn fault(&self, message: String) -> Disagreement {
-        Disagreement { subject: format!("{}{:?} at level {}", self.op.name(), self.shapes, self.level), message }
+        Disagreement { subject: format!("{}{:?} at level {}", self.op.name(), self.shapes, self.isa), message }
     }
 
     fn differentiable(&self) -> Result<&'a dyn Differentiable<T>, Disagreement> {
@@ -133,7 +133,7 @@ impl<'a, T: Real> Trial<'a, T> {
             // Networks' own checks run with packed weights.
             packed: &[],
             shapes: &self.shapes,
-            level: self.level,
+            isa: self.isa,
             parts,
             stream: self.stream,
             coupled: None,
@@ -164,7 +164,7 @@ impl<'a, T: Real> Trial<'a, T> {
             // Networks' own checks run with packed weights.
             packed: &[],
             shapes: &self.shapes,
-            level: self.level,
+            isa: self.isa,
             stream: self.stream,
             coupled: None,
         });
@@ -196,12 +196,12 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 /// The first [`Disagreement`].
 pub fn operation<O: Op<f64> + Op<f32>>(op: &O, operands: &[&[usize]]) -> Checked {
     let random = Some(Stream::new(7, 0, 0, 0));
-    for level in Level::available() {
+    for isa in InstructionSet::available() {
         for stream in [None, random] {
-            let double = Trial::<f64>::new(op, operands, level, stream)?;
+            let double = Trial::<f64>::new(op, operands, isa, stream)?;
             jacobian(&double)?;
             rules(&double)?;
-            let single = Trial::<f32>::new(op, operands, level, stream)?;
+            let single = Trial::<f32>::new(op, operands, isa, stream)?;
             precision(&double, &single)?;
             pieces(&double)?;
             pieces(&single)?;
@@ -456,7 +456,7 @@ mod tests {
             self.op.differentiable().map(|inner| inner.reads()).unwrap_or_default()
         }
         fn backward(&self, io: Backward<'_, T>) {
-            let Backward { x, y, dy, workspace, mut dx, scratch, packed, shapes, level, stream, coupled } = io;
+            let Backward { x, y, dy, workspace, mut dx, scratch, packed, shapes, isa, stream, coupled } = io;
             let Some(inner) = self.op.differentiable() else { return };
             let (Fault::Scaled(at)
             | Fault::Dropped(at)
@@ -468,7 +468,7 @@ mod tests {
             let mut own = vec![T::ZERO; target.values.len()];
             let mut slots: [Option<Gradient<'_, T>>; MAX_OPERANDS] = dx;
             slots[at] = Some(Gradient { values: &mut own, write: Write::Set });
-            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, packed, shapes, level, stream, coupled });
+            inner.backward(Backward { x, y, dy, workspace, dx: slots, scratch, packed, shapes, isa, stream, coupled });
             let write = match self.fault {
                 Fault::Dropped(_) => return,
                 Fault::NeverSets(_) => Write::Add,

@@ -4,7 +4,7 @@
 use super::parts::Parts;
 use super::shape::Shape;
 use crate::error::{Error, Result};
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Rows, Write};
 use std::ops::Range;
@@ -84,7 +84,7 @@ pub struct Forward<'a, T> {
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
-    pub level: Level,
+    pub isa: InstructionSet,
     /// For large operations: in how many pieces to work.
     pub parts: Parts<'a, T>,
     /// Random stream of this operation, step and sample; `None` when random parts are off. Counter-based: the backward pass
@@ -121,7 +121,7 @@ pub struct Backward<'a, T> {
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
-    pub level: Level,
+    pub isa: InstructionSet,
     /// The random stream of the forward pass.
     pub stream: Option<Stream>,
     /// For a [`Coupling`] while training, combined from the parts of the backward pass; otherwise `None`.
@@ -151,7 +151,7 @@ pub struct Pack<'a, T> {
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
-    pub level: Level,
+    pub isa: InstructionSet,
 }
 
 /// An operation: numbers in, numbers out, for one sample.
@@ -183,8 +183,8 @@ pub trait Op<T: Real>: Send + Sync {
         None
     }
 
-    /// How it works on a bundle of samples, if that is worth while for operands of these shapes.
-    fn bundled(&self, _operands: &[Shape]) -> Option<&dyn Bundled<T>> {
+    /// How it works on a micro-batch of samples, if that is worth while for operands of these shapes.
+    fn micro_batched(&self, _operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
         None
     }
 
@@ -195,9 +195,9 @@ pub trait Op<T: Real>: Send + Sync {
 }
 
 /// Most samples that an operation is given at once.
-pub const BUNDLE: usize = 4;
+pub const MICRO_BATCH: usize = 4;
 
-/// Numbers of a weight from which on it is read once for a bundle of samples: with its gradient it fills half of a second-level cache
+/// Numbers of a weight from which on it is read once for a micro-batch of samples: with its gradient it fills half of a second-level cache
 /// of 512 KiB in f32.
 pub(crate) const LARGE_WEIGHT: usize = 1 << 15;
 
@@ -211,26 +211,26 @@ pub struct WeightGradient<'a, T> {
     pub rows: Range<usize>,
     /// Their gradient.
     pub gradient: Gradient<'a, T>,
-    /// Scratch, as [`Bundled::weight_scratch`] says; holds anything.
+    /// Scratch, as [`MicroBatched::weight_scratch`] says; holds anything.
     pub scratch: &'a mut [T],
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
     /// Instruction-set level for the kernels.
-    pub level: Level,
+    pub isa: InstructionSet,
 }
 
 /// An operation with a weight so large that, sample by sample, it would come from memory for each one: it works on some samples at once,
 /// and so do all other operations of its plan, in turn. The gradient of the weight, as large, is made once a step from all samples.
 ///
-/// What a sample gives must not depend on the others in its bundle, to the bit. Operands from [`WEIGHT`] on are parameters, and operand 0
+/// What a sample gives must not depend on the others in its micro-batch, to the bit. Operands from [`WEIGHT`] on are parameters, and operand 0
 /// is none; its backward pass reads it.
-pub trait Bundled<T: Real>: Differentiable<T> {
-    /// [`Op::forward`] for each of 1 to [`BUNDLE`] samples.
-    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]);
+pub trait MicroBatched<T: Real>: Differentiable<T> {
+    /// [`Op::forward`] for each of 1 to [`MICRO_BATCH`] samples.
+    fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]);
 
     /// [`Differentiable::backward`] for each. The gradient of the weight is not asked for; those of the other parameters are those of all
     /// together, and asked of the first sample alone.
-    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]);
+    fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]);
 
     /// Some rows of the gradient of the weight. The bits of a row may depend on which rows are asked for together.
     fn weight_gradient(&self, io: WeightGradient<'_, T>);

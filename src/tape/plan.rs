@@ -6,91 +6,27 @@
 //! 3. The first writer of each gradient sets, later ones add: no pass fills zeros.
 //! 4. From the lifetimes, place buffers greedily by size, first fit, 64-byte aligned.
 //!
-//! Point 4 is in `plan/layout`, the steps are made in `plan/steps`. A plan holds no numbers; `session` replays it.
+//! Points 1 and 2 are in `plan/orders`, point 3 in `plan/steps`, point 4 in `plan/layout`. A plan holds no numbers; `session` replays it.
 
-use super::graph::{Graph, Source, Var};
-use super::op::{BUNDLE, Op};
-use super::shape::Shape;
+use super::graph::{Graph, Var};
+use super::op::MICRO_BATCH;
+use super::slab::alignment;
 use crate::error::{Error, Result};
-use large_weights::{Bundles, complement};
+use large_weights::{MicroBatches, complement};
 use layout::Layout;
-use phyture_kernels::{Real, Write};
+use orders::Orders;
+use phyture_kernels::Real;
 use std::ops::Range;
-use std::sync::Arc;
 use steps::{Direction, Steps};
 
 mod large_weights;
 mod layout;
+mod orders;
+mod step;
 mod steps;
 
 pub(crate) use large_weights::LargeWeight;
-
-/// Alignment of every buffer, bytes: one cache line, one 512-bit vector.
-pub(crate) const ALIGNMENT_BYTES: usize = 64;
-
-/// Most numbers that one sample may take: 4 GiB in f32, some hundred times what the paper's network takes. Sizes that come from a file
-/// meet this bound before any memory is asked for.
-pub(crate) const LARGEST_SLAB: usize = 1 << 30;
-
-/// Elements of `T` in [`ALIGNMENT_BYTES`].
-pub(crate) const fn alignment<T>() -> usize {
-    let size = size_of::<T>();
-    if size == 0 || size > ALIGNMENT_BYTES { 1 } else { ALIGNMENT_BYTES / size }
-}
-
-/// What a piece of the slab is to the step that borrows it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Role {
-    X(usize),
-    Y,
-    Workspace,
-    Scratch,
-    Dy,
-    Dx(usize, Write),
-}
-
-/// A stretch of the slab (or of the flat parameter gradients), borrowed by one step.
-#[derive(Clone, Debug)]
-pub(crate) struct Piece {
-    pub start: usize,
-    pub len: usize,
-    pub role: Role,
-}
-
-impl Piece {
-    fn new(range: Range<usize>, role: Role) -> Self {
-        Self { start: range.start, len: range.len(), role }
-    }
-}
-
-/// One call of one operation.
-pub(crate) struct Step<T> {
-    pub op: Arc<dyn Op<T>>,
-    pub site: u64,
-    pub shapes: Vec<Shape>,
-    /// Disjoint, sorted by start.
-    pub pieces: Vec<Piece>,
-    /// Operands that are parameters, and their place in the flat slab.
-    pub parameters: Vec<(usize, Range<usize>)>,
-    /// Parameter gradients to write, by their place in a shard; disjoint, sorted by start. `Write::Set` means: set for the first sample
-    /// of a shard.
-    pub parameter_gradients: Vec<Piece>,
-    /// The weight's place in the flat slab, and its packed form's place in that of the pass; `None` if nothing is packed.
-    pub packed: Option<(Range<usize>, Range<usize>)>,
-    /// Whether the operation takes some samples at once.
-    pub bundled: bool,
-    /// In the backward list, for the gradient of a large weight.
-    pub kept: Option<Kept>,
-}
-
-/// What of a sample is kept until all samples are through: operand 0 and the gradient of the result.
-#[derive(Clone, Debug)]
-pub(crate) struct Kept {
-    /// Their places in the slab.
-    pub from: [Range<usize>; 2],
-    /// Their places among what is kept of a sample.
-    pub to: [Range<usize>; 2],
-}
+pub(crate) use step::{Piece, Role, Step};
 
 /// What a session replays for each sample.
 pub(crate) struct Plan<T> {
@@ -105,7 +41,7 @@ pub(crate) struct Plan<T> {
     pub loss: Option<(usize, usize)>,
     pub slab_len: usize,
     /// Samples that are in flight together on one worker.
-    pub bundle: usize,
+    pub micro_batch: usize,
     /// Packed weights of the forward and of the backward list, one after another in the order of the list.
     pub packed_len: [usize; 2],
     pub parameter_len: usize,
@@ -145,7 +81,7 @@ impl<T: Real> Plan<T> {
         self.summed.iter().map(|(range, _)| range.len()).sum()
     }
 
-    /// Numbers from one sample's slab to the next one's in a bundle.
+    /// Numbers from one sample's slab to the next one's in a micro-batch.
     pub const fn lane_len(&self) -> usize {
         self.slab_len.next_multiple_of(alignment::<T>())
     }
@@ -153,14 +89,14 @@ impl<T: Real> Plan<T> {
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
         let orders = Orders::of(graph, loss, outputs)?;
         let layout = Layout::of(graph, &orders, loss, outputs)?;
-        let bundles = Bundles::of(graph, &orders.forward, &orders.backward);
-        let mut large_weights = bundles.large_weights(graph);
+        let micro_batches = MicroBatches::of(graph, &orders.forward, &orders.backward);
+        let mut large_weights = micro_batches.large_weights(graph);
         let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
-        let mut steps = Steps::new(graph, &layout, &bundles, &summed);
+        let mut steps = Steps::new(graph, &layout, &micro_batches, &summed);
         let (forward, forward_packed) = steps.list(&orders.forward, Direction::Forward);
         let (mut backward, backward_packed) = steps.list(&orders.backward, Direction::Backward);
         let kept = steps.keep(&orders.backward, &mut backward, &mut large_weights);
-        let is_bundled = forward.iter().any(|step| step.bundled);
+        let is_micro_batched = forward.iter().any(|step| step.micro_batched);
         Ok(Self {
             stretches: [&forward, &backward].map(|steps| stretches(steps)),
             forward,
@@ -170,7 +106,7 @@ impl<T: Real> Plan<T> {
             input_gradients: layout.input_gradients(graph),
             loss: loss.map(|loss| (layout.value(loss.0).start, layout.gradient(loss.0).start)),
             slab_len: layout.slab_len,
-            bundle: if is_bundled { BUNDLE } else { 1 },
+            micro_batch: if is_micro_batched { MICRO_BATCH } else { 1 },
             packed_len: [forward_packed, backward_packed],
             parameter_len: graph.parameter_count(),
             unreached: steps.unreached(),
@@ -184,40 +120,6 @@ impl<T: Real> Plan<T> {
     }
 }
 
-/// Which operations run, in the order of the graph and back.
-struct Orders {
-    forward: Vec<usize>,
-    backward: Vec<usize>,
-    /// By node, whether its gradient is wanted.
-    backpropagated: Vec<bool>,
-}
-
-impl Orders {
-    fn of<T: Real>(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
-        let nodes = &graph.nodes;
-        for var in loss.iter().chain(outputs) {
-            if !graph.node(*var).is_some_and(|node| matches!(node.source, Source::Op { .. })) {
-                let message = "a loss or output that no operation of this graph computes".into();
-                return Err(Error::Shape { operation: "plan", message });
-            }
-        }
-        let needed = ancestors(graph, loss.iter().chain(outputs).map(|var| var.0));
-        let backpropagated = loss.map_or(Ok(vec![false; nodes.len()]), |loss| paths(graph, loss))?;
-        let is_op = |node: usize| matches!(nodes[node].source, Source::Op { .. });
-        let forward: Vec<usize> = (0..nodes.len()).filter(|&node| needed[node] && is_op(node)).collect();
-        let backward = forward.iter().rev().copied().filter(|&node| backpropagated[node]).collect();
-        Ok(Self { forward, backward, backpropagated })
-    }
-}
-
-/// An operation of the graph and its operands, by a node of one of the lists.
-fn operation<T: Real>(graph: &Graph<T>, node: usize) -> (&Arc<dyn Op<T>>, &[Var]) {
-    match &graph.nodes[node].source {
-        Source::Op { op, operands } => (op, operands),
-        Source::Input { .. } | Source::Parameter(_) => unreachable!("the lists hold operations alone"),
-    }
-}
-
 fn stretches<T: Real>(steps: &[Step<T>]) -> Vec<Range<usize>> {
     let couplings = steps.iter().enumerate().filter(|(_, step)| step.op.coupling().is_some()).map(|(index, _)| index);
     let starts: Vec<usize> = std::iter::once(0).chain(couplings).collect();
@@ -225,61 +127,14 @@ fn stretches<T: Real>(steps: &[Step<T>]) -> Vec<Range<usize>> {
     starts.iter().copied().zip(ends).map(|(start, end)| start..end).collect()
 }
 
-fn shapes_of<T: Real>(graph: &Graph<T>, operands: &[Var]) -> Vec<Shape> {
-    operands.iter().map(|&var| graph.shape(var)).collect()
-}
-
-fn ancestors<T: Real>(graph: &Graph<T>, targets: impl Iterator<Item = usize>) -> Vec<bool> {
-    let mut needed = vec![false; graph.nodes.len()];
-    targets.for_each(|target| needed[target] = true);
-    for node in (0..needed.len()).rev() {
-        if let (true, Source::Op { operands, .. }) = (needed[node], &graph.nodes[node].source) {
-            operands.iter().for_each(|var| needed[var.0] = true);
-        }
-    }
-    needed
-}
-
-/// The nodes on a path from a parameter, or an input with gradient, to the loss.
-fn paths<T: Real>(graph: &Graph<T>, loss: Var) -> Result<Vec<bool>> {
-    // An operation without a backward pass counts as reaching all its operands, so that it is found and refused.
-    let reaches = |op: &Arc<dyn Op<T>>, index| op.differentiable().is_none_or(|differentiable| differentiable.reaches(index));
-    let mut from_parameter = vec![false; graph.nodes.len()];
-    for (index, node) in graph.nodes.iter().enumerate() {
-        from_parameter[index] = match &node.source {
-            Source::Input { gradient } => *gradient,
-            Source::Parameter(_) => true,
-            Source::Op { op, operands } => operands.iter().enumerate().any(|(at, var)| from_parameter[var.0] && reaches(op, at)),
-        };
-    }
-    let mut to_loss = vec![false; graph.nodes.len()];
-    to_loss[loss.0] = true;
-    for index in (0..graph.nodes.len()).rev() {
-        if let (true, Source::Op { op, operands }) = (to_loss[index], &graph.nodes[index].source) {
-            for (at, var) in operands.iter().enumerate() {
-                to_loss[var.0] |= reaches(op, at);
-            }
-            if from_parameter[index] && op.differentiable().is_none() {
-                let message = "it has no backward pass but stands between a parameter and the loss; \
-                               give it one, or use it for inference only"
-                    .into();
-                return Err(Error::Shape { operation: op.name(), message });
-            }
-        }
-    }
-    if !from_parameter[loss.0] {
-        let message = "the loss depends on no parameter and on no input whose gradient is asked for".into();
-        return Err(Error::Shape { operation: "train", message });
-    }
-    Ok(from_parameter.iter().zip(&to_loss).map(|(from, to)| *from && *to).collect())
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::super::graph::Graph;
     use super::super::op::{Forward, Op};
     use super::super::ops::{Activation, Add, Half, Interleave, Linear, ScaleExp, SquaredError, Subtract};
+    use super::super::shape::Shape;
     use super::*;
+    use phyture_kernels::Write;
     use phyture_kernels::activation::Activation as Kind;
     use proptest::prelude::*;
 

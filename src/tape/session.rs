@@ -19,7 +19,7 @@ use lockstep::Lockstep;
 use packing::pack;
 use phyture_kernels::Real;
 use phyture_kernels::adam::Adam;
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 use replay::Replay;
 pub use shards::SHARDS;
 use shards::{Shard, reduce};
@@ -52,14 +52,14 @@ pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
 ///
 /// # Errors
 /// [`Error::Config`] if the environment asks for one that this processor does not have.
-pub fn instruction_set() -> Result<Level> {
-    Level::detect().map_err(Error::level)
+pub fn instruction_set() -> Result<InstructionSet> {
+    InstructionSet::detect().map_err(Error::level)
 }
 
 /// A plan with its memory, ready to be replayed.
 pub struct Session<T> {
     plan: Plan<T>,
-    level: Level,
+    isa: InstructionSet,
     poison: bool,
     /// One for each thread that may work on samples.
     slabs: Slabs<T>,
@@ -98,7 +98,7 @@ impl<T: Real> Session<T> {
     }
 
     fn new(plan: Plan<T>, threads: Threads) -> Result<Self> {
-        let level = instruction_set()?;
+        let isa = instruction_set()?;
         let trains = plan.loss.is_some();
         let count = threads.count();
         let workers = Workers::new(count)?;
@@ -106,10 +106,10 @@ impl<T: Real> Session<T> {
         let shards = if trains { SHARDS } else { SHARDS.max(count) };
         let [gradient_len, shard_len] = [plan.parameter_len, plan.shard_len()].map(|len| if trains { len } else { 0 });
         Ok(Self {
-            level,
+            isa,
             poison: false,
             packed: plan.packed_len.map(Slab::new),
-            slabs: Slabs::new(count.min(shards), (plan.bundle * plan.lane_len()).max(plan.large_weight_scratch)),
+            slabs: Slabs::new(count.min(shards), (plan.micro_batch * plan.lane_len()).max(plan.large_weight_scratch)),
             loaded: Vec::new(),
             shards: (0..shards).map(|_| Shard { gradients: vec![T::ZERO; shard_len] }).collect(),
             gradients: vec![T::ZERO; gradient_len],
@@ -128,8 +128,8 @@ impl<T: Real> Session<T> {
     }
 
     /// The instruction-set level it runs at.
-    pub const fn level(&self) -> Level {
-        self.level
+    pub const fn isa(&self) -> InstructionSet {
+        self.isa
     }
 
     /// Numbers in the slab of one worker: the memory of one sample in flight.
@@ -204,12 +204,12 @@ impl<T: Real> Session<T> {
     /// Weights in the form their kernels want.
     fn pack(&mut self, parameters: &[T]) -> Result<()> {
         self.check(parameters)?;
-        let Self { plan, level, packed, workers, .. } = self;
+        let Self { plan, isa, packed, workers, .. } = self;
         workers.run(|parallelism| {
             let [forward, backward] = packed.each_mut().map(Slab::aligned);
             parallelism.join(
-                || pack(parallelism, &plan.forward, Pass::Forward, *level, parameters, 0, forward),
-                || pack(parallelism, &plan.backward, Pass::Backward, *level, parameters, 0, backward),
+                || pack(parallelism, &plan.forward, Pass::Forward, *isa, parameters, 0, forward),
+                || pack(parallelism, &plan.backward, Pass::Backward, *isa, parameters, 0, backward),
             );
         });
         Ok(())
@@ -226,15 +226,15 @@ impl<T: Real> Session<T> {
         if let Some(lockstep) = &mut self.lockstep {
             lockstep.forget();
         }
-        let Self { plan, level, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers, .. } = self;
-        let (level, poison, count) = (*level, *poison, shards.len());
+        let Self { plan, isa, poison, slabs, packed, shards, gradients, losses, results, lockstep, workers, .. } = self;
+        let (isa, poison, count) = (*isa, *poison, shards.len());
         let losses = &mut losses[..samples];
         let (losses_mut, results) = (&mut *losses, &mut results[..samples * result_len]);
         workers.run(|parallelism| {
             let packed = packed.each_mut().map(|packed| &*packed.aligned());
             let replay = Replay {
                 plan,
-                level,
+                isa,
                 poison,
                 parallelism,
                 slabs,
@@ -293,9 +293,9 @@ impl<T: Real> Session<T> {
             let message = format!("{lengths:?} parameters and moments; the gradient has {}", self.gradients.len());
             return Err(Error::Shape { operation: "adam", message });
         }
-        let (level, gradients) = (self.level, &self.gradients);
+        let (isa, gradients) = (self.isa, &self.gradients);
         self.workers.run(|parallelism| {
-            Update { parallelism, level, adam, step }.work(gradients, [parameters, first_moment, second_moment]);
+            Update { parallelism, isa, adam, step }.work(gradients, [parameters, first_moment, second_moment]);
         });
         Ok(())
     }
@@ -358,7 +358,7 @@ impl<T: Real> Session<T> {
 #[cfg(test)]
 mod tests {
     use super::super::gradcheck;
-    use super::super::op::BUNDLE;
+    use super::super::op::MICRO_BATCH;
     use super::super::ops::{Dropout, Flatten, Linear, SquaredError, Temporal};
     use super::super::plan::tests::{random_graph, recipe};
     use super::*;
@@ -480,15 +480,15 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_does_not_depend_on_its_bundle() -> Result<()> {
+    fn a_sample_does_not_depend_on_its_micro_batch() -> Result<()> {
         let (graph, loss, output) = large_weights::<f64>()?;
         let parameters = parameters(graph.parameter_count());
         let mut alone = Session::train(&graph, loss, &[output], Threads(1))?;
-        assert!(alone.plan.bundle > 1, "these weights are not worth a bundle");
+        assert!(alone.plan.micro_batch > 1, "these weights are not worth a micro_batch");
         let weights = &alone.plan.large_weights;
         assert!(weights.iter().any(|weight| weight.steps.len() > 1) && weights.iter().any(|weight| weight.piece < weight.rows));
         // A power of 2, by which a loss can be divided without rounding.
-        let samples = SHARDS * BUNDLE;
+        let samples = SHARDS * MICRO_BATCH;
         let mut session = Session::train(&graph, loss, &[output], Threads(2))?;
         session.set_poison(true);
         session.step(&parameters, samples, None, &fill)?;
@@ -508,10 +508,10 @@ mod tests {
     }
 
     #[test]
-    fn bundles_give_the_same_bits_on_any_number_of_threads() -> Result<()> {
+    fn micro_batches_give_the_same_bits_on_any_number_of_threads() -> Result<()> {
         let (graph, loss, output) = large_weights::<f32>()?;
         let parameters = parameters(graph.parameter_count());
-        for samples in [2, SHARDS * BUNDLE + 3] {
+        for samples in [2, SHARDS * MICRO_BATCH + 3] {
             let mut found = Vec::new();
             for threads in [1, 2, 5] {
                 let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
@@ -540,7 +540,7 @@ mod tests {
         let (mut whole, mut blocks) = ([start.clone(), start.clone(), start.clone()], [start.clone(), start.clone(), start]);
         let adam = Adam::default();
         let [parameters, first, second] = whole.each_mut().map(|values| &mut values[..]);
-        phyture_kernels::adam::step(session.level(), &adam, 7, 1.0, session.gradients(), parameters, first, second);
+        phyture_kernels::adam::step(session.isa(), &adam, 7, 1.0, session.gradients(), parameters, first, second);
         let [parameters, first, second] = blocks.each_mut().map(|values| &mut values[..]);
         session.adam(&adam, 7, parameters, first, second)?;
         assert_eq!(whole.map(|values| bits(&values)), blocks.clone().map(|values| bits(&values)));

@@ -1,9 +1,17 @@
 //! The memory of one sample in flight: one stretch of numbers at an aligned start; and the slabs of all threads of a session. What lies
 //! where in a slab is the plan's.
 
-use super::plan::{ALIGNMENT_BYTES, alignment};
 use phyture_kernels::Real;
 use std::sync::{Mutex, PoisonError};
+
+/// Alignment of every buffer, bytes: one cache line, one 512-bit vector.
+pub(crate) const ALIGNMENT_BYTES: usize = 64;
+
+/// Elements of `T` in [`ALIGNMENT_BYTES`].
+pub(crate) const fn alignment<T>() -> usize {
+    let size = size_of::<T>();
+    if size == 0 || size > ALIGNMENT_BYTES { 1 } else { ALIGNMENT_BYTES / size }
+}
 
 /// Activations, gradients of activations, workspaces and scratch of one sample, at an aligned start.
 pub(super) struct Slab<T> {

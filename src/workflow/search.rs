@@ -80,7 +80,7 @@ impl SearchTask<'_> {
 
 /// The verdict where the log is not what the program takes it for: the faults of a check, and nothing searched.
 pub fn convention_fault(report: &CheckReport, data_sha256: String) -> Diagnosis {
-    let faults = report.findings.iter().filter(|finding| finding.verdict == check::Verdict::Fault);
+    let faults = report.findings.iter().filter(|finding| finding.verdict == check::Severity::Fault);
     let notes = faults.map(|finding| match &finding.set {
         Some(set) => format!("{}; set {set}", finding.message),
         None => finding.message.clone(),

@@ -8,7 +8,7 @@
 use super::{KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
 use crate::dropout::{Keep, Mask, MaskLanes};
 use crate::elementary::power_of_two;
-use crate::level::{Isa, Level, Tiled};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile;
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -34,7 +34,7 @@ pub struct Gradients<'a, T> {
 /// # Panics
 /// As [`forward`](super::forward).
 pub fn backward<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     heads: usize,
     q: Rows<'_, T>,
     k: Rows<'_, T>,
@@ -47,12 +47,12 @@ pub fn backward<T: Real>(
     scratch: &mut [T],
 ) {
     let shape = Shape::of(heads, &q, &k, &v, &o, log_sum_exp);
-    crate::rows::same_shape(&q, &o);
-    crate::rows::same_shape(&o, &d_o);
-    crate::rows::same_shape(&q, &gradients.dq.view());
-    crate::rows::same_shape(&k, &gradients.dk.view());
-    crate::rows::same_shape(&v, &gradients.dv.view());
-    T::attention_backward(level, Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
+    crate::strided::same_shape(&q, &o);
+    crate::strided::same_shape(&o, &d_o);
+    crate::strided::same_shape(&q, &gradients.dq.view());
+    crate::strided::same_shape(&k, &gradients.dk.view());
+    crate::strided::same_shape(&v, &gradients.dv.view());
+    T::attention_backward(isa, Backward { shape, q, k, v, dropout, o, log_sum_exp, d_o, gradients, scratch });
 }
 
 pub(crate) struct Backward<'a, T> {

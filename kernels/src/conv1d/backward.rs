@@ -5,8 +5,8 @@
 //! dW[j, c, o] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
 //! ```
 
-use super::{Geometry, Shifted, Weight, ends_len, pack_transposed, packed_len, six_points};
-use crate::level::{Isa, Level, Tiled};
+use super::{Geometry, Shifted, Weight, ends_len, pack_transposed, packed_len, winograd};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows, Pair, Sink, Store};
 use crate::{Real, Rows, RowsMut, Write, linear};
 
@@ -15,7 +15,7 @@ use crate::{Real, Rows, RowsMut, Write, linear};
 /// # Panics
 /// If shapes disagree.
 pub fn backward_input<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     dz: Rows<'_, T>,
     weight: Weight<'_, T>,
@@ -30,11 +30,11 @@ pub fn backward_input<T: Real>(
         Weight::Packed(packed) => (packed, rest),
         Weight::Plain(weight) => {
             let (packed, rest) = rest.split_at_mut(packed_len(geometry, outputs, inputs));
-            pack_transposed(level, geometry, (inputs, outputs), weight, packed);
+            pack_transposed(isa, geometry, (inputs, outputs), weight, packed);
             (&*packed, rest)
         }
     };
-    T::conv1d_backward_input(level, BackwardInput { geometry, dz, packed, dx, write, ends, scratch });
+    T::conv1d_backward_input(isa, BackwardInput { geometry, dz, packed, dx, write, ends, scratch });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -61,11 +61,11 @@ impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
         let part = |first, jump_at, jump, rows| Reversed { dz: self.dz, zeros, taps, first, jump_at, jump, rows };
         let mut inner = Store { c: self.dx.reborrow(), bias: None, write: self.write };
         let mut outer = Store { c: RowsMut::packed(ends, left + right, inputs), bias: None, write: Write::Set };
-        if six_points::applies(self.geometry, inputs, outputs) {
-            let packed = &self.packed[..six_points::packed_len(outputs, inputs)];
+        if winograd::applies(self.geometry, inputs, outputs) {
+            let packed = &self.packed[..winograd::packed_len(outputs, inputs)];
             let rows = n + left + right;
             let mut sink = Padded { left, n, inner, outer };
-            six_points::product::<T, I, _, _, MR, NR>(
+            winograd::product::<T, I, _, _, MR, NR>(
                 taps,
                 &part(0, rows, 0, rows),
                 (rows, outputs),
@@ -119,7 +119,7 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
     }
 }
 
-impl<T> six_points::Sequence<T> for Reversed<'_, T> {
+impl<T> winograd::Sequence<T> for Reversed<'_, T> {
     /// Taps are in reverse: the last one reads the row itself.
     #[inline(always)]
     fn row(&self, s: usize) -> &[T] {
@@ -168,7 +168,7 @@ impl<T: Real> Sink<T> for Padded<'_, T> {
 /// # Panics
 /// If shapes disagree.
 pub fn backward_weight<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
     dz: Rows<'_, T>,
@@ -178,7 +178,7 @@ pub fn backward_weight<T: Real>(
 ) {
     assert_eq!(dz.rows(), geometry.output_rows(x.rows()), "conv1d: rows of dz");
     assert_eq!(dweight.len(), geometry.taps * x.cols() * dz.cols(), "conv1d: length of the weight's gradient");
-    T::conv1d_backward_weight(level, BackwardWeight { geometry, x, dz, dweight, write, scratch });
+    T::conv1d_backward_weight(isa, BackwardWeight { geometry, x, dz, dweight, write, scratch });
 }
 
 pub(crate) struct BackwardWeight<'a, T> {
@@ -201,10 +201,10 @@ impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
             }
             return;
         }
-        if six_points::applies(self.geometry, inputs, outputs) {
+        if winograd::applies(self.geometry, inputs, outputs) {
             let shifted = Shifted { x: self.x, taps, left, first: 0, rows: n };
             let target = (self.dweight, self.write);
-            return six_points::weight_gradient::<T, I, _, MR, NR>(taps, &shifted, inputs, self.dz, target, self.scratch);
+            return winograd::weight_gradient::<T, I, _, MR, NR>(taps, &shifted, inputs, self.dz, target, self.scratch);
         }
         let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
         // For each block of rows, x and one panel of dz stay in the first-level cache for all taps.
@@ -244,6 +244,6 @@ impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
 }
 
 /// db {=, +=} Σ_t dz.
-pub fn backward_bias<T: Real>(level: Level, dz: Rows<'_, T>, dbias: &mut [T], write: Write) {
-    linear::backward_bias(level, dz, dbias, write);
+pub fn backward_bias<T: Real>(isa: InstructionSet, dz: Rows<'_, T>, dbias: &mut [T], write: Write) {
+    linear::backward_bias(isa, dz, dbias, write);
 }

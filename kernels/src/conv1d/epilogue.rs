@@ -5,9 +5,9 @@
 
 use crate::activation::{self, Activation};
 use crate::dropout::Mask;
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::tile::{self, Sink};
-use crate::{Real, Rows, RowsMut, rows};
+use crate::{Real, Rows, RowsMut, strided};
 
 /// What follows the convolution in the same pass.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,11 +86,11 @@ impl<T: Real> Sink<T> for Finish<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree or the activation is gelu, whose derivative y does not tell.
-pub fn backward_epilogue<T: Real>(level: Level, epilogue: Epilogue, y: Rows<'_, T>, dy: Rows<'_, T>, dz: RowsMut<'_, T>) {
-    rows::same_shape(&y, &dy);
-    rows::same_shape(&y, &dz.view());
+pub fn backward_epilogue<T: Real>(isa: InstructionSet, epilogue: Epilogue, y: Rows<'_, T>, dy: Rows<'_, T>, dz: RowsMut<'_, T>) {
+    strided::same_shape(&y, &dy);
+    strided::same_shape(&y, &dz.view());
     assert!(epilogue.activation != Activation::Gelu, "conv1d: the derivative of gelu cannot be told from its output");
-    T::conv1d_backward_epilogue(level, BackwardEpilogue { epilogue, y, dy, dz });
+    T::conv1d_backward_epilogue(isa, BackwardEpilogue { epilogue, y, dy, dz });
 }
 
 pub(crate) struct BackwardEpilogue<'a, T> {
@@ -175,12 +175,12 @@ mod tests {
             };
             let y_expected = expected(&|z| reference::activation(activation, z), &|_, _| 1.0);
             let dz_expected = expected(&|z| reference::activation_derivative(activation, z), &|t, o| dy.view().row(t)[o]);
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dz) = (Matrix::<f64>::poisoned(seed, (after, outputs)), Matrix::<f64>::poisoned(seed, (after, outputs)));
-                forward(level, geometry, x.view(), Weight::Plain(&weight), None, epilogue, y.view_mut(), &mut scratch);
+                forward(isa, geometry, x.view(), Weight::Plain(&weight), None, epilogue, y.view_mut(), &mut scratch);
                 assert_near("y", &y.to_vec(), &y_expected, Tolerance::Close);
-                backward_epilogue(level, epilogue, y.view(), dy.view(), dz.view_mut());
+                backward_epilogue(isa, epilogue, y.view(), dy.view(), dz.view_mut());
                 assert_near("dz", &dz.to_vec(), &dz_expected, Tolerance::Close);
             }
         }
@@ -191,11 +191,11 @@ mod tests {
         let geometry = Geometry { taps: 1, left: 0, right: 0 };
         let mask = Mask::new(Stream::new(5, 0, 0, 0), 0.5);
         let epilogue = Epilogue { activation: LEAKY, dropout: Some(mask) };
-        for level in Level::available() {
+        for isa in InstructionSet::available() {
             let (x, dy) = (vec![1.0_f32; 64], vec![1.0_f32; 64]);
             let (mut y, mut dz, mut scratch) = (vec![f32::NAN; 64], vec![f32::NAN; 64], vec![0.0; scratch_len(geometry, 1, 1)]);
             forward(
-                level,
+                isa,
                 geometry,
                 Rows::packed(&x, 64, 1),
                 Weight::Plain(&[0.0]),
@@ -204,7 +204,7 @@ mod tests {
                 RowsMut::packed(&mut y, 64, 1),
                 &mut scratch,
             );
-            backward_epilogue(level, epilogue, Rows::packed(&y, 64, 1), Rows::packed(&dy, 64, 1), RowsMut::packed(&mut dz, 64, 1));
+            backward_epilogue(isa, epilogue, Rows::packed(&y, 64, 1), Rows::packed(&dy, 64, 1), RowsMut::packed(&mut dz, 64, 1));
             let expected: Vec<f32> = (0..64).map(|t| if mask.keeps(t, 0) { 0.01 * mask.scale() as f32 } else { 0.0 }).collect();
             assert!(y.iter().all(|y| *y == 0.0));
             assert_near("dz of zeros", &dz, &expected, Tolerance::Close);

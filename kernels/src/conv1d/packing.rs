@@ -2,14 +2,14 @@
 //!
 //! Not here: any arithmetic.
 
-use super::{Geometry, six_points};
-use crate::level::{Isa, Level, Tiled};
+use super::{Geometry, winograd};
+use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::{Real, Rows, tile};
 
 /// Numbers of a weight packed by [`pack`]; by [`pack_transposed`] with inputs and outputs exchanged.
 pub const fn packed_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
-    if six_points::applies(geometry, inputs, outputs) {
-        six_points::packed_len(inputs, outputs)
+    if winograd::applies(geometry, inputs, outputs) {
+        winograd::packed_len(inputs, outputs)
     } else {
         tile::panels_len(geometry.taps * inputs, outputs)
     }
@@ -29,9 +29,9 @@ pub enum Weight<'a, T> {
 ///
 /// # Panics
 /// If lengths disagree.
-pub fn pack<T: Real>(level: Level, geometry: Geometry, (inputs, outputs): (usize, usize), weight: &[T], packed: &mut [T]) {
+pub fn pack<T: Real>(isa: InstructionSet, geometry: Geometry, (inputs, outputs): (usize, usize), weight: &[T], packed: &mut [T]) {
     assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
-    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: false });
+    T::conv1d_pack(isa, Pack { geometry, inputs, outputs, weight, packed, transposed: false });
 }
 
 /// Packs a weight for [`backward_input`](super::backward_input).
@@ -39,14 +39,14 @@ pub fn pack<T: Real>(level: Level, geometry: Geometry, (inputs, outputs): (usize
 /// # Panics
 /// If lengths disagree.
 pub fn pack_transposed<T: Real>(
-    level: Level,
+    isa: InstructionSet,
     geometry: Geometry,
     (inputs, outputs): (usize, usize),
     weight: &[T],
     packed: &mut [T],
 ) {
     assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d: length of the weight");
-    T::conv1d_pack(level, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
+    T::conv1d_pack(isa, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
 }
 
 pub(crate) struct Pack<'a, T> {
@@ -66,13 +66,13 @@ impl<T: Real> Tiled<T> for Pack<'_, T> {
         if weight.is_empty() {
             return;
         }
-        if six_points::applies(geometry, inputs, outputs) {
-            let packed = &mut packed[..six_points::packed_len(inputs, outputs)];
+        if winograd::applies(geometry, inputs, outputs) {
+            let packed = &mut packed[..winograd::packed_len(inputs, outputs)];
             // Called by name: through a pointer they would be compiled without the level's instructions.
             return if transposed {
-                six_points::pack_transposed::<T, I, NR>(taps, inputs, outputs, weight, packed)
+                winograd::pack_transposed::<T, I, NR>(taps, inputs, outputs, weight, packed)
             } else {
-                six_points::pack::<T, I, NR>(taps, inputs, outputs, weight, packed)
+                winograd::pack::<T, I, NR>(taps, inputs, outputs, weight, packed)
             };
         }
         if !transposed {

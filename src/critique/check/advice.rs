@@ -1,7 +1,7 @@
 //! Advice against what `dataset.toml` states already: what it says is not advised again, and a unit that it states is named as what may
 //! be wrong. Nothing is measured here.
 
-use super::report::Finding;
+use super::finding::Finding;
 use crate::flight::Source;
 
 /// Keys whose value is a word.
@@ -67,14 +67,14 @@ fn starts_word(text: &str, at: usize) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::{Subject, Verdict};
+    use super::super::finding::{Severity, Subject};
     use super::*;
 
     fn heeded(set: &str, stated: &[(&str, &str)]) -> (Option<String>, String) {
         let mut finding = Finding {
             name: "a".into(),
             subject: Subject::Conventions,
-            verdict: Verdict::Fault,
+            verdict: Severity::Fault,
             measured: None,
             interval: None,
             expected: None,

@@ -1,7 +1,8 @@
 //! Cells that cannot be: for moments, values far outside of what their column does in all flights. Nothing is mended here; the finding prints the
 //! rule for `dataset.toml` that does.
 
-use super::report::{Finding, Subject, Verdict};
+use super::finding::{Finding, Severity, Subject};
+use super::flights::{CONTROLS, named, of_all};
 use crate::flight::{Column, Flight};
 
 /// Values of a column that its usual range is taken from, at most.
@@ -43,7 +44,7 @@ pub(super) fn spikes(flights: &[Flight]) -> Vec<(Finding, Vec<usize>)> {
 fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
     let [low, high] = usual(flights, column)?;
     let jump = OUTSIDE * (high - low);
-    let is_control = super::CONTROLS.contains(&column);
+    let is_control = CONTROLS.contains(&column);
     let size = low.abs().max(high.abs()).max(1.0);
     let beyond = if is_control { LARGEST_CONTROL * size } else { f64::NEG_INFINITY };
     let range = [(low - jump).min(-beyond), (high + jump).max(beyond)];
@@ -80,7 +81,7 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
 fn usual(flights: &[Flight], column: Column) -> Option<[f64; 2]> {
     let samples: usize = flights.iter().map(Flight::len).sum();
     let every = samples.div_ceil(LOOKED_AT).max(1);
-    let mut values: Vec<f64> = super::of_all(flights, column).step_by(every).map(|(value, _)| value).collect();
+    let mut values: Vec<f64> = of_all(flights, column).step_by(every).map(|(value, _)| value).collect();
     values.sort_unstable_by(f64::total_cmp);
     let within = |share: f64| {
         let tail = (share * values.len() as f64).ceil() as usize;
@@ -101,7 +102,7 @@ fn finding(column: Column, spikes: &Spikes, flights: &[Flight]) -> Finding {
         if spikes.cells == 1 { "cell" } else { "cells" },
         spikes.longest_s,
         if spikes.cells == 1 { "is" } else { "are" },
-        super::named(&where_to)
+        named(&where_to)
     );
     let rule = format!(
         "[[repair]] columns = [\"{name}\"], valid = [\"value > {low:.4}\", \"value < {high:.4}\"], max_gap_s = {:.3}, with the file's name and in its units",
@@ -110,7 +111,7 @@ fn finding(column: Column, spikes: &Spikes, flights: &[Flight]) -> Finding {
     Finding {
         name: format!("spikes_{name}"),
         subject: Subject::Conventions,
-        verdict: Verdict::Fault,
+        verdict: Severity::Fault,
         measured: Some(spikes.cells as f64),
         interval: None,
         expected: Some(0.0),

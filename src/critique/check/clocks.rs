@@ -1,7 +1,7 @@
 //! Streams with a clock of their own: how far a stream comes later, or earlier, in the second half of flights than in the first. How late it comes on the
 //! whole is in `timing`.
 
-use super::report::{Finding, Subject, Verdict};
+use super::finding::{Finding, Severity, Subject, finding};
 use super::timing::Timing;
 
 /// A delay that grows by so much along a flight changes verdicts, s.
@@ -90,9 +90,9 @@ fn grown(first: &Finding, second: &Finding, apart_s: f64) -> Option<Finding> {
         interval: Some([low, high]),
         expected: Some(0.0),
         unit: "s".into(),
-        ..super::finding(
+        ..finding(
             &format!("{CLOCK}{stream}"),
-            if is_grown { Verdict::Fault } else { Verdict::Ok },
+            if is_grown { Severity::Fault } else { Severity::Ok },
             message.replace('_', " "),
             None,
         )

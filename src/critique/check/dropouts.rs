@@ -1,9 +1,9 @@
 //! Samples that a recorder dropped and filled with the last ones: all that is measured stands still for a while and then jumps. A single column
 //! that stands still is the business of `streams`.
 
-use super::odd::{MOST, in_flights};
-use super::report::{Finding, Verdict};
-use super::{finding, named};
+use super::finding::{Finding, Severity, finding};
+use super::flights::{MOST, in_flights, named};
+use super::robust::median;
 use crate::flight::{Column, Flight};
 
 /// A rest of all measurements from here on, s, is no chance.
@@ -37,13 +37,13 @@ pub(super) fn findings(flights: &[Flight]) -> Option<Finding> {
         100.0 * share
     );
     let indices: Vec<usize> = lost.iter().map(|one| one.flight).collect();
-    let verdict = if share > MUCH { Verdict::Fault } else { Verdict::Warning };
+    let verdict = if share > MUCH { Severity::Fault } else { Severity::Warning };
     if indices.len() as f64 > MOST * flights.len() as f64 {
         return Some(finding("dropouts", verdict, message, None));
     }
     let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
     Some(match verdict {
-        Verdict::Fault => in_flights("dropouts", &indices, &message, flights),
+        Severity::Fault => in_flights("dropouts", &indices, &message, flights),
         _ => finding("dropouts", verdict, format!("in {}: {message}", named(&names)), None),
     })
 }
@@ -83,5 +83,5 @@ fn of_flight(index: usize, flight: &Flight) -> Option<Lost> {
 /// The median change from sample to sample, of those that change anything.
 fn usual_change(values: &[f64]) -> f64 {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
-    super::sticks::median(changes.collect()).unwrap_or(0.0)
+    median(changes.collect()).unwrap_or(0.0)
 }

@@ -1,14 +1,14 @@
 //! What the streams of a log say of each other, gathered: of one flight, in short blocks, or of all together. Verdicts on single flights are the
 //! business of `odd`.
 
-use super::RELATIONS;
 use super::clocks::Halves;
+use super::finding::{Finding, RELATIONS, Severity, finding};
 use super::forces::Forces;
 use super::gains::Gains;
 use super::increments::Motion;
 use super::mounts::Mounts;
 use super::relations::Relation;
-use super::report::{Finding, Verdict};
+use super::robust::median;
 use super::timing::Timing;
 use super::unexplained::Left;
 use std::collections::BTreeSet;
@@ -90,15 +90,15 @@ impl Evidence {
         match self.is_reversed() {
             Some(true) => {
                 let message = "rates and accelerations all have the other sign against the changes: the rows stand in the order of falling time";
-                return vec![super::finding(TIME_REVERSED, Verdict::Fault, message.into(), None)];
+                return vec![finding(TIME_REVERSED, Severity::Fault, message.into(), None)];
             }
-            Some(false) => findings.push(super::finding(TIME_REVERSED, Verdict::Ok, "the time runs forward".into(), None)),
+            Some(false) => findings.push(finding(TIME_REVERSED, Severity::Ok, "the time runs forward".into(), None)),
             None => {}
         }
         for relation in &self.relations {
             let Some(finding) = relation.finding(self.gains.left(relation.name)) else { continue };
             // Gains of a relation that is known to be read wrongly, or in which nothing moves, say nothing more.
-            let is_read = finding.verdict != Verdict::Fault && finding.measured.is_some_and(f64::is_finite);
+            let is_read = finding.verdict != Severity::Fault && finding.measured.is_some_and(f64::is_finite);
             findings.push(finding);
             if is_read {
                 findings.extend(self.gains.findings(relation.name, least_explained));
@@ -106,8 +106,8 @@ impl Evidence {
         }
         let mut findings = time_step(without_consequences(findings));
         let is_sound = |relation: &str| {
-            let is_faulty = |finding: &Finding| finding.verdict == Verdict::Fault && finding.name.starts_with(relation);
-            !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Verdict::Fault)
+            let is_faulty = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.starts_with(relation);
+            !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Severity::Fault)
         };
         findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")]));
         findings
@@ -126,12 +126,12 @@ impl Evidence {
 
 /// Targets that are read as their states are known to be: one column of rates in degrees contradicts the attitude and its own derivative.
 fn without_consequences(mut findings: Vec<Finding>) -> Vec<Finding> {
-    let faults = || findings.iter().filter(|finding| finding.verdict == Verdict::Fault);
+    let faults = || findings.iter().filter(|finding| finding.verdict == Severity::Fault);
     let of_states: BTreeSet<String> = faults().filter_map(|finding| finding.set.clone()).collect();
     for finding in &mut findings {
         let of_state = finding.set.as_ref().map(|set| set.replace("_dot", ""));
-        if finding.verdict == Verdict::Fault && finding.set != of_state && of_state.is_some_and(|set| of_states.contains(&set)) {
-            finding.verdict = Verdict::Undetermined;
+        if finding.verdict == Severity::Fault && finding.set != of_state && of_state.is_some_and(|set| of_states.contains(&set)) {
+            finding.verdict = Severity::Undetermined;
             finding.message = "not judged: the state is read otherwise, as is said above".into();
             finding.set = None;
         }
@@ -144,15 +144,15 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
     let of_relation = |finding: &Finding| {
         RELATIONS.iter().find(|relation| finding.name.starts_with(**relation) && finding.name.len() > relation.len()).copied()
     };
-    let is_known = |finding: &&Finding| finding.verdict != Verdict::Undetermined;
+    let is_known = |finding: &&Finding| finding.verdict != Severity::Undetermined;
     let gain = |finding: &Finding| of_relation(finding).zip(finding.measured);
     let gains: Vec<(&str, f64)> = findings.iter().filter(is_known).filter_map(gain).collect();
     let relations: BTreeSet<&str> = gains.iter().map(|gain| gain.0).collect();
-    let median = super::sticks::median(gains.iter().map(|gain| gain.1).collect()).filter(|times| *times > 0.0);
+    let median = median(gains.iter().map(|gain| gain.1).collect()).filter(|times| *times > 0.0);
     let Some(times) = median.filter(|_| relations.len() > 1) else { return findings };
     let is_one = (times - 1.0).abs() < OTHER_TIME;
     if is_one || gains.iter().any(|gain| (gain.1 / times - 1.0).abs() > SAME) {
-        let verdict = if is_one { Verdict::Ok } else { Verdict::Undetermined };
+        let verdict = if is_one { Severity::Ok } else { Severity::Undetermined };
         let message = if is_one { "what changes does so as fast as its rates say" } else { "the gains of single columns differ" };
         return findings.into_iter().chain([step(verdict, times, message.into(), None)]).collect();
     }
@@ -161,9 +161,9 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
     );
     let set = format!("[columns] t = \"t * {times:.3}\", with the file's name");
     let others = findings.into_iter().filter(|finding| !RELATIONS.iter().any(|relation| finding.name.starts_with(relation)));
-    std::iter::once(step(Verdict::Fault, times, message, Some(&set))).chain(others).collect()
+    std::iter::once(step(Severity::Fault, times, message, Some(&set))).chain(others).collect()
 }
 
-fn step(verdict: Verdict, times: f64, message: String, set: Option<&str>) -> Finding {
-    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..super::finding(TIME_STEP, verdict, message, set) }
+fn step(verdict: Severity, times: f64, message: String, set: Option<&str>) -> Finding {
+    Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..finding(TIME_STEP, verdict, message, set) }
 }

@@ -1,8 +1,8 @@
 //! What the flights contain: how far each state and control moves, for how long, and whether the columns of the baseline can be
 //! told apart. A coefficient can be no better than this.
 
-use super::of_all;
-use super::report::{Finding, Subject, Verdict};
+use super::finding::{Finding, Severity, Subject};
+use super::flights::of_all;
 use crate::blocks::BLOCK_S;
 use crate::flight::{Column, Flight};
 use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
@@ -163,7 +163,7 @@ pub(super) fn findings(movements: &[Excitation], collinearity: &[Collinearity]) 
         // Rounding of the mean is no movement.
         if movement.deviation <= f64::EPSILON.sqrt() * movement.mean.abs() {
             let message = format!("`{}` stands still: its coefficient cannot be found from these flights", movement.column);
-            findings.push(finding(name, Verdict::Warning, Some(movement.deviation), message));
+            findings.push(finding(name, Severity::Warning, Some(movement.deviation), message));
         } else if movement.carrying_blocks < FEW_CARRYING_BLOCKS {
             let message = format!(
                 "{} blocks of 10 s hold {:.0} % of the movement of `{}`: fly more of it",
@@ -171,7 +171,7 @@ pub(super) fn findings(movements: &[Excitation], collinearity: &[Collinearity]) 
                 100.0 * CARRIED_SHARE,
                 movement.column
             );
-            findings.push(finding(name, Verdict::Warning, Some(movement.carrying_blocks as f64), message));
+            findings.push(finding(name, Severity::Warning, Some(movement.carrying_blocks as f64), message));
         }
     }
     for row in collinearity {
@@ -182,12 +182,12 @@ pub(super) fn findings(movements: &[Excitation], collinearity: &[Collinearity]) 
                 "the columns of {} are hard to tell apart (condition number {:.0}, variance inflation {worst:.1}): its coefficients are uncertain",
                 row.channel, row.condition_number
             );
-            findings.push(finding(name, Verdict::Warning, Some(row.condition_number), message));
+            findings.push(finding(name, Severity::Warning, Some(row.condition_number), message));
         }
     }
     if findings.is_empty() {
         let message = "states and controls move, and the baseline's columns can be told apart".into();
-        findings.push(finding("excitation".into(), Verdict::Ok, None, message));
+        findings.push(finding("excitation".into(), Severity::Ok, None, message));
     }
     findings
 }

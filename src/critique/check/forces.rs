@@ -4,9 +4,9 @@
 //! rotor's thrust is along the body's z axis, so the two are small. And: with free coefficients on gravity and −ω × v, are they 1? Drag and trim
 //! are fitted beside them; what else acts on the helicopter biases a coefficient by some per cent, a wrong convention by 1 or more.
 
+use super::finding::{Finding, Severity, Subject};
 use super::increments::{Instant, Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Subject, Verdict};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{cross, gravity_body, rotate_back};
@@ -128,7 +128,7 @@ impl Forces {
         let mut finding = Finding {
             name: "lateral_force".into(),
             subject: Subject::Conventions,
-            verdict: Verdict::Ok,
+            verdict: Severity::Ok,
             measured: Some(rms(0)),
             interval: None,
             expected: None,
@@ -142,10 +142,10 @@ impl Forces {
             flights: Vec::new(),
         };
         if blocks < FEW_BLOCKS {
-            finding.verdict = Verdict::Undetermined;
+            finding.verdict = Severity::Undetermined;
             finding.message = format!("fewer than {FEW_BLOCKS} blocks of 10 s");
         } else if total(best) < CONVINCING_SHARE * total(0) && interval.is_some_and(|[_, high]| high < 0.0) {
-            finding.verdict = Verdict::Fault;
+            finding.verdict = Severity::Fault;
             finding.message = format!(
                 "force along x and y, which should be small, falls to {:.2} m/s² if {}",
                 rms(best),
@@ -153,7 +153,7 @@ impl Forces {
             );
             finding.set = Some(self.readings[best].set.into());
         } else if total(best) < total(0) && interval.is_some_and(|[_, high]| high < 0.0) {
-            finding.verdict = Verdict::Warning;
+            finding.verdict = Severity::Warning;
             finding.message =
                 format!("force along x and y is a little smaller, {:.2} m/s², if {}", rms(best), self.readings[best].says);
         }
@@ -178,7 +178,7 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
     let mut finding = Finding {
         name: format!("{term}_{axis}"),
         subject: Subject::Conventions,
-        verdict: Verdict::Undetermined,
+        verdict: Severity::Undetermined,
         measured: estimate.map(|estimate| estimate.value),
         interval: estimate.map(|estimate| estimate.interval),
         expected: Some(1.0),
@@ -191,7 +191,7 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
     let what = if term == "gravity" { "gravity in body axes" } else { "the Coriolis term -w x v" };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;
     if beyond(if axis == "z" { FAULT_MARGIN_THRUST } else { FAULT_MARGIN }) {
-        finding.verdict = Verdict::Fault;
+        finding.verdict = Severity::Fault;
         let contains = |number: f64| (value - number).abs() < FAULT_MARGIN;
         let (message, set) = match (term, contains(0.0), contains(-1.0)) {
             ("gravity", true, _) => (
@@ -221,12 +221,12 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
     } else if high - low > 4.0 * FAULT_MARGIN || (low <= 0.0 && high >= 1.0) {
         finding.message = format!("these flights do not tell how {what} enters");
     } else if beyond(WARNING_MARGIN) {
-        finding.verdict = Verdict::Warning;
+        finding.verdict = Severity::Warning;
         finding.message = format!(
             "{what} enters with a coefficient off 1; forces not modelled here, a tilted sensor or a wrong time step can do that"
         );
     } else {
-        finding.verdict = Verdict::Ok;
+        finding.verdict = Severity::Ok;
         finding.message = format!("{what} enters as it should");
     }
     finding

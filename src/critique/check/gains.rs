@@ -3,9 +3,9 @@
 //! Of the heading the angle is asked by which it is turned. This is what flight test calls data compatibility (Klein & Morelli 2006, ch. 10), one
 //! linear regression a relation. Other readings of whole relations are in `relations`.
 
+use super::finding::{Finding, Severity, Subject, finding};
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Subject, Verdict};
 use super::unexplained::{Fit, Left};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
@@ -177,7 +177,7 @@ impl Gains {
         };
         let (estimates, columns, units) = match relation {
             "position_rate" => {
-                let turned = self.turned().filter(|turned| turned.verdict == Verdict::Fault);
+                let turned = self.turned().filter(|turned| turned.verdict == Severity::Fault);
                 if let Some(turned) = turned.filter(|_| self.heading.explained() > self.position.explained()) {
                     return vec![turned];
                 }
@@ -200,7 +200,7 @@ impl Gains {
             findings.extend((0..3).map(|axis| offset(columns[axis], estimates[3 + axis], least, unit)));
         }
         // A single column that is read wrongly turns the way as well.
-        findings.extend(self.turned().filter(|turned| relation == "position_rate" && turned.verdict != Verdict::Fault));
+        findings.extend(self.turned().filter(|turned| relation == "position_rate" && turned.verdict != Severity::Fault));
         findings
     }
 
@@ -224,10 +224,10 @@ impl Gains {
 
 /// What is said of one column and not of all three names that column, and sets its unit alone.
 fn alone(findings: &mut [Finding], columns: [&str; 3]) {
-    let is_fault = |finding: &Finding| finding.verdict == Verdict::Fault;
+    let is_fault = |finding: &Finding| finding.verdict == Severity::Fault;
     let sets: Vec<Option<String>> =
         findings.iter().filter(|finding| is_fault(finding)).map(|finding| finding.set.clone()).collect();
-    let told = findings.iter().filter(|finding| finding.verdict != Verdict::Undetermined).count();
+    let told = findings.iter().filter(|finding| finding.verdict != Severity::Undetermined).count();
     if sets.len() == told && sets.windows(2).all(|pair| pair[0] == pair[1]) && told > 1 {
         return;
     }
@@ -254,17 +254,17 @@ fn offset(column: &str, estimate: Estimate, least: f64, unit: &str) -> Finding {
 fn constant(name: &str, estimate: Estimate, least: f64, unit: &str, says: String, set: String) -> Finding {
     let Estimate { value, interval: [low, high] } = estimate;
     let (verdict, message, set) = match () {
-        () if low > least || high < -least => (Verdict::Fault, says, Some(set)),
-        () if low > 0.5 * least || high < -0.5 * least => (Verdict::Warning, says, Some(set)),
-        () if high - low > 2.0 * least => (Verdict::Undetermined, "these flights move too little to say".into(), None),
-        () => (Verdict::Ok, "none that is more than a sensor's drift".into(), None),
+        () if low > least || high < -least => (Severity::Fault, says, Some(set)),
+        () if low > 0.5 * least || high < -0.5 * least => (Severity::Warning, says, Some(set)),
+        () if high - low > 2.0 * least => (Severity::Undetermined, "these flights move too little to say".into(), None),
+        () => (Severity::Ok, "none that is more than a sensor's drift".into(), None),
     };
     Finding {
         measured: Some(value),
         interval: Some([low, high]),
         expected: Some(0.0),
         unit: unit.into(),
-        ..super::finding(name, verdict, message, set.as_deref())
+        ..finding(name, verdict, message, set.as_deref())
     }
 }
 
@@ -286,7 +286,7 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     let mut finding = Finding {
         name: format!("{relation}_{axis}"),
         subject: Subject::Conventions,
-        verdict: Verdict::Undetermined,
+        verdict: Severity::Undetermined,
         measured: estimate.map(|estimate| estimate.value),
         interval: estimate.map(|estimate| estimate.interval),
         expected: Some(1.0),
@@ -301,7 +301,7 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     let known = of_units(relation).iter().filter(|unit| value > 0.0 && off(unit.0) < WARNING_MARGIN);
     let known = known.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
     if beyond(FAULT_MARGIN) || (beyond(UNIT_MARGIN) && known.is_some()) {
-        finding.verdict = Verdict::Fault;
+        finding.verdict = Severity::Fault;
         finding.message = match known {
             _ if (value + 1.0).abs() < WARNING_MARGIN => "the gain of this axis is that of the other sign".into(),
             Some((_, says, _)) => format!("the gain of this axis is that of {says}"),
@@ -315,10 +315,10 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
     } else if high - low > 4.0 * FAULT_MARGIN || (low <= 0.0 && high >= 1.0) {
         finding.message = "these flights move too little about this axis to say".into();
     } else if beyond(WARNING_MARGIN) {
-        finding.verdict = Verdict::Warning;
+        finding.verdict = Severity::Warning;
         finding.message = "off 1: a wrong time step, a filter on one of the streams, or noise".into();
     } else {
-        finding.verdict = Verdict::Ok;
+        finding.verdict = Severity::Ok;
         finding.message = "as it should be".into();
     }
     finding

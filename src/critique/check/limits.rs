@@ -1,11 +1,11 @@
 //! Sticks that a log cuts off: their values pile up at an end that is not the end of their travel, and while they stand there the axis goes on
 //! answering. A stick that stands at its real end moves its axis no further.
 
-use super::finding;
+use super::finding::{Finding, Severity, finding};
+use super::flights::{MOST, WIDER, in_flights};
 use super::increments::{Motion, length_s};
-use super::odd::{MOST, WIDER, in_flights};
 use super::regression::BlockRegression;
-use super::report::{Finding, Verdict};
+use super::robust::median;
 use super::sticks::{STICKS, change_of, state_of};
 use crate::flight::Flight;
 use std::collections::BTreeSet;
@@ -66,7 +66,7 @@ fn cut_off(stick: usize, each: &[(usize, Piled)], flights: &[Flight], except: &B
     let judged = each.iter().filter(|(flight, _)| !except.contains(flight));
     let piled: Vec<(usize, f64, &Ends)> =
         judged.filter_map(|(flight, piled)| piled[stick].as_ref().map(|(end, ends)| (*flight, *end, ends))).collect();
-    let end = super::sticks::median(piled.iter().map(|entry| entry.1).collect())?;
+    let end = median(piled.iter().map(|entry| entry.1).collect())?;
     let merged = BlockRegression::merged(piled.iter().map(|entry| entry.2));
     let [_, gain, _, beyond] = merged.estimates()?;
     let [low, high] = beyond.interval;
@@ -83,7 +83,7 @@ fn cut_off(stick: usize, each: &[(usize, Piled)], flights: &[Flight], except: &B
     let indices: Vec<usize> = piled.iter().map(|entry| entry.0).collect();
     let is_set = indices.len() as f64 > MOST * flights.len() as f64;
     Some(if is_set {
-        finding(&format!("cut_off_{name}"), Verdict::Fault, message, None)
+        finding(&format!("cut_off_{name}"), Severity::Fault, message, None)
     } else {
         in_flights(&format!("cut_off_{name}"), &indices, &message, flights)
     })

@@ -13,6 +13,8 @@ mod clocks;
 mod dropouts;
 mod evidence;
 mod excitation;
+mod finding;
+mod flights;
 mod forces;
 mod gains;
 mod increments;
@@ -22,6 +24,7 @@ mod odd;
 mod regression;
 mod relations;
 mod report;
+mod robust;
 mod stamps;
 mod sticks;
 mod streams;
@@ -32,7 +35,8 @@ mod trims;
 mod unexplained;
 
 pub use excitation::{Collinearity, Excitation};
-pub use report::{CheckReport, Finding, Subject, Verdict};
+pub use finding::{Finding, Severity, Subject};
+pub use report::CheckReport;
 #[cfg(feature = "files")]
 pub use suggestion::{Open, Suggestion};
 pub use timing::DelayProfile;
@@ -41,16 +45,14 @@ use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Targets};
 use crate::physics::Model;
 use evidence::Evidence;
-
+use finding::{RELATIONS, finding};
+use flights::{CONTROLS, of_all};
 use odd::{Odd, Own};
 use std::collections::BTreeSet;
 use sticks::Sticks;
 
-const CONTROLS: [Column; 4] = [Column::U1, Column::U2, Column::U3, Column::U4];
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
-/// Relations whose readings say how a log is written.
-const RELATIONS: [&str; 4] = ["position_rate", "attitude_rate", "velocity_targets", "rate_targets"];
 /// Share of the samples that may exceed it: glitches and full deflections are no other scale.
 const RARE_SHARE: f64 = 0.01;
 
@@ -70,7 +72,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     findings.iter_mut().for_each(|finding| advice::heed(finding, &data.source));
 
     CheckReport {
-        fault: findings.iter().any(|finding| finding.verdict == Verdict::Fault),
+        fault: findings.iter().any(|finding| finding.verdict == Severity::Fault),
         summary: summary(&findings),
         flights: data.flights.len(),
         duration_s: data.duration_s(),
@@ -115,7 +117,7 @@ impl Gathered {
         let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
         let poor = streams::findings(&data.flights).into_iter().chain(spikes);
         let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).collect();
-        let faults = poor.iter().filter(|finding| finding.verdict == Verdict::Fault);
+        let faults = poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
         let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(unfit).collect();
@@ -150,17 +152,17 @@ impl Gathered {
         findings.extend(self.poor.iter().chain(&self.odd).cloned());
         findings.extend(self.together.kinematics(0.0));
         // Of the attitude the relations know more than the force does.
-        let is_read = |finding: &Finding| finding.verdict == Verdict::Fault && RELATIONS[..2].contains(&finding.name.as_str());
+        let is_read = |finding: &Finding| finding.verdict == Severity::Fault && RELATIONS[..2].contains(&finding.name.as_str());
         let known: Vec<Option<String>> =
             findings.iter().filter(|finding| is_read(finding)).map(|finding| finding.set.clone()).collect();
         let lateral = self.together.forces.lateral();
-        let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Verdict::Fault;
+        let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Severity::Fault;
         findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
-            let faults = of_sticks.iter().filter(|finding| finding.verdict == Verdict::Fault);
+            let faults = of_sticks.iter().filter(|finding| finding.verdict == Severity::Fault);
             let named: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
             let is_known = |flight: &usize| named.contains(&data.flights[*flight].name);
             let known = (0..data.flights.len()).filter(is_known).chain(self.unjudged.iter().copied()).collect();
@@ -169,7 +171,7 @@ impl Gathered {
             findings.extend(cut_off);
         }
         // What thrust does along z is known from the collective alone.
-        let unsure = findings.iter().any(|finding| finding.verdict == Verdict::Fault);
+        let unsure = findings.iter().any(|finding| finding.verdict == Severity::Fault);
         findings.extend(places(self.together.forces.coefficients(), unsure));
         let rest = data.flights.iter().enumerate().filter(|(flight, _)| !self.except.contains(flight));
         findings.extend(plausibility(&rest.map(|entry| entry.1).collect::<Vec<_>>()));
@@ -221,8 +223,8 @@ fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
 
 /// Coefficients of gravity and of the Coriolis term; where a unit of length explains their size, that unit in their place.
 fn places(coefficients: Vec<Finding>, unsure: bool) -> Vec<Finding> {
-    if let Some(lengths) = odd::lengths(&coefficients).filter(|lengths| lengths.verdict == Verdict::Fault) {
-        let others = coefficients.into_iter().filter(|finding| finding.verdict != Verdict::Fault);
+    if let Some(lengths) = odd::lengths(&coefficients).filter(|lengths| lengths.verdict == Severity::Fault) {
+        let others = coefficients.into_iter().filter(|finding| finding.verdict != Severity::Fault);
         return others.chain([lengths]).collect();
     }
     coefficients.into_iter().map(|finding| if unsure { not_judged(finding) } else { finding }).collect()
@@ -236,28 +238,13 @@ const fn other_order(order: QuaternionOrder) -> &'static str {
     }
 }
 
-fn finding(name: &str, verdict: Verdict, message: String, set: Option<&str>) -> Finding {
-    Finding {
-        name: name.into(),
-        subject: Subject::Conventions,
-        verdict,
-        measured: None,
-        interval: None,
-        expected: None,
-        unit: "1".into(),
-        message,
-        set: set.map(Into::into),
-        flights: Vec::new(),
-    }
-}
-
 /// A coefficient along z that a wrong stick, or wrong cells of it, explain.
 fn not_judged(finding: Finding) -> Finding {
-    if finding.verdict != Verdict::Fault || !finding.name.ends_with("_z") {
+    if finding.verdict != Severity::Fault || !finding.name.ends_with("_z") {
         return finding;
     }
     let message = "not judged, since it rests on the sticks, and something is wrong with these".into();
-    Finding { verdict: Verdict::Undetermined, message, set: None, ..finding }
+    Finding { verdict: Severity::Undetermined, message, set: None, ..finding }
 }
 
 /// What rests on a reading that is known to be wrong is not judged.
@@ -277,11 +264,11 @@ fn symptom(finding: Finding) -> Finding {
     ]
     .iter()
     .any(|start| finding.name.starts_with(start));
-    if is_reading || is_known || finding.verdict < Verdict::Warning {
+    if is_reading || is_known || finding.verdict < Severity::Warning {
         return finding;
     }
     let message = "not judged before what is wrong above is mended".into();
-    Finding { verdict: Verdict::Undetermined, message, set: None, flights: Vec::new(), ..finding }
+    Finding { verdict: Severity::Undetermined, message, set: None, flights: Vec::new(), ..finding }
 }
 
 /// Where the accelerations come from.
@@ -294,34 +281,7 @@ fn origin(flights: &[Flight]) -> Finding {
             flights.len()
         ),
     };
-    finding("targets", Verdict::Ok, message, None)
-}
-
-/// So many flights are named.
-const NAMED: usize = 4;
-
-/// Names, of many the first few.
-fn named(names: &[&str]) -> String {
-    match names.len().checked_sub(NAMED) {
-        None | Some(0) => names.join(", "),
-        Some(more) => format!("{} and {more} more", names[..NAMED].join(", ")),
-    }
-}
-
-/// The rule of `dataset.toml` that leaves flights out.
-fn left_out(names: &[&str]) -> String {
-    format!("leave_out = [{}]", names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "))
-}
-
-/// A column of all flights with their steps; each flight leaves the memory behind it.
-fn of_all<'f>(flights: impl IntoIterator<Item = &'f Flight>, column: Column) -> impl Iterator<Item = (f64, f64)> {
-    flights.into_iter().flat_map(move |flight| {
-        let left = std::iter::from_fn(move || {
-            flight.rest();
-            None
-        });
-        flight.column(column).iter().map(|value| (*value, flight.step_s)).chain(left)
-    })
+    finding("targets", Severity::Ok, message, None)
 }
 
 /// Ranges that no aircraft of this kind leaves.
@@ -336,7 +296,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
     if pitch > std::f64::consts::FRAC_PI_2 + 0.01 {
         let message =
             format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
-        findings.push(finding("angle_range", Verdict::Fault, message, Some("[units] angles = \"deg\"")));
+        findings.push(finding("angle_range", Severity::Fault, message, Some("[units] angles = \"deg\"")));
     }
     let beyond = |column: Column| {
         let samples: usize = flights.iter().map(|flight| flight.len()).sum();
@@ -356,7 +316,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
             }
             _ => "[columns] u1 = \"u1 / 1000\" or the like, with the file's names",
         };
-        findings.push(finding("control_range", Verdict::Warning, message, Some(set)));
+        findings.push(finding("control_range", Severity::Warning, message, Some(set)));
     }
     let with_height: Vec<&Flight> = flights.iter().copied().filter(|flight| !flight.absent.contains(&Column::Z)).collect();
     let (below, samples) = with_height.iter().fold((0, 0), |(below, samples), flight| {
@@ -371,7 +331,7 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
         );
         findings.push(finding(
             "height_sign",
-            Verdict::Warning,
+            Severity::Warning,
             message,
             Some("[columns] z = \"-z\", with the file's name, if z is height"),
         ));
@@ -380,13 +340,13 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
 }
 
 fn summary(findings: &[Finding]) -> String {
-    let of = |verdict: Verdict| findings.iter().filter(move |finding| finding.verdict == verdict);
-    let names = |verdict: Verdict| of(verdict).map(|finding| finding.name.as_str()).collect::<Vec<_>>().join(", ");
-    if let Some(first) = of(Verdict::Fault).next() {
-        return format!("Convention fault ({}): {}.", names(Verdict::Fault), first.message);
+    let of = |verdict: Severity| findings.iter().filter(move |finding| finding.verdict == verdict);
+    let names = |verdict: Severity| of(verdict).map(|finding| finding.name.as_str()).collect::<Vec<_>>().join(", ");
+    if let Some(first) = of(Severity::Fault).next() {
+        return format!("Convention fault ({}): {}.", names(Severity::Fault), first.message);
     }
-    match of(Verdict::Warning).count() {
+    match of(Severity::Warning).count() {
         0 => "No convention fault, no warning.".into(),
-        _ => format!("No convention fault; warnings: {}.", names(Verdict::Warning)),
+        _ => format!("No convention fault; warnings: {}.", names(Severity::Warning)),
     }
 }

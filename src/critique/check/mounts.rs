@@ -5,9 +5,9 @@
 //! are linear in δ. An attitude that is off shows the same δ in both; a turned gyro or velocity sensor in one. Offsets of v and ω are fitted beside it: at
 //! a constant speed they look the same; and a delay of the attitude, which in a steady roll does.
 
+use super::finding::{Finding, Severity, finding};
 use super::increments::{Motion, Vector};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Verdict};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::cross;
 
@@ -125,7 +125,7 @@ impl Mounts {
         }
         let most =
             known().map(|(turn, _)| turn.angles[turn.largest()]).max_by(|one, other| one.value.abs().total_cmp(&other.value.abs()));
-        let sound = |angle| of_angle(angle, Verdict::Ok, "attitude, velocity and rates are in the same axes".into(), None);
+        let sound = |angle| of_angle(angle, Severity::Ok, "attitude, velocity and rates are in the same axes".into(), None);
         most.map(sound).into_iter().collect()
     }
 }
@@ -165,21 +165,21 @@ fn attitude(angle: Estimate, axis: usize) -> Finding {
     let sign = if value < 0.0 { '+' } else { '-' };
     // Only the roll is turned last, about the body's own axis.
     let set = (axis == 0).then(|| format!("[columns] roll = \"roll {sign} {:.4}\", with the file's name", value.abs()));
-    of_angle(angle, Verdict::Fault, message, set)
+    of_angle(angle, Severity::Fault, message, set)
 }
 
 fn against(turn: &Turn, axis: usize, stream: &str) -> Finding {
     let degrees = -turn.angles[axis].value.to_degrees();
     let message = format!("the axes of the {stream} are turned by {degrees:.1}° about {} against the attitude", AXES[axis]);
-    of_angle(turn.angles[axis], Verdict::Fault, message, None)
+    of_angle(turn.angles[axis], Severity::Fault, message, None)
 }
 
-fn of_angle(angle: Estimate, verdict: Verdict, message: String, set: Option<String>) -> Finding {
+fn of_angle(angle: Estimate, verdict: Severity, message: String, set: Option<String>) -> Finding {
     Finding {
         measured: Some(angle.value),
         interval: Some(angle.interval),
         expected: Some(0.0),
         unit: "rad".into(),
-        ..super::finding(NAME, verdict, message, set.as_deref())
+        ..finding(NAME, verdict, message, set.as_deref())
     }
 }

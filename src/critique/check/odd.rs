@@ -3,17 +3,15 @@
 
 use super::clocks::CLOCK;
 use super::evidence::Evidence;
+use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
+use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, TOGETHER};
-use super::report::{Finding, Subject, Verdict};
-use super::sticks::median;
+use super::robust::{NORMAL, median};
 use super::timing::{Acts, Timing};
 use super::unexplained::Left;
-use super::{RELATIONS, left_out, named};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A flight by itself is believed where twice its interval says so: there are many flights and many relations.
-pub(super) const WIDER: f64 = 2.0;
 /// A gain that certainly differs from 1 by this much is that of another reading.
 const OFF: f64 = 0.2;
 /// Streams this much apart change verdicts: lags of rotor and servo are as long. s
@@ -22,18 +20,12 @@ pub(super) const LATE_S: f64 = 0.03;
 const LATER_S: f64 = 0.05;
 /// Delays of flights that differ by so many times what they scatter are not those of what is flown.
 const APART: f64 = 3.0;
-/// From a median absolute deviation to the standard deviation of normal numbers.
-pub(super) const NORMAL: f64 = 1.4826;
-/// Flights at least in which a single stick is late or scaled, or a clock another: there are many flights and many sticks, and manoeuvres do the like.
-pub(super) const FEWEST: usize = 3;
 /// A gain of a flight differs from that of the others from here on.
 const SCALED: f64 = 0.04;
 /// A gain of a single flight's axis is one where with it so much of the change is explained.
 const EXPLAINED: f64 = 0.5;
 /// Fall of the logarithm of the squared error that a shift of a stream has to bring in a single flight.
 const CONVINCING_FALL: f64 = 1.0;
-/// Where more than this share of the flights breaks a relation, it is the set that does.
-pub(super) const MOST: f64 = 0.8;
 /// Coefficients of gravity agree with a unit of length to this factor.
 const NEAR_UNIT: f64 = 1.25;
 
@@ -102,7 +94,7 @@ pub(super) fn late_streams(timing: &Timing) -> Vec<Finding> {
                     finding.message,
                     1e3 * late_s.abs()
                 );
-                Finding { verdict: Verdict::Fault, message, set: Some(format!("[late] {stream} = {late_s:.3}")), ..finding }
+                Finding { verdict: Severity::Fault, message, set: Some(format!("[late] {stream} = {late_s:.3}")), ..finding }
             }
             None => finding,
         }
@@ -116,11 +108,11 @@ pub(super) fn late_controls(timing: &Timing) -> Vec<Finding> {
     let late: Vec<&Finding> =
         sticks.iter().filter(|finding| finding.measured.is_some_and(|at_s| at_s < 0.0) && contradicts(finding)).collect();
     if late.len() < 2 || late.len() < sticks.len() {
-        return late.into_iter().map(|finding| Finding { verdict: Verdict::Fault, ..finding.clone() }).collect();
+        return late.into_iter().map(|finding| Finding { verdict: Severity::Fault, ..finding.clone() }).collect();
     }
     let mean_s = -late.iter().filter_map(|finding| finding.measured).sum::<f64>() / late.len() as f64;
     let message = format!("the controls come late: they are recorded {:.0} ms after they act", 1e3 * mean_s);
-    vec![super::finding("controls_late", Verdict::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
+    vec![finding("controls_late", Severity::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
 }
 
 /// What breaks with the others, and in which flights.
@@ -138,7 +130,7 @@ impl Odd {
         }
         let mut by_name: BTreeMap<&str, Vec<(usize, &Finding)>> = BTreeMap::new();
         for own in each {
-            for finding in own.findings.iter().filter(|finding| finding.verdict != Verdict::Undetermined) {
+            for finding in own.findings.iter().filter(|finding| finding.verdict != Severity::Undetermined) {
                 by_name.entry(&finding.name).or_default().push((own.flight, finding));
             }
         }
@@ -174,7 +166,7 @@ impl Odd {
             odd.extend(name, apart.into_iter().map(|shift| (shift.flights, shift.message)).collect(), flights);
             odd.findings.extend(vague.into_iter().map(|shift| {
                 let message = format!("{}, or the sticks move so otherwise there that they look so", shift.message);
-                Finding { verdict: Verdict::Warning, ..in_flights(name, &shift.flights, &message, flights) }
+                Finding { verdict: Severity::Warning, ..in_flights(name, &shift.flights, &message, flights) }
             }));
         }
         odd
@@ -194,13 +186,13 @@ pub(super) fn is_misread(each: &[&Own], all: &Evidence) -> bool {
         all.other_reading(place).is_some_and(|reading| most(agree(reading)))
     };
     let columns = all.kinematics(0.0);
-    let faults = columns.iter().filter(|finding| finding.verdict == Verdict::Fault && finding.measured.is_some());
+    let faults = columns.iter().filter(|finding| finding.verdict == Severity::Fault && finding.measured.is_some());
     let is_of_column = |finding: &Finding| {
         let own = each.iter().filter_map(|own| own.findings.iter().find(|other| other.name == finding.name));
-        let told: Vec<&Finding> = own.filter(|own| own.verdict != Verdict::Undetermined).collect();
-        told.len() > 1 && told.iter().filter(|own| own.verdict == Verdict::Fault).count() as f64 > MOST * told.len() as f64
+        let told: Vec<&Finding> = own.filter(|own| own.verdict != Severity::Undetermined).collect();
+        told.len() > 1 && told.iter().filter(|own| own.verdict == Severity::Fault).count() as f64 > MOST * told.len() as f64
     };
-    let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Verdict::Fault;
+    let turned = |finding: &Finding| finding.name == LATERAL && finding.verdict == Severity::Fault;
     let is_turned = all.forces.lateral().is_some_and(|finding| turned(&finding));
     (0..all.relations.len()).any(is_common)
         || faults.into_iter().any(is_of_column)
@@ -212,21 +204,10 @@ const CONTROLS: &str = "control_delay";
 const STICK: &str = "delay_";
 pub(super) const LATERAL: &str = "lateral_force";
 
-/// A fault of some flights.
-pub(super) fn in_flights(name: &str, indices: &[usize], message: &str, flights: &[Flight]) -> Finding {
-    let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
-    let message = format!("in {} of {} flights ({}): {message}", indices.len(), flights.len(), named(&names));
-    Finding {
-        set: Some(left_out(&names)),
-        flights: names.into_iter().map(str::to_owned).collect(),
-        ..super::finding(name, Verdict::Fault, message, None)
-    }
-}
-
 /// Flights by what is wrong in them, where others keep the relation.
 fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
     let (faulty, sound): (Vec<_>, Vec<_>) = of_flights.iter().partition(|(_, finding)| contradicts(finding));
-    let sound = sound.iter().filter(|(_, finding)| finding.verdict != Verdict::Fault).count();
+    let sound = sound.iter().filter(|(_, finding)| finding.verdict != Severity::Fault).count();
     if faulty.len() as f64 > MOST * (faulty.len() + sound) as f64 {
         return Vec::new();
     }
@@ -295,14 +276,14 @@ fn ratios(of_flights: &[(usize, &Finding)]) -> Vec<(usize, f64)> {
 
 /// Whether a flight by itself contradicts what is expected beyond doubt.
 fn contradicts(finding: &Finding) -> bool {
-    let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Verdict::Fault };
+    let Some((value, [low, high])) = finding.measured.zip(finding.interval) else { return finding.verdict == Severity::Fault };
     let (low, high) = (value - WIDER * (value - low), value + WIDER * (high - value));
     match finding.subject {
-        Subject::Timing => finding.verdict >= Verdict::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
+        Subject::Timing => finding.verdict >= Severity::Warning && value.abs() >= LATE_S && (low > 0.0 || high < 0.0),
         Subject::Conventions | Subject::Excitation if finding.expected == Some(0.0) => {
-            finding.verdict == Verdict::Fault && (low > 0.0 || high < 0.0)
+            finding.verdict == Severity::Fault && (low > 0.0 || high < 0.0)
         }
-        Subject::Conventions | Subject::Excitation => finding.verdict == Verdict::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
+        Subject::Conventions | Subject::Excitation => finding.verdict == Severity::Fault && (low > 1.0 + OFF || high < 1.0 - OFF),
     }
 }
 
@@ -366,11 +347,11 @@ pub(super) fn lengths(coefficients: &[Finding]) -> Option<Finding> {
     };
     let value = 0.5 * (both[0].0 + both[1].0);
     let found = LENGTHS.into_iter().find(|(unit, ..)| is_near(*unit));
-    let mut finding = super::finding("lengths", Verdict::Ok, "gravity has the size that it has in metres".into(), None);
+    let mut finding = finding("lengths", Severity::Ok, "gravity has the size that it has in metres".into(), None);
     finding.measured = Some(value);
     finding.expected = Some(1.0);
     if let Some((_, name, unit)) = found {
-        finding.verdict = Verdict::Fault;
+        finding.verdict = Severity::Fault;
         finding.message = format!("gravity has the size that it has where all lengths are in {name}");
         finding.set = Some(format!("[units] position = \"{unit}\", velocity = \"{unit}/s\", acceleration = \"{unit}/s^2\""));
     }

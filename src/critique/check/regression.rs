@@ -1,6 +1,6 @@
 //! Least squares on sums by block, and intervals that hold where errors within a block depend on each other.
 
-use crate::student::quantile_975;
+use crate::student_t::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// Sums of one block: XᵀX, Xᵀy and Σy².

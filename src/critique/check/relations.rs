@@ -4,8 +4,8 @@
 //! and f. If another reading leaves less than half of the error, consistently over blocks, the log is in that other reading: no
 //! aerodynamics enters, so nothing but a convention can do that. Gains of single axes are in `gains`.
 
+use super::finding::{Finding, Severity, Subject};
 use super::increments::{Instant, Motion, Vector};
-use super::report::{Finding, Subject, Verdict};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
 use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};
@@ -304,7 +304,7 @@ impl Relation {
         self.open = None;
     }
 
-    /// Verdict over all flights, `left` as of [`Relation::other_reading`]; `None` where the relation never applied.
+    /// Severity over all flights, `left` as of [`Relation::other_reading`]; `None` where the relation never applied.
     pub fn finding(&self, left: f64) -> Option<Finding> {
         let blocks = self.misfit.first()?.len();
         if blocks == 0 {
@@ -314,7 +314,7 @@ impl Relation {
         let mut finding = Finding {
             name: self.name.into(),
             subject: Subject::Conventions,
-            verdict: Verdict::Ok,
+            verdict: Severity::Ok,
             measured: Some(100.0 * nominal),
             interval: None,
             expected: Some(0.0),
@@ -324,10 +324,10 @@ impl Relation {
             flights: Vec::new(),
         };
         if !nominal.is_finite() || blocks < FEW_BLOCKS {
-            finding.verdict = Verdict::Undetermined;
+            finding.verdict = Severity::Undetermined;
             finding.message = format!("{}: too little movement or fewer than {FEW_BLOCKS} blocks of 10 s to say", self.formula);
         } else if let Some(index) = self.other_reading(left) {
-            finding.verdict = Verdict::Fault;
+            finding.verdict = Severity::Fault;
             finding.message = format!(
                 "{} does not hold; {} ({:.1} % unexplained that way)",
                 self.formula,
@@ -336,7 +336,7 @@ impl Relation {
             );
             finding.set = Some(self.hypotheses[index].set.into());
         } else if nominal > POOR_SHARE {
-            finding.verdict = Verdict::Warning;
+            finding.verdict = Severity::Warning;
             finding.message = format!("{} holds poorly, and no other reading of the log does much better", self.formula);
         }
         Some(finding)

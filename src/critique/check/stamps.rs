@@ -4,10 +4,10 @@
 //! When a control acts nobody knows beforehand, so flights are compared: what one says of two axes at least must lie by the same whole number of samples
 //! from what most say, and nearly all flights must lie at whole numbers, or the differences are those of what is flown.
 
-use super::odd::{FEWEST, MOST, Own};
-use super::report::{Finding, Subject, Verdict};
-use super::sticks::median;
-use super::{finding, named};
+use super::finding::{Finding, Severity, Subject, finding};
+use super::flights::{FEWEST, MOST, named};
+use super::odd::Own;
+use super::robust::median;
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -133,7 +133,7 @@ fn told(samples: i64, logs: &[&str], of_all: usize, step_s: f64) -> Finding {
         measured: Some(late_s),
         unit: "s".into(),
         flights: logs.iter().map(|&log| log.to_owned()).collect(),
-        ..finding(NAME, Verdict::Warning, message, Some(&set))
+        ..finding(NAME, Severity::Warning, message, Some(&set))
     }
 }
 

@@ -5,11 +5,11 @@
 //! Each axis is a regression of its change over a piece on its own state, all four sticks and 1, all integrated over the piece. Nothing is differentiated, and the
 //! recorded accelerations are not looked at: a stream of theirs that is late says nothing about sticks.
 
-use super::finding;
+use super::finding::{Finding, Severity, finding};
+use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::Motion;
-use super::odd::{FEWEST, MOST, WIDER, in_flights};
 use super::regression::{BlockRegression, Estimate};
-use super::report::{Finding, Verdict};
+use super::robust::median;
 use super::unexplained::{Fit, Left};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
@@ -169,7 +169,7 @@ impl Sticks {
             alike as f64 > MOST * known.len() as f64 || exchanged.is_empty()
         });
         match common {
-            Some(order) => findings.push(finding("stick_order", Verdict::Fault, exchange(&order), Some(&swap(&order)))),
+            Some(order) => findings.push(finding("stick_order", Severity::Fault, exchange(&order), Some(&swap(&order)))),
             None => {
                 let mut orders: Vec<[usize; 4]> = exchanged.iter().map(|entry| entry.1).collect();
                 orders.sort_unstable();
@@ -191,8 +191,8 @@ impl Sticks {
             let open: Vec<&str> =
                 (0..4).filter(|&axis| !whole.as_ref().is_some_and(|all| all.is_own(axis))).map(|axis| AXES[axis]).collect();
             let (verdict, message) = match open.as_slice() {
-                [] => (Verdict::Ok, "each axis answers to its own stick, alike in all flights".into()),
-                open => (Verdict::Undetermined, format!("these flights do not tell which stick moves {}", joined(open))),
+                [] => (Severity::Ok, "each axis answers to its own stick, alike in all flights".into()),
+                open => (Severity::Undetermined, format!("these flights do not tell which stick moves {}", joined(open))),
             };
             findings.push(finding("sticks", verdict, message, None));
         }
@@ -346,15 +346,4 @@ fn joined(names: &[&str]) -> String {
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
         names => names.join(", "),
     }
-}
-
-pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
-}
-
-/// The lower quartile: what is usual where half of the flights may be faulty upwards.
-pub(super) fn lower_quartile(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 4).copied()
 }

@@ -1,9 +1,9 @@
 //! Streams that hold less than the log they stand in: a value frozen for seconds, one held from each sample of a slower stream to the next, one
 //! rounded coarsely, one with more noise in some flights than in the others. All are seen in a column by itself, without physics.
 
-use super::odd::{MOST, in_flights};
-use super::report::{Finding, Verdict};
-use super::{CONTROLS, finding, of_all};
+use super::finding::{Finding, Severity, finding};
+use super::flights::{CONTROLS, MOST, in_flights, of_all};
+use super::robust::{lower_quartile, median};
 use crate::flight::{Column, Flight};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -79,7 +79,7 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let rounded: Vec<(Column, Finding)> =
         grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
     // Steps of rounding look like noise.
-    let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Verdict::Fault);
+    let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Severity::Fault);
     let noisy = NOISY.into_iter().chain(CONTROLS).filter(present).filter(is_smooth).filter_map(|column| noise(flights, column));
     let noisy: Vec<Finding> =
         noisy.chain(CONTROLS.into_iter().filter(is_smooth).filter_map(|column| rough(flights, column))).collect();
@@ -153,7 +153,7 @@ impl Rests {
         let set = (POSITION.contains(&column) || column == Column::Yaw).then_some(missing.as_str());
         match such.as_slice() {
             [] => None,
-            _ if is_set => Some(finding(&format!("frozen_{name}"), Verdict::Fault, message, set)),
+            _ if is_set => Some(finding(&format!("frozen_{name}"), Severity::Fault, message, set)),
             some => Some(in_flights(&format!("frozen_{name}"), some, &message, flights)),
         }
     }
@@ -169,7 +169,7 @@ impl Rests {
         };
         let each: Vec<(usize, usize)> =
             self.counts.iter().enumerate().filter_map(|(index, counts)| Some((index, of_flight(counts)?))).collect();
-        let hold = super::sticks::median(each.iter().map(|entry| entry.1 as f64).collect())?;
+        let hold = median(each.iter().map(|entry| entry.1 as f64).collect())?;
         let such: Vec<usize> = each.iter().filter(|entry| entry.1 as f64 == hold).map(|entry| entry.0).collect();
         let seconds = hold * flights[*such.first()?].step_s;
         let is_set = such.len() as f64 > MOST * flights.len() as f64;
@@ -199,7 +199,7 @@ fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Findin
     );
     match hold.flights.as_slice() {
         [] => {
-            let verdict = if matters { Verdict::Fault } else { Verdict::Warning };
+            let verdict = if matters { Severity::Fault } else { Severity::Warning };
             Some(finding(&name, verdict, message, Some(&format!("resample_hz = {rate_hz:.3}"))))
         }
         some => matters.then(|| in_flights(&name, some, &message, flights)),
@@ -227,12 +227,12 @@ impl Grains {
     fn finding(&self, flights: &[Flight], column: Column) -> Option<Finding> {
         // In the quieter flights it matters first.
         let each = (0..flights.len()).map(|index| variance(&flights[index..=index], column));
-        let variance = super::sticks::lower_quartile(each.filter(|variance| *variance > 0.0).collect())?;
+        let variance = lower_quartile(each.filter(|variance| *variance > 0.0).collect())?;
         // An error that is as likely anywhere within a step has a twelfth of its square as variance.
         let share = |step: f64| step * step / 12.0 / variance;
         let noticed = |(index, step): (usize, &Option<f64>)| step.filter(|step| share(*step) > NOTICED).map(|step| (index, step));
         let such: Vec<(usize, f64)> = self.steps.iter().enumerate().filter_map(noticed).collect();
-        let step = super::sticks::median(such.iter().map(|entry| entry.1).collect())?;
+        let step = median(such.iter().map(|entry| entry.1).collect())?;
         let name = column.name();
         let message = format!(
             "{name} is rounded to {step:.3}, {:.1} % of its variance: what it moves comes out too small by about that, and the rounding can look \
@@ -241,7 +241,7 @@ impl Grains {
         );
         let is_coarse = share(step) > COARSE && share(step).is_finite();
         if such.len() as f64 > MOST * self.telling as f64 {
-            let verdict = if is_coarse { Verdict::Fault } else { Verdict::Warning };
+            let verdict = if is_coarse { Severity::Fault } else { Severity::Warning };
             return Some(finding(&format!("rounding_{name}"), verdict, message, None));
         }
         let indices: Vec<usize> = such.into_iter().map(|entry| entry.0).collect();
@@ -277,14 +277,14 @@ fn variance(flights: &[Flight], column: Column) -> f64 {
 /// Flights in which a column has much more white noise than in the others.
 fn noise(flights: &[Flight], column: Column) -> Option<Finding> {
     let each: Vec<f64> = flights.iter().map(|flight| noise_of(flight, column)).collect();
-    let usual = super::sticks::lower_quartile(each.clone())?;
+    let usual = lower_quartile(each.clone())?;
     let least = (NOISIER * usual).max(LEAST_NOISE * variance(flights, column).sqrt());
     // In other units the noise is another, too, but no other share.
     let share = |index: usize| each[index] / variance(&flights[index..=index], column).sqrt();
-    let usual_share = super::sticks::lower_quartile((0..each.len()).map(share).collect())?;
+    let usual_share = lower_quartile((0..each.len()).map(share).collect())?;
     let such: Vec<usize> =
         (0..each.len()).filter(|&index| each[index] > least && share(index) > 0.5 * NOISIER * usual_share).collect();
-    let size = super::sticks::median(such.iter().map(|&index| each[index]).collect())?;
+    let size = median(such.iter().map(|&index| each[index]).collect())?;
     let name = column.name();
     let message = format!(
         "{name} has noise of {size:.3} {} (rms), where the others have {usual:.3}: what it moves comes out too small",
@@ -295,7 +295,7 @@ fn noise(flights: &[Flight], column: Column) -> Option<Finding> {
 
 /// A stick that trembles in most flights: as noise of the log it makes lags of its own; as the command of a controller it is what it is.
 fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
-    let size = super::sticks::median(flights.iter().map(|flight| noise_of(flight, column)).collect())?;
+    let size = median(flights.iter().map(|flight| noise_of(flight, column)).collect())?;
     let deviation = variance(flights, column).sqrt();
     let share = (size / deviation).powi(2);
     let name = column.name();
@@ -304,7 +304,7 @@ fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
          as behind a lag",
         100.0 * share
     );
-    let verdict = if size > SWAMPED * deviation { Verdict::Fault } else { Verdict::Warning };
+    let verdict = if size > SWAMPED * deviation { Severity::Fault } else { Severity::Warning };
     (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
 }
 

@@ -4,7 +4,8 @@
 //! Findings speak of columns as the program has them, in its axes and units, and of flights as they were read: a description that states something
 //! already is what they come on top of. What cannot be said so, or leaves a choice, is left to a person.
 
-use super::report::{CheckReport, Finding, Verdict};
+use super::finding::{Finding, Severity};
+use super::report::CheckReport;
 use crate::critique::wrap::wrapped;
 use crate::flight::{Axes, Column, Description, Frame, Schema, Source, TargetKind, Targets, column_names, columns_of};
 use crate::formula::Formula;
@@ -48,7 +49,7 @@ impl CheckReport {
     /// What mends the faults that were found in flights of this source. `None` where nothing is at fault, or where the source has a description that is
     /// none.
     pub fn suggestion(&self, source: &Source) -> Option<Suggestion> {
-        let is_mended = |finding: &&Finding| finding.verdict == Verdict::Fault || finding.name == super::stamps::NAME;
+        let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || finding.name == super::stamps::NAME;
         let mut faults = self.findings.iter().filter(is_mended).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
@@ -366,7 +367,7 @@ fn comment(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::Subject;
+    use super::super::finding::Subject;
     use super::*;
 
     /// A report with these faults: a line and the flights that it is about.
@@ -374,7 +375,7 @@ mod tests {
         let finding = |(place, (line, flights)): (usize, &(&str, &[&str]))| Finding {
             name: format!("fault_{place}"),
             subject: Subject::Conventions,
-            verdict: Verdict::Fault,
+            verdict: Severity::Fault,
             measured: None,
             interval: None,
             expected: None,

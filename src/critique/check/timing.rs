@@ -4,13 +4,13 @@
 //! rate and not with its square; the minimum is refined by a parabola, and its interval is from leaving out one block at a time
 //! (jackknife). A flight whose step differs from the first's is left out.
 
+use super::finding::{Finding, Severity, Subject};
 use super::increments::Motion;
 use super::regression::BlockRegression;
-use super::report::{Finding, Subject, Verdict};
 use super::sticks::{EXPLAINED, STICKS};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
-use crate::student::quantile_975;
+use crate::student_t::quantile_975;
 use serde::{Deserialize, Serialize};
 
 /// Streams are compared up to this shift to either side, s.
@@ -330,7 +330,7 @@ impl Timing {
             Some(Finding {
                 name: format!("delay_{name}"),
                 subject: Subject::Timing,
-                verdict: if minimum.interval[1] < -profile.grid { Verdict::Warning } else { Verdict::Ok },
+                verdict: if minimum.interval[1] < -profile.grid { Severity::Warning } else { Severity::Ok },
                 measured: Some(at_s),
                 interval: Some(minimum.interval.map(|samples| samples * self.step_s)),
                 expected: None,
@@ -360,7 +360,7 @@ impl Timing {
         let mut finding = Finding {
             name: "control_delay".into(),
             subject: Subject::Timing,
-            verdict: Verdict::Undetermined,
+            verdict: Severity::Undetermined,
             measured: None,
             interval: None,
             expected: of_model_s,
@@ -388,10 +388,10 @@ impl Timing {
         let Some(minimum) = profile.minimum().filter(|minimum| minimum.depth > LEAST_DEPTH) else { return (finding, Some(shown)) };
         let [low, high] = minimum.interval.map(|samples| samples * step_s);
         let delay_s = minimum.at * step_s;
-        (finding.measured, finding.interval, finding.verdict) = (Some(delay_s), Some([low, high]), Verdict::Ok);
+        (finding.measured, finding.interval, finding.verdict) = (Some(delay_s), Some([low, high]), Severity::Ok);
         let at_end = [profile.shifts.first(), profile.shifts.last()].into_iter().flatten().any(|end| *end as f64 == minimum.at);
         if high < -grid_s {
-            finding.verdict = Verdict::Warning;
+            finding.verdict = Severity::Warning;
             finding.message =
                 "the controls are recorded after they act, or a feedback loop drives them; look at the log's time stamps".into();
         } else {
@@ -400,10 +400,10 @@ impl Timing {
             let written = delay_s.max(0.0);
             finding.set = Some(format!("control_delay_s = {written:.3} under [data] in the model file"));
             if of_model_s.is_some_and(|model_s| model_s < low - grid_s || model_s > high + grid_s) {
-                finding.verdict = Verdict::Warning;
+                finding.verdict = Severity::Warning;
                 finding.message.push_str(", which is not what the model says");
             } else if at_end {
-                finding.verdict = Verdict::Warning;
+                finding.verdict = Severity::Warning;
             }
         }
         (finding, Some(shown))
@@ -414,7 +414,7 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64, least_fall: f64) -> Findi
     let mut finding = Finding {
         name: pair.name.into(),
         subject: Subject::Timing,
-        verdict: Verdict::Undetermined,
+        verdict: Severity::Undetermined,
         measured: None,
         interval: None,
         expected: Some(0.0),
@@ -429,13 +429,13 @@ fn offset(pair: &Pair, profile: &Profile, step_s: f64, least_fall: f64) -> Findi
     let [low, high] = minimum.interval;
     // Half a sample (half a shift, where these are further apart) is what sampling itself leaves open.
     if minimum.at.abs() > profile.grid && minimum.fall >= least_fall && (low > 0.5 * profile.grid || high < -0.5 * profile.grid) {
-        finding.verdict = Verdict::Warning;
+        finding.verdict = Severity::Warning;
         let late = minimum.at > 0.0;
         finding.message = format!("{} by {:.0} ms", if late { pair.late } else { pair.early }, 1e3 * (minimum.at * step_s).abs());
         // Of two streams either may be the wrong one.
         finding.set = Some(format!("[late] {} = {:.3}", pair.second, minimum.at * step_s));
     } else {
-        finding.verdict = Verdict::Ok;
+        finding.verdict = Severity::Ok;
         finding.message = "in step".into();
     }
     finding

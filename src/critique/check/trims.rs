@@ -1,11 +1,11 @@
 //! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, and one that stands elsewhere in some flights
 //! than in the others for the same answer. Signs, gains and order of the sticks are the business of `sticks`.
 
-use super::CONTROLS;
+use super::finding::{Finding, Severity};
+use super::flights::{CONTROLS, in_flights};
 use super::increments::SHORT_BLOCK_S;
-use super::odd::{NORMAL, in_flights};
-use super::report::{Finding, Verdict};
-use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks, median};
+use super::robust::{NORMAL, median};
+use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks};
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
@@ -104,7 +104,7 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
     );
     let mut indices: Vec<usize> = fewer.iter().map(|trim| trim.flight).collect();
     indices.sort_unstable();
-    Some(Finding { verdict: Verdict::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
+    Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
 }
 
 /// The smaller of two groups of trims far apart, and by how much it differs; `None` where there is one group.

@@ -6,11 +6,11 @@
 //! in its own unit and as a share of what moves, has something that they have not. Of a relation that is pure mechanics this is a fault of the log. An
 //! axis that answers to nothing may also be an aircraft that lost its rotor speed, so that is a warning.
 
+use super::finding::{Finding, Severity};
+use super::flights::{MOST, in_flights};
 use super::increments::SHORT_BLOCK_S;
-use super::odd::{MOST, in_flights};
 use super::regression::BlockRegression;
-use super::report::{Finding, Verdict};
-use super::sticks::lower_quartile;
+use super::robust::lower_quartile;
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
@@ -114,7 +114,7 @@ pub(super) fn of_answers(each: &[OfFlight], except: &BTreeSet<usize>, flights: &
             one.how()
         );
         let indices: Vec<usize> = one.flights.iter().map(|entry| entry.0).collect();
-        Finding { verdict: Verdict::Warning, ..in_flights(&format!("{UNEXPLAINED}{axis}"), &indices, &message, flights) }
+        Finding { verdict: Severity::Warning, ..in_flights(&format!("{UNEXPLAINED}{axis}"), &indices, &message, flights) }
     };
     broken(each, |fit| matches!(fit, Fit::Answer { .. }), except).into_iter().map(told).collect()
 }

@@ -4,21 +4,22 @@
 use super::amend::{Amended, as_in_the_model, searched};
 use super::confirm::confirm;
 use super::describe::{accepted, summary};
-use super::engine::{Engine, FOLDS};
+use super::engine::{Engine, Errors, FOLDS};
 use super::gates::{BLOCK_S, CORRELATION_S};
 use super::gram::blocks;
-use super::joint::{Errors, Point, undetermined};
+use super::joint::{Point, undetermined};
 use super::own::Halves;
 use super::report::{Bar, Diagnosis, Locked, Status, Step, Verdict, Worth};
+use super::selection::selection;
 use super::sentences;
 use crate::blocks::{BlockMean, BlockSum};
 use crate::critique::channels::PerChannel;
 use crate::critique::shares::Share;
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Column, Flight};
 use crate::physics::Model;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Time of flight that a model without one of its effects is fitted to, s, where more was searched, and flights at least: half an hour settles the
 /// others' numbers well enough to tell what comes back.
@@ -81,31 +82,6 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
     let mut worth: Vec<Worth> = named.iter().enumerate().map(of).collect::<Result<_>>()?;
     worth.sort_by(|left, right| right.at_least().total_cmp(&left.at_least()));
     Ok(worth)
-}
-
-/// Some seconds of flight out of the spans: every second, third … flight as long as some flights are left, and the first part of each. What
-/// remembers runs from the start of a flight, so a part from its middle would take as long.
-pub(super) fn selection(flights: &[Flight], spans: &[Span], (seconds, fewest): (f64, usize)) -> Vec<Span> {
-    let length = |span: &Span| flights.get(span.flight).map_or(0.0, |flight| (span.end - span.start) as f64 * flight.step_s);
-    let total: f64 = spans.iter().map(length).sum();
-    let used: Vec<usize> = spans.iter().map(|span| span.flight).collect::<BTreeSet<_>>().into_iter().collect();
-    let every = ((total / seconds) as usize).min(used.len() / fewest).max(1);
-    let chosen: Vec<usize> = used.into_iter().step_by(every).collect();
-    let whole: f64 = spans.iter().filter(|span| chosen.contains(&span.flight)).map(length).sum();
-    let share = (seconds / whole).min(1.0);
-    let mut kept = Vec::new();
-    for flight in chosen {
-        let mut own: Vec<Span> = spans.iter().filter(|span| span.flight == flight).copied().collect();
-        own.sort_unstable_by_key(|span| span.start);
-        let samples: usize = own.iter().map(|span| span.end - span.start).sum();
-        let mut left = (share * samples as f64).ceil() as usize;
-        for span in own {
-            let end = span.start + left.min(span.end - span.start);
-            left -= end - span.start;
-            kept.extend((span.start < end).then_some(Span { end, ..span }));
-        }
-    }
-    kept
 }
 
 /// Squared error of each block before anything was added: of the model without all that was found, brought to the sum that was measured.
@@ -220,6 +196,7 @@ mod tests {
     use super::super::gram::tests::{model, noise};
     use super::super::{Options, amend, calibrated};
     use super::*;
+    use crate::flight::Span;
     use crate::flight::split::Part;
     use crate::physics::{Effect, catalogue};
 
@@ -323,25 +300,5 @@ mod tests {
         let kept = each_once(rounds.iter().flatten());
         let told: Vec<(&str, f64)> = kept.iter().map(|step| (step.effect.as_str(), step.p_value)).collect();
         assert_eq!(told, [("one", 0.4), ("two", 0.2), ("three", 0.3)]);
-    }
-
-    #[test]
-    fn a_selection_keeps_twenty_flights_or_all_and_the_first_part_of_each() -> Result<()> {
-        let flight = |name: usize, samples: usize| {
-            let columns = std::array::from_fn(|_| vec![0.0; samples]);
-            Flight::new(name.to_string(), "rest", 0.0, 1.0, columns, crate::flight::Targets::Recorded)
-        };
-        for (count, samples, kept) in [(19, 1000, 19), (100, 10, 100), (100, 100, 20), (60, 50, 60), (60, 60, 30), (45, 1000, 23)] {
-            let flights: Vec<Flight> = (0..count).map(|name| flight(name, samples)).collect::<Result<_>>()?;
-            let spans: Vec<Span> = (0..count).map(|flight| Span { flight, start: 0, end: samples }).collect();
-            let selected = selection(&flights, &spans, REFIT);
-            assert_eq!(selected.len(), kept, "{count} of {samples} s");
-            // No more than was asked for, but for the rounding of each; and from the start of each flight.
-            let total: usize = selected.iter().map(|span| span.end).sum();
-            let asked = (count * samples).min(REFIT.0 as usize);
-            assert!((asked..=asked.max(1800) + kept).contains(&total), "{total} s of {count} of {samples} s");
-            assert!(selected.iter().all(|span| span.start == 0));
-        }
-        Ok(())
     }
 }

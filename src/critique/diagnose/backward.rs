@@ -1,19 +1,20 @@
 //! The backward road: every effect that applies at once, all numbers fitted together, then what is needless left out. Forms interact, so
 //! an effect can look small by itself and be large beside the others; a search that adds one after the other underrates it.
 
-use super::account::selection;
-use super::candidate::{Candidate, with};
-use super::engine::{Engine, permuted_folds};
-use super::gates::{BLOCK_S, LOOSE, SMALLEST_AMPLITUDE, SMALLEST_AMPLITUDE_OF_RIVAL, SMALLEST_FALL};
+use super::candidate::{Candidate, is_found, with};
+use super::engine::{Engine, Errors, permuted_folds};
+use super::gains::{by_flight_of, gains_of};
+use super::gates::{BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
-use super::influence::{Influences, decisive_flight};
-use super::joint::{Errors, Folds, Point, undetermined};
-use super::score::{by_flight_of, gains_of};
+use super::influence::decisive_flight;
+use super::joint::{Folds, Point, undetermined};
+use super::judged::{Fitted, Judged};
 use super::search::Search;
+use super::selection::selection;
 use super::significance::Flips;
 use crate::error::Result;
 use crate::flight::Span;
-use crate::physics::{Effect, Model, catalogue, off_zero};
+use crate::physics::{Effect, Model, off_zero};
 use std::collections::BTreeMap;
 
 /// Time of flight on which everything is fitted first, s, and flights at least: many steps on it cost as much as few on all.
@@ -35,61 +36,6 @@ const MOST_ROUNDS: usize = 6;
 /// held-out blocks: two of which one is needed cost more together.
 const SLACK: f64 = 0.5;
 
-/// An effect, and what it brings beside all others that are in.
-pub(super) struct Judged {
-    pub effect: String,
-    /// Gain of each block.
-    pub gains: Vec<f64>,
-    /// Share of the held-out error without it that it removes, by channel that it changes.
-    pub falls: BTreeMap<usize, f64>,
-    pub p_value: f64,
-    /// Standard error of its best known number, in usual sizes.
-    pub looseness: f64,
-    /// A flight without which its gain would be gone.
-    pub rests_on: Option<String>,
-    /// Whether its numbers belong to each flight.
-    by_flight: bool,
-    /// An effect whose form it may only mend.
-    pub mends: Option<String>,
-}
-
-impl Judged {
-    pub fn gain(&self) -> f64 {
-        self.gains.iter().sum()
-    }
-
-    pub fn largest_fall(&self) -> f64 {
-        self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// What it removes of a channel's error, in units of what is left with it.
-    fn removed(&self, channel: usize) -> f64 {
-        self.falls.get(&channel).map_or(0.0, |fall| fall / (1.0 - fall))
-    }
-
-    /// The effect whose form this one may only mend: in every channel in which it is worth while, some other removes so much more that
-    /// its form need be wrong by little. The form of a property of each flight is not in doubt.
-    fn flaw_of<'j>(&self, others: impl Iterator<Item = &'j Judged> + Clone) -> Option<&'j str> {
-        let notes = |kind: &str| catalogue::definition(kind).and_then(|definition| definition.notes);
-        let listed = |one: &str, other: &str| notes(one).is_some_and(|notes| notes.confusable_with.contains(&other));
-        let stronger = |channel: usize| {
-            others.clone().filter(|other| other.effect != self.effect && !other.by_flight).find(|other| {
-                let related = listed(&self.effect, &other.effect) || listed(&other.effect, &self.effect);
-                let amplitude = if related { SMALLEST_AMPLITUDE_OF_RIVAL } else { SMALLEST_AMPLITUDE };
-                self.removed(channel) < amplitude * amplitude * other.removed(channel)
-            })
-        };
-        let worthy = self.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
-        let found: Vec<Option<&Judged>> = worthy.map(|(&channel, _)| stronger(channel)).collect();
-        found.iter().all(Option::is_some).then(|| found.first().copied().flatten().map(|other| other.effect.as_str()))?
-    }
-
-    /// Whether these flights could show it.
-    pub fn is_excited(&self) -> bool {
-        self.looseness <= LOOSE
-    }
-}
-
 /// What the road came to.
 pub(super) struct Backward {
     /// With what is needed, fitted, with intervals.
@@ -98,12 +44,6 @@ pub(super) struct Backward {
     pub needed: Vec<Judged>,
     /// As they were when they were left out.
     pub needless: Vec<Judged>,
-}
-
-/// A model whose numbers and intervals are from all that was searched, and those of them that hang on one flight.
-pub(super) struct Fitted {
-    pub model: Model,
-    pub influences: Influences,
 }
 
 /// Effects by place in [`Point::optional`].
@@ -324,9 +264,4 @@ fn note_looseness(point: &Point, looseness: &[f64], pruned: &mut Pruned) {
         let place = point.optional.iter().position(|&effect| point.model.effects[effect].name == judged.effect);
         judged.looseness = place.map_or(f64::INFINITY, |place| looseness[place]);
     }
-}
-
-/// Whether a search put an effect into the model.
-pub(super) fn is_found(effect: &Effect) -> bool {
-    effect.added_by.as_deref() == Some("diagnose")
 }

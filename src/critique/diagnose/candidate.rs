@@ -105,3 +105,8 @@ pub(super) fn with(model: &Model, effect: &Effect) -> Model {
     enlarged.effects.push(effect.clone());
     enlarged
 }
+
+/// Whether a search put an effect into the model.
+pub(super) fn is_found(effect: &Effect) -> bool {
+    effect.added_by.as_deref() == Some("diagnose")
+}

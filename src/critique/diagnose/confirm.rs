@@ -1,6 +1,6 @@
 //! The confirmation: errors on flights that no search has seen, with none, one, two … of the accepted effects.
 
-use super::joint::Errors;
+use super::engine::Errors;
 use super::own::{Halves, Judgement, judged_errors};
 use super::report::{Bar, Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};

@@ -1,14 +1,15 @@
 //! From what a search found to what is said of it. No measuring here.
 
-use super::backward::{Fitted, Judged};
 use super::candidate::Candidate;
 use super::engine::Trial;
+use super::found::Found;
 use super::gates::SMALLEST_FALL;
 use super::influence::decisive_flight;
+use super::judged::{Fitted, Judged};
 use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
 use super::resample::{RESAMPLES, draw};
-use super::score::Scored;
-use super::search::{Found, Search};
+use super::scored::Scored;
+use super::search::Search;
 use super::sentences;
 use crate::flight::Column;
 use crate::physics::{Coefficient, Definition, Effect, Parameter, catalogue};

@@ -31,6 +31,9 @@ pub(super) struct Engine<'a> {
     pub held: Vec<(String, String)>,
 }
 
+/// Squared errors by channel and block.
+pub(super) type Errors = [Vec<f64>; 6];
+
 /// A model on the blocks.
 #[derive(Clone, Debug)]
 pub(super) struct Trial {
@@ -38,7 +41,7 @@ pub(super) struct Trial {
     pub model: Model,
     pub layout: Layout,
     /// For each channel the squared error of each block under coefficients of other folds.
-    pub errors: [Vec<f64>; 6],
+    pub errors: Errors,
     /// Channels that the model changes against the one it is compared with.
     pub changed: [bool; 6],
     /// Whether a coefficient of the last effect is on a bound.

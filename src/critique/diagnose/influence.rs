@@ -4,8 +4,8 @@
 //! No block is weighed down for its size: an effect that acts in few manoeuvres is all in blocks that look like outliers.
 
 use super::engine::Engine;
+use super::gains::by_flight_of;
 use super::report::Influence;
-use super::score::by_flight_of;
 use crate::flight::Flight;
 use std::collections::BTreeMap;
 use std::fmt;

@@ -10,7 +10,7 @@ mod normal;
 mod spread;
 
 use super::design::{Design, Free, Layout};
-use super::engine::{Engine, FOLDS};
+use super::engine::{Engine, Errors, FOLDS};
 use super::fit::Reduced;
 use super::gram::grams;
 use super::known::{Known, known};
@@ -65,9 +65,6 @@ pub(super) struct Folds {
     locals: Vec<usize>,
     normals: Vec<Normal>,
 }
-
-/// Squared errors by channel and block.
-pub(super) type Errors = [Vec<f64>; 6];
 
 impl Point {
     /// The neighbourhood of a model; `optional` effects may then be left out.

@@ -1,14 +1,15 @@
 //! The models between the one that was given and the one with all that was found, by which it shows how the error falls. Nothing is
 //! searched or decided here, and no error measured on flights that are kept.
 
-use super::account::selection;
 use super::candidate::with;
 use super::confirm::Rung;
 use super::engine::Engine;
+use super::found::Found;
 use super::gates::BLOCK_S;
 use super::joint::{Moving, Point};
 use super::own::{Halves, judged_errors};
-use super::search::{Found, Search};
+use super::search::Search;
+use super::selection::selection;
 use crate::error::{Error, Result};
 use crate::flight::Span;
 use crate::physics::{Effect, Model};

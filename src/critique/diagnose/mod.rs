@@ -18,10 +18,14 @@ mod design;
 mod engine;
 mod failure;
 mod fit;
+mod forward;
+mod found;
+mod gains;
 mod gates;
 mod gram;
 mod influence;
 mod joint;
+mod judged;
 mod known;
 mod ladder;
 mod own;
@@ -30,13 +34,15 @@ mod report;
 mod resample;
 mod rest;
 mod score;
+mod scored;
 mod search;
+mod selection;
 pub mod sentences;
 mod significance;
 mod signs;
+mod stepwise_stlsq;
 mod suggest;
 mod text;
-mod textbook;
 mod verdict;
 
 pub use account::{together, weigh};
@@ -46,7 +52,8 @@ pub use report::{
     Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Influence, Kept, Locked, Method, Number,
     ParameterValue, Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,
 };
+pub use search::Options;
 pub use signs::number_remark;
+pub use stepwise_stlsq::{Named, stepwise_and_stlsq};
 pub use text::LoopText;
-pub use textbook::{Named, textbook};
-pub use verdict::{Options, Outcome, diagnose};
+pub use verdict::{Outcome, diagnose};

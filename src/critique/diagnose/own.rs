@@ -1,10 +1,9 @@
 //! Numbers that each flight has for itself (wind, a bias) on flights that no fit has seen: found from a flight's first half, so that its second
 //! half can judge. Nothing else is fitted here, and nothing judged.
 
-use super::engine::{Engine, FOLDS};
+use super::engine::{Engine, Errors, FOLDS};
 use super::gates::CORRELATION_S;
 use super::gram::blocks;
-use super::joint::Errors;
 use super::known::size_of;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};

@@ -2,7 +2,8 @@
 
 use super::candidate::with;
 use super::engine::Trial;
-use super::score::{Scored, gains, paired};
+use super::gains::{gains, paired};
+use super::scored::Scored;
 use super::search::Search;
 use crate::error::Result;
 use crate::physics::{Effect, Model};

@@ -2,89 +2,15 @@
 
 use super::candidate::{Candidate, with};
 use super::engine::{Engine, Pass, Trial, priors};
-use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, LARGEST_GAIN, SMALLEST_FALL, SMALLEST_MOVEMENT};
-use super::report::Status;
+use super::gains::gains;
+use super::gates::{CARRIED_SHARE, DETECTION, FEWEST_CARRYING, SMALLEST_FALL, SMALLEST_MOVEMENT};
+use super::scored::Scored;
 use super::search::Search;
-use super::sentences;
 use super::significance::{OwnBlocks, Raw, block_weights, raw_scores};
 use crate::error::Result;
-use crate::flight::Column;
 use crate::physics::Model;
 use std::collections::BTreeMap;
 use std::ops::Range;
-
-/// One candidate on one step.
-pub(super) struct Scored<'a> {
-    pub candidate: &'a Candidate,
-    /// The variant with the largest gain.
-    pub best: Trial,
-    pub gains: Vec<f64>,
-    pub gain: f64,
-    pub falls: BTreeMap<usize, f64>,
-    pub p_value: f64,
-    pub detection: Option<f64>,
-    pub excited: bool,
-    pub plausible: bool,
-    pub carrying: usize,
-    /// An accepted effect whose flaw it describes.
-    pub rival: Option<String>,
-    /// Values of each open parameter that are as good as the best; empty before refinement.
-    pub profiles: BTreeMap<String, [f64; 2]>,
-}
-
-impl Scored<'_> {
-    pub(super) fn largest_fall(&self) -> f64 {
-        self.falls.values().copied().fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Whether no channel is predicted worse by as much as would count as better.
-    fn harms_nothing(&self) -> bool {
-        self.falls.values().all(|fall| *fall > -SMALLEST_FALL)
-    }
-
-    pub(super) fn passes(&self, largest_p: f64) -> bool {
-        self.harms_nothing()
-            && self.rival.is_none()
-            && self.excited
-            && self.plausible
-            && self.gain > 0.0
-            && self.p_value <= largest_p
-            && self.largest_fall() >= SMALLEST_FALL
-    }
-
-    pub(super) fn status(&self, largest_p: f64) -> Status {
-        match () {
-            () if !self.excited => Status::NotExcited,
-            () if self.p_value > largest_p => Status::NotSignificant,
-            () if !self.plausible || !self.harms_nothing() => Status::Implausible,
-            () if self.rival.is_some() && self.largest_fall() >= SMALLEST_FALL => Status::SamePhysics,
-            () => Status::Negligible,
-        }
-    }
-
-    /// What decided that status, in words. `held` are coefficients held at the sign that physics gives them.
-    pub(super) fn reason(&self, largest_p: f64, held: &[(String, String)]) -> String {
-        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name());
-        match self.status(largest_p) {
-            Status::NotExcited => sentences::not_carried(self.carrying),
-            Status::NotSignificant => sentences::could_be_chance(self.p_value, largest_p),
-            Status::Implausible if !self.plausible => {
-                let own = held.iter().filter(|(kind, _)| *kind == self.candidate.effect.kind).map(|(_, name)| name.clone());
-                sentences::forbidden(&own.collect::<Vec<_>>())
-            }
-            Status::Implausible => {
-                let worst = self.falls.iter().min_by(|left, right| left.1.total_cmp(right.1));
-                worst.map_or_else(String::new, |(&channel, &fall)| sentences::makes_worse(name(channel), fall))
-            }
-            Status::SamePhysics => sentences::mends(self.rival.as_deref().unwrap_or("?")),
-            Status::Negligible if self.largest_fall() >= SMALLEST_FALL => sentences::few_blocks_gain(),
-            Status::Accepted | Status::Negligible => {
-                let best = self.falls.iter().max_by(|left, right| left.1.total_cmp(right.1));
-                best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(name(channel), fall))
-            }
-        }
-    }
-}
 
 pub(super) struct Movement {
     pub share: f64,
@@ -245,40 +171,6 @@ impl Search<'_> {
 fn usual_spreads(candidate: &Candidate) -> Vec<f64> {
     let known = |name: &str| candidate.definition?.coefficient(name)?.by_flight;
     candidate.effect.coefficients.iter().map(|coefficient| known(&coefficient.name).unwrap_or(1.0)).collect()
-}
-
-/// A block's gain: half the logarithm of the ratio of its held-out errors, over the channels, within bounds.
-pub(super) fn gains(base: &Trial, trial: &Trial) -> Vec<f64> {
-    gains_of(&base.errors, &trial.errors, &trial.changed)
-}
-
-/// The same of squared errors before and after, by channel and block, over some channels.
-pub(super) fn gains_of(before: &[Vec<f64>; 6], after: &[Vec<f64>; 6], channels: &[bool; 6]) -> Vec<f64> {
-    (0..before[0].len())
-        .map(|block| {
-            (0..6)
-                .filter(|&channel| channels[channel])
-                .map(|channel| {
-                    let gain = 0.5 * (before[channel][block] / after[channel][block]).ln();
-                    if gain.is_finite() { gain.clamp(-LARGEST_GAIN, LARGEST_GAIN) } else { 0.0 }
-                })
-                .sum()
-        })
-        .collect()
-}
-
-/// Gains of blocks, added up by flight.
-pub(super) fn by_flight_of(engine: &Engine<'_>, gains: &[f64]) -> Vec<f64> {
-    engine.runs().map(|run| gains[run].iter().sum()).collect()
-}
-
-/// Mean difference of paired gains times their number, and its standard error.
-pub(super) fn paired(left: &[f64], right: &[f64]) -> (f64, f64) {
-    let differences: Vec<f64> = left.iter().zip(right).map(|(left, right)| left - right).collect();
-    let count = differences.len().max(1) as f64;
-    let mean = differences.iter().sum::<f64>() / count;
-    let variance = differences.iter().map(|difference| (difference - mean).powi(2)).sum::<f64>() / (count - 1.0).max(1.0);
-    (mean * count, (variance * count).sqrt())
 }
 
 /// The controls must keep acting the way they act without the effect; an effect whose every coefficient had to be put on a bound of

@@ -1,8 +1,9 @@
 //! Signs that physics fixes, in a search: a coefficient whose whole interval lies on the wrong side of zero is held on the right one,
 //! and the search is done once more. What then still removes error is there; what only the wrong sign made useful is not.
 
+use super::found::Found;
 use super::report::Number;
-use super::search::{Found, Search};
+use super::search::Search;
 use crate::error::Result;
 use crate::physics::{Model, SignFinding, doubt};
 

@@ -1,11 +1,12 @@
 //! From flights and a model to a diagnosis: blocks, search, what is left, confirmation, verdict.
 
-use super::backward::{Backward, is_found};
-use super::candidate::{Candidate, candidates};
+use super::backward::Backward;
+use super::candidate::{Candidate, candidates, is_found};
 use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, permuted_folds};
 use super::failure::{Measured, failure};
+use super::found::Found;
 use super::gates::{
     BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, MOST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL,
 };
@@ -13,7 +14,7 @@ use super::gram::blocks;
 use super::own::prediction_errors;
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
 use super::rest::{channel, dependences, stands_in};
-use super::search::{Found, Search};
+use super::search::{Options, Search};
 use super::significance::Flips;
 use super::signs::wrong_signs;
 use super::{sentences, signs, suggest};
@@ -25,24 +26,6 @@ use std::time::Instant;
 
 /// Effects that are looked for one after the other, at most, where they cannot be fitted at once.
 const MOST_FORWARD: usize = 6;
-
-/// How a search is done.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Most effects to accept, one after the other. Without a limit, as soon as many are missing, all that apply are fitted at once and the
-    /// needless left out.
-    pub max_effects: Option<usize>,
-    /// Seed of folds, flips and resampling.
-    pub seed: u64,
-    /// Candidates to leave out.
-    pub without: Vec<String>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self { max_effects: None, seed: 1, without: Vec::new() }
-    }
-}
 
 /// A diagnosis and the model with what it found.
 #[derive(Clone, Debug)]

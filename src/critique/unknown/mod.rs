@@ -109,18 +109,18 @@ pub struct Unknown {
 /// [`Error::Shape`] if the columns of the table differ in length or its block numbers fall.
 pub fn unknown(table: &ResidualTable, options: &UnknownOptions) -> Result<Vec<Unknown>> {
     check(table)?;
-    let search = Search::new(table, options);
-    let whole = map(6, &|channel| search.dependence(&search.features, &search.starts, &table.residual[channel]));
-    let worth = |(_, found): &(usize, &Found)| found.r2_with_feedback > options.worth;
+    let halves = CrossFit::new(table, options);
+    let whole = map(6, &|channel| halves.dependence(&halves.features, &halves.starts, &table.residual[channel]));
+    let worth = |(_, found): &(usize, &Explained)| found.r2_with_feedback > options.worth;
     if !whole.iter().enumerate().any(|found| worth(&found)) {
         return Ok(Vec::new());
     }
-    let null_r2_95 = search.null(options.nulls);
+    let null_r2_95 = halves.null(options.nulls);
     let candidates = whole.iter().enumerate().filter(worth).filter(|(_, found)| found.r2_with_feedback > null_r2_95);
-    let candidates: Vec<(usize, &Found)> = candidates.collect();
+    let candidates: Vec<(usize, &Explained)> = candidates.collect();
     let described = map(candidates.len(), &|index| {
         let (channel, found) = candidates[index];
-        search.describe(channel, found, null_r2_95, options.worth)
+        halves.describe(channel, found, null_r2_95, options.worth)
     });
     let mut described: Vec<Unknown> = described.into_iter().flatten().collect();
     described.sort_by(|a, b| b.r2.total_cmp(&a.r2));
@@ -149,7 +149,7 @@ fn check(table: &ResidualTable) -> Result<()> {
 
 /// What trees on some of the features find in one channel.
 #[derive(Clone, Debug)]
-struct Found {
+struct Explained {
     r2: f64,
     r2_with_feedback: f64,
     /// κ, the smaller of both ways.
@@ -158,7 +158,7 @@ struct Found {
 }
 
 /// The halves of the blocks, binned features and the groups of features that are one variable.
-struct Search<'a> {
+struct CrossFit<'a> {
     table: &'a ResidualTable,
     seed: u64,
     blocks: Vec<Range<usize>>,
@@ -171,7 +171,7 @@ struct Search<'a> {
     groups: Vec<(String, Vec<usize>)>,
 }
 
-impl<'a> Search<'a> {
+impl<'a> CrossFit<'a> {
     fn new(table: &'a ResidualTable, options: &UnknownOptions) -> Self {
         let blocks = table.blocks();
         let order = permutation(blocks.len(), options.seed, 0);
@@ -205,9 +205,9 @@ impl<'a> Search<'a> {
     }
 
     /// Fits each half and judges on the other; `starts` are the same features at the start of each row.
-    fn dependence(&self, features: &Binned, starts: &Binned, residual: &[f64]) -> Found {
+    fn dependence(&self, features: &Binned, starts: &Binned, residual: &[f64]) -> Explained {
         let models = self.models(features, residual);
-        let mut found = Found { r2: 0.0, r2_with_feedback: 0.0, persists: 1.0, models };
+        let mut found = Explained { r2: 0.0, r2_with_feedback: 0.0, persists: 1.0, models };
         for (model, judged) in found.models.iter().zip(self.judged()) {
             if model.is_constant() {
                 found.persists = 0.0;
@@ -384,11 +384,11 @@ impl<'a> Search<'a> {
     }
 
     /// Names the variables behind a dependence; `None` if it is one of feedback.
-    fn describe(&self, channel: usize, found: &Found, null_r2_95: f64, worth: f64) -> Option<Unknown> {
+    fn describe(&self, channel: usize, found: &Explained, null_r2_95: f64, worth: f64) -> Option<Unknown> {
         let residual = &self.table.residual[channel];
         let mut shares = self.importance(found, residual);
         // Rivals often move together (height and thrust, speed and its components): each is tried alone.
-        let alone: Vec<Found> = shares
+        let alone: Vec<Explained> = shares
             .iter()
             .take(RIVALS)
             .map(|(group, _)| {
@@ -400,7 +400,7 @@ impl<'a> Search<'a> {
         let lines = self.beside_lines(&[], residual).0;
         let bent = lines < NEARLY_ALL * found.r2_with_feedback;
         let persists = if bent { PERSISTS } else { LINES_PERSIST };
-        let stands = |found: &Found| found.persists >= persists && found.r2 > worth && found.r2 > null_r2_95;
+        let stands = |found: &Explained| found.persists >= persists && found.r2 > worth && found.r2 > null_r2_95;
         let best = (0..alone.len()).max_by(|a, b| alone[*a].r2.total_cmp(&alone[*b].r2))?;
         let (mut r2, mut r2_with_feedback) = (found.r2, found.r2_with_feedback);
         if !stands(found) {
@@ -437,7 +437,7 @@ impl<'a> Search<'a> {
 
     /// Groups and their shares of the rise of the squared error when the group's values are shuffled among the judged rows
     /// (Breiman 2001), largest first.
-    fn importance(&self, found: &Found, residual: &[f64]) -> Vec<(usize, f64)> {
+    fn importance(&self, found: &Explained, residual: &[f64]) -> Vec<(usize, f64)> {
         let mut rises = vec![0.0; self.groups.len()];
         for (half, model) in found.models.iter().enumerate() {
             let judged: Vec<usize> = self.halves[1 - half].iter().cloned().flatten().collect();

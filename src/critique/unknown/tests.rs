@@ -184,7 +184,7 @@ fn gusts_alone_are_not_explained() -> Result<()> {
 fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
     for seed in 0..3 {
         let table = made(200 + seed, 30, 1.0)?.table()?;
-        let search = Search::new(&table, &UnknownOptions::default());
+        let search = CrossFit::new(&table, &UnknownOptions::default());
         let roll = search.dependence(&search.features, &search.starts, &table.residual[3]);
         assert!(roll.r2_with_feedback > WORTH, "there is something to resist: {}", roll.r2_with_feedback);
         assert_eq!(unknown(&table, &UnknownOptions::default())?, []);
@@ -246,7 +246,7 @@ proptest! {
         let mut table = ResidualTable { names: vec!["vx".into()], features: vec![vec![0.0; rows]], ..Default::default() };
         table.residual = std::array::from_fn(|_| vec![0.0; rows]);
         (table.block, table.flight) = (flights.clone(), flights);
-        let paired = Search::new(&table, &UnknownOptions::default()).pairing(index);
+        let paired = CrossFit::new(&table, &UnknownOptions::default()).pairing(index);
         prop_assert_eq!(paired.len(), rows);
         prop_assert!(paired.iter().enumerate().all(|(row, other)| table.block[row] != table.block[*other]));
     }

@@ -18,7 +18,7 @@ use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, chec
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{
-    Activation, AddWeighted, Dropout, FoldConvolution, GeneralConv1d, LastRows, LayerNorm, Mean, MergeKernels, Periods,
+    Activation, AddWeighted, Dropout, FftPeriods, FoldConvolution, GeneralConv1d, LastRows, LayerNorm, Mean, MergeKernels,
     PositionalEncoding,
 };
 use phyture_kernels::Real;
@@ -105,7 +105,7 @@ impl Configuration for TimesNetConfig {
 impl TimesNetConfig {
     /// x plus the weighted results of all its periods.
     fn block<T: Real>(&self, recorder: &mut Recorder<T>, name: &str, x: Var) -> Result<Var> {
-        let periods = recorder.graph.apply(Periods::new(self.periods, self.history), &[x])?;
+        let periods = recorder.graph.apply(FftPeriods::new(self.periods, self.history), &[x])?;
         let (first, first_bias) = self.inception(recorder, &format!("{name}.inception.0"), self.d_model, self.d_ff)?;
         let (second, second_bias) = self.inception(recorder, &format!("{name}.inception.1"), self.d_ff, self.d_model)?;
         let mut sum = x;

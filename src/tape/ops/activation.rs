@@ -27,7 +27,7 @@ impl<T: Real> Op<T> for Activation {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        activation::forward(io.level, self.kind, rows(io.x[0], shape), rows_mut(io.y, shape));
+        activation::forward(io.isa, self.kind, rows(io.x[0], shape), rows_mut(io.y, shape));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -49,7 +49,7 @@ impl<T: Real> Differentiable<T> for Activation {
             Saves::Input => io.x[0],
             Saves::Output => io.y,
         };
-        activation::backward(io.level, self.kind, rows(saved, shape), rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
+        activation::backward(io.isa, self.kind, rows(saved, shape), rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
     }
 }
 

@@ -6,7 +6,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Write, rows};
+use phyture_kernels::{Real, Write, strided};
 
 /// Operands a, b, periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,9 +31,9 @@ impl<T: Real> Op<T> for AddWeighted {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        rows::copy(io.level, rows(io.x[0], shape), rows_mut(io.y, shape), Write::Set);
+        strided::copy(io.isa, rows(io.x[0], shape), rows_mut(io.y, shape), Write::Set);
         let weight = io.x[2][2 * self.index + 1];
-        rows::scale(io.level, weight, rows(io.x[1], shape), rows_mut(io.y, shape), Write::Add);
+        strided::scale(io.isa, weight, rows(io.x[1], shape), rows_mut(io.y, shape), Write::Add);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -52,16 +52,16 @@ impl<T: Real> Differentiable<T> for AddWeighted {
         let dy = rows(io.dy, shape);
         let [da, db, dperiods, ..] = io.dx;
         if let Some(da) = da {
-            rows::copy(io.level, dy, rows_mut(da.values, shape), da.write);
+            strided::copy(io.isa, dy, rows_mut(da.values, shape), da.write);
         }
         if let Some(db) = db {
-            rows::scale(io.level, io.x[2][at], dy, rows_mut(db.values, shape), db.write);
+            strided::scale(io.isa, io.x[2][at], dy, rows_mut(db.values, shape), db.write);
         }
         if let Some(dperiods) = dperiods {
             if dperiods.write == Write::Set {
                 dperiods.values.fill(T::ZERO);
             }
-            dperiods.values[at] += rows::inner(io.level, dy, rows(io.x[1], shape));
+            dperiods.values[at] += strided::inner(io.isa, dy, rows(io.x[1], shape));
         }
     }
 }

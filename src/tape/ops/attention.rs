@@ -55,7 +55,7 @@ impl<T: Real> Op<T> for Attention {
         let mask = self.mask(io.stream);
         io.parts.rows(q.rows(), attention::CUT, [io.y, io.workspace], io.scratch, |piece, [o, lse], scratch| {
             let o = RowsMut::packed(o, piece.len(), q.cols());
-            attention::forward_rows(io.level, self.heads, q, k, v, mask, piece.start, o, lse, scratch);
+            attention::forward_rows(io.isa, self.heads, q, k, v, mask, piece.start, o, lse, scratch);
         });
     }
 
@@ -87,7 +87,7 @@ impl<T: Real> Differentiable<T> for Attention {
         let (o, d_o) = (rows(io.y, q), rows(io.dy, q));
         let mask = self.mask(io.stream);
         let lse = io.workspace;
-        attention::backward(io.level, self.heads, operands.0, operands.1, operands.2, mask, o, lse, d_o, gradients, scratch);
+        attention::backward(io.isa, self.heads, operands.0, operands.1, operands.2, mask, o, lse, d_o, gradients, scratch);
     }
 }
 

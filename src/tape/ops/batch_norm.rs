@@ -9,7 +9,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Coupled, Coupling, Differentiable, Forward, Memory, Op, Pass, Reads, exactly, misfit};
-use phyture_kernels::{Real, Rows, RowsMut, batch_norm, rows};
+use phyture_kernels::{Real, Rows, RowsMut, batch_norm, strided};
 
 /// Operands x, γ, β, running mean, running variance; the last two are parameters without gradient.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ impl<T: Real> Op<T> for BatchNorm {
             // A variance below 0, which only a damaged file can hold, counts as 0.
             *rstd = T::of(1.0 / (variance.f64().max(0.0) + self.eps).sqrt());
         }
-        batch_norm::forward(io.level, rows(x, shape), (mean, rstd), gamma, beta, rows_mut(io.y, shape));
+        batch_norm::forward(io.isa, rows(x, shape), (mean, rstd), gamma, beta, rows_mut(io.y, shape));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -73,13 +73,13 @@ impl<T: Real> Coupling<T> for BatchNorm {
 
     fn gather(&self, io: &Forward<'_, T>, part: &mut [T]) {
         let [shape, ..] = io.shapes else { return };
-        batch_norm::moments(io.level, rows(io.x[0], shape), part);
+        batch_norm::moments(io.isa, rows(io.x[0], shape), part);
     }
 
     fn gather_backward(&self, io: &Backward<'_, T>, part: &mut [T]) {
         let [shape, ..] = io.shapes else { return };
         let kept = io.workspace.split_at(shape.rows().1);
-        batch_norm::backward_sums(io.level, rows(io.x[0], shape), kept, rows(io.dy, shape), part);
+        batch_norm::backward_sums(io.isa, rows(io.x[0], shape), kept, rows(io.dy, shape), part);
     }
 
     fn combine(&self, pass: Pass, operands: &[Shape], parts: &[T], total: &mut [T]) {
@@ -120,13 +120,13 @@ impl<T: Real> Differentiable<T> for BatchNorm {
         let [dx, dgamma, dbeta, ..] = io.dx;
         if let Some(dx) = dx {
             let sums = io.coupled.map(|coupled| (coupled.total, coupled.samples * n));
-            batch_norm::backward_input(io.level, x, kept, io.x[1], dy, sums, rows_mut(dx.values, shape), dx.write);
+            batch_norm::backward_input(io.isa, x, kept, io.x[1], dy, sums, rows_mut(dx.values, shape), dx.write);
         }
         // A sample gives its own share of the sums; the session adds the shares.
-        batch_norm::backward_sums(io.level, x, kept, dy, &mut io.scratch[..2 * channels]);
+        batch_norm::backward_sums(io.isa, x, kept, dy, &mut io.scratch[..2 * channels]);
         for (to, from) in [dgamma, dbeta].into_iter().zip(io.scratch.chunks_exact(channels)) {
             if let Some(to) = to {
-                rows::copy(io.level, Rows::packed(from, 1, channels), RowsMut::packed(to.values, 1, channels), to.write);
+                strided::copy(io.isa, Rows::packed(from, 1, channels), RowsMut::packed(to.values, 1, channels), to.write);
             }
         }
     }

@@ -4,7 +4,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Rows, RowsMut, Write, rows};
+use phyture_kernels::{Real, Rows, RowsMut, Write, strided};
 
 /// a [n, A] and b [n, B] to y [n, A + B].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,8 +28,8 @@ impl<T: Real> Op<T> for Concatenate {
         let [a, b, ..] = io.shapes else { return };
         let ((n, first), (_, second)) = (a.rows(), b.rows());
         let mut y = RowsMut::packed(io.y, n, first + second);
-        rows::copy(io.level, rows(io.x[0], a), y.reborrow().columns(0, first), Write::Set);
-        rows::copy(io.level, rows(io.x[1], b), y.columns(first, second), Write::Set);
+        strided::copy(io.isa, rows(io.x[0], a), y.reborrow().columns(0, first), Write::Set);
+        strided::copy(io.isa, rows(io.x[1], b), y.columns(first, second), Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -49,7 +49,7 @@ impl<T: Real> Differentiable<T> for Concatenate {
         let [da, db, ..] = io.dx;
         for (dx, shape, from, count) in [(da, a, 0, first), (db, b, first, second)] {
             if let Some(dx) = dx {
-                rows::copy(io.level, dy.columns(from, count), rows_mut(dx.values, shape), dx.write);
+                strided::copy(io.isa, dy.columns(from, count), rows_mut(dx.values, shape), dx.write);
             }
         }
     }

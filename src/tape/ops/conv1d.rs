@@ -106,8 +106,8 @@ impl<T: Real> Op<T> for Conv1d {
     fn pack(&self, io: Pack<'_, T>) {
         let Some(Sizes { geometry, inputs, outputs, .. }) = self.sizes(io.shapes) else { return };
         match io.pass {
-            Pass::Forward => conv1d::pack(io.level, geometry, (inputs, outputs), io.weight, io.packed),
-            Pass::Backward => conv1d::pack_transposed(io.level, geometry, (inputs, outputs), io.weight, io.packed),
+            Pass::Forward => conv1d::pack(io.isa, geometry, (inputs, outputs), io.weight, io.packed),
+            Pass::Backward => conv1d::pack_transposed(io.isa, geometry, (inputs, outputs), io.weight, io.packed),
         }
     }
 
@@ -119,7 +119,7 @@ impl<T: Real> Op<T> for Conv1d {
         let epilogue = self.epilogue.kernel(io.stream);
         io.parts.rows(geometry.output_rows(sizes.rows), conv1d::CUT, [io.y], io.scratch, |piece, [y], scratch| {
             let y = RowsMut::packed(y, piece.len(), outputs);
-            conv1d::forward_rows(io.level, geometry, x, weight, bias, epilogue, piece.start, y, scratch);
+            conv1d::forward_rows(io.isa, geometry, x, weight, bias, epilogue, piece.start, y, scratch);
         });
     }
 
@@ -145,19 +145,19 @@ impl<T: Real> Differentiable<T> for Conv1d {
         } else {
             let y = Rows::packed(io.y, count, outputs);
             let to = RowsMut::packed(&mut *dz, count, outputs);
-            conv1d::backward_epilogue(io.level, self.epilogue.kernel(io.stream), y, dy, to);
+            conv1d::backward_epilogue(io.isa, self.epilogue.kernel(io.stream), y, dy, to);
             Rows::packed(dz, count, outputs)
         };
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
             let weight = weight(io.x[1], io.packed);
-            conv1d::backward_input(io.level, geometry, dz, weight, rows_mut(dx.values, x), dx.write, scratch);
+            conv1d::backward_input(io.isa, geometry, dz, weight, rows_mut(dx.values, x), dx.write, scratch);
         }
         if let Some(dweight) = dweight {
-            conv1d::backward_weight(io.level, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write, scratch);
+            conv1d::backward_weight(io.isa, geometry, rows(io.x[0], x), dz, dweight.values, dweight.write, scratch);
         }
         if let Some(dbias) = dbias {
-            conv1d::backward_bias(io.level, dz, dbias.values, dbias.write);
+            conv1d::backward_bias(io.isa, dz, dbias.values, dbias.write);
         }
     }
 }

@@ -123,7 +123,7 @@ impl<T: Real> Op<T> for GeneralConv1d {
         let y = RowsMut::packed(io.y, sizes.geometry.rows, sizes.outputs);
         let bias = (!bias.is_empty()).then_some(io.x[2]);
         let epilogue = self.epilogue(io.stream);
-        conv1d_general::forward(io.level, sizes.geometry, rows(io.x[0], x), io.x[1], bias, epilogue, y, io.scratch);
+        conv1d_general::forward(io.isa, sizes.geometry, rows(io.x[0], x), io.x[1], bias, epilogue, y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -147,19 +147,19 @@ impl<T: Real> Differentiable<T> for GeneralConv1d {
         } else {
             let y = Rows::packed(io.y, geometry.rows, outputs);
             let to = RowsMut::packed(&mut *dz, geometry.rows, outputs);
-            conv1d::backward_epilogue(io.level, self.epilogue(io.stream), y, dy, to);
+            conv1d::backward_epilogue(io.isa, self.epilogue(io.stream), y, dy, to);
             Rows::packed(dz, geometry.rows, outputs)
         };
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            conv1d_general::backward_input(io.level, geometry, dz, io.x[1], rows_mut(dx.values, x), dx.write, scratch);
+            conv1d_general::backward_input(io.isa, geometry, dz, io.x[1], rows_mut(dx.values, x), dx.write, scratch);
         }
         if let Some(dweight) = dweight {
             let (to, write) = (dweight.values, dweight.write);
-            conv1d_general::backward_weight(io.level, geometry, rows(io.x[0], x), dz, to, write, scratch);
+            conv1d_general::backward_weight(io.isa, geometry, rows(io.x[0], x), dz, to, write, scratch);
         }
         if let Some(dbias) = dbias {
-            conv1d::backward_bias(io.level, dz, dbias.values, dbias.write);
+            conv1d::backward_bias(io.isa, dz, dbias.values, dbias.write);
         }
     }
 }

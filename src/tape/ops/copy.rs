@@ -4,7 +4,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
-use phyture_kernels::{Real, Write, rows};
+use phyture_kernels::{Real, Write, strided};
 
 /// y = x, any shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,7 +21,7 @@ impl<T: Real> Op<T> for Copy {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [x, ..] = io.shapes else { return };
-        rows::copy(io.level, rows(io.x[0], x), rows_mut(io.y, x), Write::Set);
+        strided::copy(io.isa, rows(io.x[0], x), rows_mut(io.y, x), Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -36,7 +36,7 @@ impl<T: Real> Differentiable<T> for Copy {
 
     fn backward(&self, io: Backward<'_, T>) {
         let ([x, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
-        rows::copy(io.level, rows(io.dy, x), rows_mut(dx.values, x), dx.write);
+        strided::copy(io.isa, rows(io.dy, x), rows_mut(dx.values, x), dx.write);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
 use phyture_kernels::dropout::{self, Mask};
-use phyture_kernels::{Real, Write, rows};
+use phyture_kernels::{Real, Write, strided};
 
 /// Drops each element with probability `rate`, in [0, 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +29,8 @@ impl<T: Real> Op<T> for Dropout {
         let [shape, ..] = io.shapes else { return };
         let (x, y) = (rows(io.x[0], shape), rows_mut(io.y, shape));
         match io.stream {
-            Some(stream) => dropout::forward(io.level, Mask::new(stream, self.rate), x, y),
-            None => rows::copy(io.level, x, y, Write::Set),
+            Some(stream) => dropout::forward(io.isa, Mask::new(stream, self.rate), x, y),
+            None => strided::copy(io.isa, x, y, Write::Set),
         }
     }
 
@@ -48,8 +48,8 @@ impl<T: Real> Differentiable<T> for Dropout {
         let ([shape, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
         let (dy, to) = (rows(io.dy, shape), rows_mut(dx.values, shape));
         match io.stream {
-            Some(stream) => dropout::backward(io.level, Mask::new(stream, self.rate), dy, to, dx.write),
-            None => rows::copy(io.level, dy, to, dx.write),
+            Some(stream) => dropout::backward(io.isa, Mask::new(stream, self.rate), dy, to, dx.write),
+            None => strided::copy(io.isa, dy, to, dx.write),
         }
     }
 }

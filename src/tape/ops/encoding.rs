@@ -5,7 +5,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, RowsMut, encoding, rows};
+use phyture_kernels::{Real, RowsMut, encoding, strided};
 use std::sync::OnceLock;
 
 /// The table `[rows, channels]`, made once, when it is first read: recording a graph costs nothing that grows with its sizes, for these
@@ -62,7 +62,7 @@ impl<T: Real> Differentiable<T> for PositionalEncoding {
 
     fn backward(&self, io: Backward<'_, T>) {
         let ([shape, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
-        rows::copy(io.level, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
+        strided::copy(io.isa, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
     }
 }
 

@@ -6,7 +6,7 @@ use super::rows_mut;
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
-use phyture_kernels::{Real, Rows, rows};
+use phyture_kernels::{Real, Rows, strided};
 
 /// Operand x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,7 +39,7 @@ impl<T: Real> Differentiable<T> for Flatten {
     fn backward(&self, io: Backward<'_, T>) {
         let ([x, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
         let (count, columns) = x.rows();
-        rows::copy(io.level, Rows::packed(io.dy, count, columns), rows_mut(dx.values, x), dx.write);
+        strided::copy(io.isa, Rows::packed(io.dy, count, columns), rows_mut(dx.values, x), dx.write);
     }
 }
 

@@ -65,7 +65,7 @@ impl<T: Real> Op<T> for FoldConvolution {
         let [x, _, weight, _] = io.shapes else { return };
         let (fold, outputs) = (self.fold(io.x[1], weight), weight.rows().1);
         let y = RowsMut::packed(io.y, self.rows, outputs);
-        fold::forward(io.level, fold, rows(io.x[0], x), io.x[2], io.x[3], y, io.scratch);
+        fold::forward(io.isa, fold, rows(io.x[0], x), io.x[2], io.x[3], y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -88,13 +88,13 @@ impl<T: Real> Differentiable<T> for FoldConvolution {
         let dy = Rows::packed(io.dy, self.rows, weight.rows().1);
         let [dx, _, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            fold::backward_input(io.level, fold, dy, io.x[2], rows_mut(dx.values, x), dx.write, io.scratch);
+            fold::backward_input(io.isa, fold, dy, io.x[2], rows_mut(dx.values, x), dx.write, io.scratch);
         }
         if let Some(dweight) = dweight {
-            fold::backward_weight(io.level, fold, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
+            fold::backward_weight(io.isa, fold, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
         }
         if let Some(dbias) = dbias {
-            fold::backward_bias(io.level, fold, dy, dbias.values, dbias.write);
+            fold::backward_bias(io.isa, fold, dy, dbias.values, dbias.write);
         }
     }
 }

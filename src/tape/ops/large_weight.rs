@@ -1,14 +1,14 @@
-//! y = W·x + b with one large W for a bundle of samples: what `linear` and `temporal` share. Not an operation of its own.
+//! y = W·x + b with one large W for a micro-batch of samples: what `linear` and `temporal` share. Not an operation of its own.
 //!   dx = Wᵀ·dy,  dW = Σ_samples dy·xᵀ,  db = Σ_samples Σ_channels dy
 //! x [inputs, channels], W [outputs, inputs], b [outputs] or absent, y [outputs, channels].
 //!
-//! Samples are laid side by side, `[.., samples·channels]`, so that each product is one: a bundle of them for y and dx, and for dW as
+//! Samples are laid side by side, `[.., samples·channels]`, so that each product is one: a micro-batch of them for y and dx, and for dW as
 //! many as a kernel sums over at once. Beside a large W these copies are small.
 
 use crate::tape::Shape;
-use crate::tape::op::{BUNDLE, Backward, Bundled, Differentiable, Forward, LARGE_WEIGHT, WEIGHT, WeightGradient};
-use phyture_kernels::level::Level;
-use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, rows, temporal};
+use crate::tape::op::{Backward, Differentiable, Forward, LARGE_WEIGHT, MICRO_BATCH, MicroBatched, WEIGHT, WeightGradient};
+use phyture_kernels::instruction_set::InstructionSet;
+use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, strided, temporal};
 
 /// The operand after the weight.
 const BIAS: usize = WEIGHT + 1;
@@ -25,15 +25,15 @@ pub(super) struct Sizes {
 }
 
 impl Sizes {
-    /// Whether the weight is worth a bundle.
+    /// Whether the weight is worth a micro-batch.
     pub const fn are_large(self) -> bool {
         self.inputs * self.outputs >= LARGE_WEIGHT
     }
 
-    /// Scratch that the first sample of a bundle has to bring; 0 if there will be none.
-    pub fn bundle_scratch_len(self) -> usize {
+    /// Scratch that the first sample of a micro-batch has to bring; 0 if there will be none.
+    pub fn micro_batch_scratch_len(self) -> usize {
         let Self { inputs, outputs, channels } = self;
-        let columns = BUNDLE * channels;
+        let columns = MICRO_BATCH * channels;
         let product = gemm::scratch_len(outputs, inputs, columns).max(gemm::scratch_len(inputs, outputs, columns));
         if self.are_large() { (inputs + outputs) * columns + product } else { 0 }
     }
@@ -73,21 +73,24 @@ pub(super) trait Product {
     fn sizes(&self, operands: &[Shape]) -> Option<Sizes>;
 }
 
-/// The operation as one that works on bundles, if its weight is worth it.
-pub(super) fn bundled<'a, T: Real, O: Product + Differentiable<T>>(op: &'a O, operands: &[Shape]) -> Option<&'a dyn Bundled<T>> {
+/// The operation as one that works on micro-batches, if its weight is worth it.
+pub(super) fn micro_batched<'a, T: Real, O: Product + Differentiable<T>>(
+    op: &'a O,
+    operands: &[Shape],
+) -> Option<&'a dyn MicroBatched<T>> {
     op.sizes(operands).filter(|sizes| sizes.are_large()).map(|_| op as _)
 }
 
-impl<T: Real, O: Product + Differentiable<T>> Bundled<T> for O {
-    fn forward_bundle(&self, bundle: &mut [Forward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| self.sizes(io.shapes)) {
-            forward(bundle, sizes);
+impl<T: Real, O: Product + Differentiable<T>> MicroBatched<T> for O {
+    fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]) {
+        if let Some(sizes) = micro_batch.first().and_then(|io| self.sizes(io.shapes)) {
+            forward(micro_batch, sizes);
         }
     }
 
-    fn backward_bundle(&self, bundle: &mut [Backward<'_, T>]) {
-        if let Some(sizes) = bundle.first().and_then(|io| self.sizes(io.shapes)) {
-            backward(bundle, sizes);
+    fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]) {
+        if let Some(sizes) = micro_batch.first().and_then(|io| self.sizes(io.shapes)) {
+            backward(micro_batch, sizes);
         }
     }
 
@@ -103,11 +106,11 @@ impl<T: Real, O: Product + Differentiable<T>> Bundled<T> for O {
 }
 
 /// Lays matrices side by side.
-fn join<'a, T: Real>(level: Level, sizes: Sizes, values: impl Iterator<Item = &'a [T]>, all: &mut RowsMut<'_, T>) {
+fn join<'a, T: Real>(isa: InstructionSet, sizes: Sizes, values: impl Iterator<Item = &'a [T]>, all: &mut RowsMut<'_, T>) {
     let rows = all.rows();
     for (index, values) in values.enumerate() {
         let x = Rows::packed(values, rows, sizes.channels);
-        rows::copy(level, x, sizes.sample(index, all.reborrow()), Write::Set);
+        strided::copy(isa, x, sizes.sample(index, all.reborrow()), Write::Set);
     }
 }
 
@@ -115,10 +118,10 @@ fn join<'a, T: Real>(level: Level, sizes: Sizes, values: impl Iterator<Item = &'
 fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
-    let (level, [_, weight, bias, ..], scratch) = (first.level, first.x, std::mem::take(&mut first.scratch));
+    let (isa, [_, weight, bias, ..], scratch) = (first.isa, first.x, std::mem::take(&mut first.scratch));
     let (mut x, mut y, scratch) = sizes.divide(count, scratch);
-    join(level, sizes, samples.iter().map(|io| io.x[0]), &mut x);
-    gemm::ab(level, sizes.weight(weight), x.view(), y.reborrow(), Write::Set, scratch);
+    join(isa, sizes, samples.iter().map(|io| io.x[0]), &mut x);
+    gemm::ab(isa, sizes.weight(weight), x.view(), y.reborrow(), Write::Set, scratch);
     let all = y.view();
     for (index, io) in samples.iter_mut().enumerate() {
         let write = if bias.is_empty() { Write::Set } else { Write::Add };
@@ -126,7 +129,7 @@ fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
             row.fill(*bias);
         }
         let y = RowsMut::packed(&mut *io.y, sizes.outputs, sizes.channels);
-        rows::copy(level, all.columns(index * sizes.channels, sizes.channels), y, write);
+        strided::copy(isa, all.columns(index * sizes.channels, sizes.channels), y, write);
     }
 }
 
@@ -134,36 +137,36 @@ fn forward<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
 fn backward<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
     let count = samples.len();
     let Some(first) = samples.first_mut() else { return };
-    let (level, weight, scratch) = (first.level, first.x[WEIGHT], std::mem::take(&mut first.scratch));
+    let (isa, weight, scratch) = (first.isa, first.x[WEIGHT], std::mem::take(&mut first.scratch));
     let dbias = first.dx[BIAS].take();
     let (mut dx, mut dy, scratch) = sizes.divide(count, scratch);
-    join(level, sizes, samples.iter().map(|io| io.dy), &mut dy);
+    join(isa, sizes, samples.iter().map(|io| io.dy), &mut dy);
     if let Some(dbias) = dbias {
-        temporal::backward_bias(level, dy.view(), dbias.values, dbias.write);
+        temporal::backward_bias(isa, dy.view(), dbias.values, dbias.write);
     }
     // All samples ask for the gradient of x, or none does.
     if samples.iter().all(|io| io.dx[0].is_none()) {
         return;
     }
-    gemm::atb(level, sizes.weight(weight), dy.view(), dx.reborrow(), Write::Set, scratch);
+    gemm::atb(isa, sizes.weight(weight), dy.view(), dx.reborrow(), Write::Set, scratch);
     let all = dx.view();
     for (index, gradient) in samples.iter_mut().map(|io| io.dx[0].as_mut()).enumerate() {
         if let Some(gradient) = gradient {
             let dx = RowsMut::packed(&mut *gradient.values, sizes.inputs, sizes.channels);
-            rows::copy(level, all.columns(index * sizes.channels, sizes.channels), dx, gradient.write);
+            strided::copy(isa, all.columns(index * sizes.channels, sizes.channels), dx, gradient.write);
         }
     }
 }
 
 /// Rows of the gradient of W.
 fn weight_gradient<T: Real>(io: WeightGradient<'_, T>, sizes: Sizes) {
-    let WeightGradient { x, dy, rows: asked, gradient, scratch, level, .. } = io;
+    let WeightGradient { x, dy, rows: asked, gradient, scratch, isa, .. } = io;
     let Sizes { inputs, channels, .. } = sizes;
     let sizes = Sizes { outputs: asked.len(), ..sizes };
     let dy = dy.columns(asked.start * channels, asked.len() * channels);
     let mut values = RowsMut::packed(gradient.values, asked.len(), inputs);
     if x.rows() == 0 && gradient.write == Write::Set {
-        rows::fill(values.reborrow(), T::ZERO);
+        strided::fill(values.reborrow(), T::ZERO);
     }
     for start in (0..x.rows()).step_by(sizes.together()) {
         let end = x.rows().min(start + sizes.together());
@@ -171,12 +174,12 @@ fn weight_gradient<T: Real>(io: WeightGradient<'_, T>, sizes: Sizes) {
         let write = if start == 0 { gradient.write } else { Write::Add };
         if channels == 1 {
             // One column a sample: the samples are the rows of the matrices to be multiplied.
-            gemm::atb(level, dy, x, values.reborrow(), write, scratch);
+            gemm::atb(isa, dy, x, values.reborrow(), write, scratch);
         } else {
             let (mut all_x, mut all_dy, scratch) = sizes.divide(end - start, scratch);
-            join(level, sizes, (0..end - start).map(|sample| x.row(sample)), &mut all_x);
-            join(level, sizes, (0..end - start).map(|sample| dy.row(sample)), &mut all_dy);
-            gemm::abt(level, all_dy.view(), all_x.view(), values.reborrow(), write, scratch);
+            join(isa, sizes, (0..end - start).map(|sample| x.row(sample)), &mut all_x);
+            join(isa, sizes, (0..end - start).map(|sample| dy.row(sample)), &mut all_dy);
+            gemm::abt(isa, all_dy.view(), all_x.view(), values.reborrow(), write, scratch);
         }
     }
 }

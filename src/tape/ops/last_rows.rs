@@ -4,7 +4,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Rows, RowsMut, Write, rows};
+use phyture_kernels::{Real, Rows, RowsMut, Write, strided};
 
 /// x [n, C] to y [count, C].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ impl<T: Real> Op<T> for LastRows {
         let [shape, ..] = io.shapes else { return };
         let (n, channels) = shape.rows();
         let y = RowsMut::packed(io.y, self.count, channels);
-        rows::copy(io.level, rows(io.x[0], shape).range(n - self.count, n), y, Write::Set);
+        strided::copy(io.isa, rows(io.x[0], shape).range(n - self.count, n), y, Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -49,9 +49,9 @@ impl<T: Real> Differentiable<T> for LastRows {
         let (n, channels) = shape.rows();
         let mut to = rows_mut(dx.values, shape);
         if dx.write == Write::Set {
-            rows::fill(to.reborrow().range(0, n - self.count), T::ZERO);
+            strided::fill(to.reborrow().range(0, n - self.count), T::ZERO);
         }
-        rows::copy(io.level, Rows::packed(io.dy, self.count, channels), to.range(n - self.count, n), dx.write);
+        strided::copy(io.isa, Rows::packed(io.dy, self.count, channels), to.range(n - self.count, n), dx.write);
     }
 }
 

@@ -6,7 +6,7 @@ use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
-use crate::tape::op::{Backward, Bundled, Differentiable, Forward, Memory, Op, Reads, misfit};
+use crate::tape::op::{Backward, Differentiable, Forward, Memory, MicroBatched, Op, Reads, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, linear};
 
 /// Operands x, W and, optionally, b.
@@ -42,7 +42,7 @@ impl<T: Real> Op<T> for Linear {
     fn memory(&self, operands: &[Shape]) -> Memory {
         let [x, weight, ..] = operands else { return Memory::default() };
         let scratch = linear::scratch_len(x.rows().0, x.rows().1, weight.rows().0);
-        let scratch = scratch.max(self.sizes(operands).map_or(0, Sizes::bundle_scratch_len));
+        let scratch = scratch.max(self.sizes(operands).map_or(0, Sizes::micro_batch_scratch_len));
         Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
@@ -50,15 +50,15 @@ impl<T: Real> Op<T> for Linear {
         let [x, weight, bias @ ..] = io.shapes else { return };
         let y = RowsMut::packed(io.y, x.rows().0, weight.rows().0);
         let bias = (!bias.is_empty()).then_some(io.x[2]);
-        linear::forward(io.level, rows(io.x[0], x), io.x[1], bias, y, io.scratch);
+        linear::forward(io.isa, rows(io.x[0], x), io.x[1], bias, y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         Some(self)
     }
 
-    fn bundled(&self, operands: &[Shape]) -> Option<&dyn Bundled<T>> {
-        large_weight::bundled(self, operands)
+    fn micro_batched(&self, operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
+        large_weight::micro_batched(self, operands)
     }
 }
 
@@ -72,13 +72,13 @@ impl<T: Real> Differentiable<T> for Linear {
         let dy = Rows::packed(io.dy, x.rows().0, weight.rows().0);
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            linear::backward_input(io.level, dy, io.x[1], rows_mut(dx.values, x), dx.write, io.scratch);
+            linear::backward_input(io.isa, dy, io.x[1], rows_mut(dx.values, x), dx.write, io.scratch);
         }
         if let Some(dweight) = dweight {
-            linear::backward_weight(io.level, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
+            linear::backward_weight(io.isa, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
         }
         if let Some(dbias) = dbias {
-            linear::backward_bias(io.level, dy, dbias.values, dbias.write);
+            linear::backward_bias(io.isa, dy, dbias.values, dbias.write);
         }
     }
 }

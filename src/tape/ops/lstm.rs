@@ -60,7 +60,7 @@ impl<T: Real> Op<T> for Lstm {
         let weights = Weights { input, recurrent, input_bias, recurrent_bias };
         let (gates, cells) = io.workspace.split_at_mut(4 * n * hidden);
         let (gates, cells) = (RowsMut::packed(gates, n, 4 * hidden), RowsMut::packed(cells, n, hidden));
-        lstm::forward(io.level, rows(io.x[0], x), weights, RowsMut::packed(io.y, n, hidden), gates, cells, io.scratch);
+        lstm::forward(io.isa, rows(io.x[0], x), weights, RowsMut::packed(io.y, n, hidden), gates, cells, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -81,21 +81,21 @@ impl<T: Real> Differentiable<T> for Lstm {
         let (dgates, scratch) = io.scratch.split_at_mut(4 * n * hidden);
         let dy = Rows::packed(io.dy, n, hidden);
         let to = RowsMut::packed(&mut *dgates, n, 4 * hidden);
-        lstm::backward_gates(io.level, io.x[2], gates, cells, dy, to, scratch);
+        lstm::backward_gates(io.isa, io.x[2], gates, cells, dy, to, scratch);
         let dgates = Rows::packed(dgates, n, 4 * hidden);
         let [dx, dinput, drecurrent, dinput_bias, drecurrent_bias, ..] = io.dx;
         if let Some(dx) = dx {
-            linear::backward_input(io.level, dgates, io.x[1], rows_mut(dx.values, x_shape), dx.write, scratch);
+            linear::backward_input(io.isa, dgates, io.x[1], rows_mut(dx.values, x_shape), dx.write, scratch);
         }
         if let Some(dinput) = dinput {
-            linear::backward_weight(io.level, rows(io.x[0], x_shape), dgates, dinput.values, dinput.write, scratch);
+            linear::backward_weight(io.isa, rows(io.x[0], x_shape), dgates, dinput.values, dinput.write, scratch);
         }
         if let Some(drecurrent) = drecurrent {
             let h = Rows::packed(io.y, n, hidden);
-            lstm::backward_recurrent(io.level, h, dgates, drecurrent.values, drecurrent.write);
+            lstm::backward_recurrent(io.isa, h, dgates, drecurrent.values, drecurrent.write);
         }
         for bias in [dinput_bias, drecurrent_bias].into_iter().flatten() {
-            linear::backward_bias(io.level, dgates, bias.values, bias.write);
+            linear::backward_bias(io.isa, dgates, bias.values, bias.write);
         }
     }
 }

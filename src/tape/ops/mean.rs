@@ -4,7 +4,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, misfit};
-use phyture_kernels::{Real, Write, rows};
+use phyture_kernels::{Real, Write, strided};
 
 /// Operands x_0, x_1, …
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ impl<T: Real> Op<T> for Mean {
         let share = T::of(1.0 / io.shapes.len() as f64);
         for (index, shape) in io.shapes.iter().enumerate() {
             let write = if index == 0 { Write::Set } else { Write::Add };
-            rows::scale(io.level, share, rows(io.x[index], shape), rows_mut(io.y, shape), write);
+            strided::scale(io.isa, share, rows(io.x[index], shape), rows_mut(io.y, shape), write);
         }
     }
 
@@ -44,7 +44,7 @@ impl<T: Real> Differentiable<T> for Mean {
         let share = T::of(1.0 / io.shapes.len() as f64);
         for (dx, shape) in io.dx.into_iter().zip(io.shapes) {
             if let Some(dx) = dx {
-                rows::scale(io.level, share, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
+                strided::scale(io.isa, share, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
             }
         }
     }

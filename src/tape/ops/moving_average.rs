@@ -35,7 +35,7 @@ impl<T: Real> Op<T> for MovingAverage {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        moving_average::forward(io.level, self.width, rows(io.x[0], shape), rows_mut(io.y, shape), io.scratch);
+        moving_average::forward(io.isa, self.width, rows(io.x[0], shape), rows_mut(io.y, shape), io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -50,7 +50,7 @@ impl<T: Real> Differentiable<T> for MovingAverage {
 
     fn backward(&self, io: Backward<'_, T>) {
         let ([shape, ..], [Some(dx), ..]) = (io.shapes, io.dx) else { return };
-        moving_average::backward(io.level, self.width, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write, io.scratch);
+        moving_average::backward(io.isa, self.width, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write, io.scratch);
     }
 }
 

@@ -51,7 +51,7 @@ impl<T: Real> Op<T> for Pool {
         let [x, ..] = io.shapes else { return };
         let (n, channels) = x.rows();
         let y = RowsMut::packed(io.y, self.geometry.output_rows(n), channels);
-        pool::forward(io.level, self.kind, self.geometry, rows(io.x[0], x), y);
+        pool::forward(io.isa, self.kind, self.geometry, rows(io.x[0], x), y);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -76,7 +76,7 @@ impl<T: Real> Differentiable<T> for Pool {
             pool::Pool::Mean => (Rows::packed(&[], 0, channels), Rows::packed(&[], 0, channels)),
         };
         let dy = Rows::packed(io.dy, after, channels);
-        pool::backward(io.level, self.kind, self.geometry, pair, dy, rows_mut(dx.values, x), dx.write, io.scratch);
+        pool::backward(io.isa, self.kind, self.geometry, pair, dy, rows_mut(dx.values, x), dx.write, io.scratch);
     }
 }
 

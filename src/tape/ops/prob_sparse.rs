@@ -53,7 +53,7 @@ impl<T: Real> Op<T> for ProbSparse {
         let stream = io.stream.unwrap_or(Stream::new(self.seed, 0, 0, 0));
         let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
         let o = rows_mut(io.y, q);
-        prob_sparse::forward(io.level, self.sparse, stream, operands.0, operands.1, operands.2, o, io.workspace, io.scratch);
+        prob_sparse::forward(io.isa, self.sparse, stream, operands.0, operands.1, operands.2, o, io.workspace, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -77,7 +77,7 @@ impl<T: Real> Differentiable<T> for ProbSparse {
         let gradients = Gradients { dq: rows_mut(dq.values, q), dk: rows_mut(dk.values, k), dv: rows_mut(dv.values, k), writes };
         let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
         let (d_o, kept) = (rows(io.dy, q), io.workspace);
-        prob_sparse::backward(io.level, self.sparse, operands.0, operands.1, operands.2, d_o, kept, gradients, scratch);
+        prob_sparse::backward(io.isa, self.sparse, operands.0, operands.1, operands.2, d_o, kept, gradients, scratch);
     }
 }
 

@@ -30,7 +30,7 @@ impl<T: Real> Op<T> for ScaleExp {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        sci::scale(io.level, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
+        sci::scale(io.isa, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -53,7 +53,7 @@ impl<T: Real> Differentiable<T> for ScaleExp {
         let mut scratch = io.scratch;
         let dx = or_scratch(dx, &mut scratch, shape.len());
         let ds = or_scratch(ds, &mut scratch, shape.len());
-        sci::scale_backward(io.level, x, s, dy, rows_mut(dx.values, shape), dx.write, rows_mut(ds.values, shape), ds.write);
+        sci::scale_backward(io.isa, x, s, dy, rows_mut(dx.values, shape), dx.write, rows_mut(ds.values, shape), ds.write);
     }
 }
 

@@ -5,7 +5,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Rows, RowsMut, Write, rows};
+use phyture_kernels::{Real, Rows, RowsMut, Write, strided};
 
 /// x [n, C] to y [count, C]; the last row of y is that of x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +43,7 @@ impl<T: Real> Op<T> for SpacedRows {
         let [shape, ..] = io.shapes else { return };
         let (n, channels) = shape.rows();
         let from = rows(io.x[0], shape).every(self.first(n), self.stride);
-        rows::copy(io.level, from, RowsMut::packed(io.y, self.count, channels), Write::Set);
+        strided::copy(io.isa, from, RowsMut::packed(io.y, self.count, channels), Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -63,7 +63,7 @@ impl<T: Real> Differentiable<T> for SpacedRows {
             dx.values.fill(T::ZERO);
         }
         let to = rows_mut(dx.values, shape).every(self.first(n), self.stride);
-        rows::copy(io.level, Rows::packed(io.dy, self.count, channels), to, Write::Add);
+        strided::copy(io.isa, Rows::packed(io.dy, self.count, channels), to, Write::Add);
     }
 }
 

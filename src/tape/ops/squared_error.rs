@@ -48,7 +48,7 @@ impl<T: Real> Differentiable<T> for SquaredError {
     fn backward(&self, io: Backward<'_, T>) {
         let ([shape, ..], [Some(dx), ..], [dy, ..]) = (io.shapes, io.dx, io.dy) else { return };
         let (x, target, weight) = (rows(io.x[0], shape), rows(io.x[1], shape), self.scale * dy.f64());
-        loss::squared_error_gradient(io.level, x, target, weight, rows_mut(dx.values, shape), dx.write);
+        loss::squared_error_gradient(io.isa, x, target, weight, rows_mut(dx.values, shape), dx.write);
     }
 }
 

@@ -5,7 +5,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, rows};
+use phyture_kernels::{Real, strided};
 
 /// y = a + b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +25,7 @@ fn backward<T: Real>(io: Backward<'_, T>, signs: [T; 2]) {
     let [shape, ..] = io.shapes else { return };
     for (dx, sign) in io.dx.into_iter().zip(signs) {
         if let Some(dx) = dx {
-            rows::scale(io.level, sign, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
+            strided::scale(io.isa, sign, rows(io.dy, shape), rows_mut(dx.values, shape), dx.write);
         }
     }
 }
@@ -41,7 +41,7 @@ impl<T: Real> Op<T> for Add {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        rows::add(io.level, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
+        strided::add(io.isa, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -70,7 +70,7 @@ impl<T: Real> Op<T> for Subtract {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, ..] = io.shapes else { return };
-        rows::subtract(io.level, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
+        strided::subtract(io.isa, rows(io.x[0], shape), rows(io.x[1], shape), rows_mut(io.y, shape));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {

@@ -6,7 +6,7 @@ use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
-use crate::tape::op::{Backward, Bundled, Differentiable, Forward, Memory, Op, Reads, misfit};
+use crate::tape::op::{Backward, Differentiable, Forward, Memory, MicroBatched, Op, Reads, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, temporal};
 
 /// Operands x, W and, optionally, b.
@@ -40,7 +40,7 @@ impl<T: Real> Op<T> for Temporal {
 
     fn memory(&self, operands: &[Shape]) -> Memory {
         let Some(sizes @ Sizes { inputs, outputs, channels }) = self.sizes(operands) else { return Memory::default() };
-        let scratch = temporal::scratch_len(inputs, outputs, channels).max(sizes.bundle_scratch_len());
+        let scratch = temporal::scratch_len(inputs, outputs, channels).max(sizes.micro_batch_scratch_len());
         Memory { forward_scratch: scratch, backward_scratch: scratch, ..Memory::default() }
     }
 
@@ -48,15 +48,15 @@ impl<T: Real> Op<T> for Temporal {
         let [x, weight, bias @ ..] = io.shapes else { return };
         let y = RowsMut::packed(io.y, weight.rows().0, x.rows().1);
         let bias = (!bias.is_empty()).then_some(io.x[2]);
-        temporal::forward(io.level, rows(io.x[0], x), io.x[1], bias, y, io.scratch);
+        temporal::forward(io.isa, rows(io.x[0], x), io.x[1], bias, y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         Some(self)
     }
 
-    fn bundled(&self, operands: &[Shape]) -> Option<&dyn Bundled<T>> {
-        large_weight::bundled(self, operands)
+    fn micro_batched(&self, operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
+        large_weight::micro_batched(self, operands)
     }
 }
 
@@ -70,13 +70,13 @@ impl<T: Real> Differentiable<T> for Temporal {
         let dy = Rows::packed(io.dy, weight.rows().0, x.rows().1);
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            temporal::backward_input(io.level, dy, io.x[1], rows_mut(dx.values, x), dx.write, io.scratch);
+            temporal::backward_input(io.isa, dy, io.x[1], rows_mut(dx.values, x), dx.write, io.scratch);
         }
         if let Some(dweight) = dweight {
-            temporal::backward_weight(io.level, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
+            temporal::backward_weight(io.isa, rows(io.x[0], x), dy, dweight.values, dweight.write, io.scratch);
         }
         if let Some(dbias) = dbias {
-            temporal::backward_bias(io.level, dy, dbias.values, dbias.write);
+            temporal::backward_bias(io.isa, dy, dbias.values, dbias.write);
         }
     }
 }

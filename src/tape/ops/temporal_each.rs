@@ -6,7 +6,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Rows, RowsMut, rows, temporal_each};
+use phyture_kernels::{Real, Rows, RowsMut, strided, temporal_each};
 
 /// Operands x, W, b.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +30,7 @@ impl<T: Real> Op<T> for TemporalEach {
 
     fn forward(&self, io: Forward<'_, T>) {
         let [x, weight, ..] = io.shapes else { return };
-        temporal_each::forward(io.level, rows(io.x[0], x), rows(io.x[1], weight), io.x[2], io.y);
+        temporal_each::forward(io.isa, rows(io.x[0], x), rows(io.x[1], weight), io.x[2], io.y);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -47,15 +47,15 @@ impl<T: Real> Differentiable<T> for TemporalEach {
         let [x, weight, ..] = io.shapes else { return };
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
-            temporal_each::backward_input(io.level, rows(io.x[1], weight), io.dy, rows_mut(dx.values, x), dx.write);
+            temporal_each::backward_input(io.isa, rows(io.x[1], weight), io.dy, rows_mut(dx.values, x), dx.write);
         }
         if let Some(dweight) = dweight {
             let to = rows_mut(dweight.values, weight);
-            temporal_each::backward_weight(io.level, rows(io.x[0], x), io.dy, to, dweight.write);
+            temporal_each::backward_weight(io.isa, rows(io.x[0], x), io.dy, to, dweight.write);
         }
         if let Some(dbias) = dbias {
             let channels = io.dy.len();
-            rows::copy(io.level, Rows::packed(io.dy, 1, channels), RowsMut::packed(dbias.values, 1, channels), dbias.write);
+            strided::copy(io.isa, Rows::packed(io.dy, 1, channels), RowsMut::packed(dbias.values, 1, channels), dbias.write);
         }
     }
 }

@@ -32,7 +32,7 @@ impl<T: Real> Op<T> for WeightNorm {
     fn forward(&self, io: Forward<'_, T>) {
         let [v, ..] = io.shapes else { return };
         let (outputs, each) = sizes(v);
-        weight_norm::forward(io.level, Rows::packed(io.x[0], outputs, each), io.x[1], RowsMut::packed(io.y, outputs, each));
+        weight_norm::forward(io.isa, Rows::packed(io.x[0], outputs, each), io.x[1], RowsMut::packed(io.y, outputs, each));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -51,10 +51,10 @@ impl<T: Real> Differentiable<T> for WeightNorm {
         let (v, dw) = (Rows::packed(io.x[0], outputs, each), Rows::packed(io.dy, outputs, each));
         let [dv, dg, ..] = io.dx;
         if let Some(dv) = dv {
-            weight_norm::backward_direction(io.level, v, io.x[1], dw, RowsMut::packed(dv.values, outputs, each), dv.write);
+            weight_norm::backward_direction(io.isa, v, io.x[1], dw, RowsMut::packed(dv.values, outputs, each), dv.write);
         }
         if let Some(dg) = dg {
-            weight_norm::backward_length(io.level, v, dw, dg.values, dg.write);
+            weight_norm::backward_length(io.isa, v, dw, dg.values, dg.write);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Which weights are large: so large that operations on them take some samples at once, and that their gradients are made once from all
 //! samples of a step. Where their other buffers lie is the plan's; the arithmetic is that of `ops` and of the session.
 
-use super::shapes_of;
+use super::orders::shapes_of;
 use crate::tape::graph::{Graph, Source, Var};
 use crate::tape::op::{Op, WEIGHT};
 use phyture_kernels::Real;
@@ -25,14 +25,14 @@ pub(crate) struct LargeWeight {
 const LARGE_WEIGHT_PIECE: usize = 1 << 18;
 
 /// Which operations take some samples at once, and which parameters have their gradients made from all samples of a step.
-pub(super) struct Bundles {
+pub(super) struct MicroBatches {
     /// Operations, by node.
     pub nodes: BTreeSet<usize>,
     /// Parameters, by node.
     pub weights: BTreeSet<usize>,
 }
 
-impl Bundles {
+impl MicroBatches {
     /// None where samples wait for each other. A weight of which a part of the gradient comes sample by sample is no large weight.
     pub fn of<T: Real>(graph: &Graph<T>, forward: &[usize], backward: &[usize]) -> Self {
         let nodes = &graph.nodes;
@@ -46,13 +46,15 @@ impl Bundles {
         }
         let suits = |op: &Arc<dyn Op<T>>, operands: &[Var]| {
             let (x, weights) = operands.split_at(WEIGHT.min(operands.len()));
-            !x.iter().any(is_parameter) && weights.iter().all(is_parameter) && op.bundled(&shapes_of(graph, operands)).is_some()
+            !x.iter().any(is_parameter)
+                && weights.iter().all(is_parameter)
+                && op.micro_batched(&shapes_of(graph, operands)).is_some()
         };
         let (mut weights, mut others) = (BTreeSet::new(), BTreeSet::new());
         for (_, op, operands) in backward.iter().filter_map(operation) {
-            let bundled = suits(op, operands);
+            let micro_batched = suits(op, operands);
             for (index, var) in operands.iter().enumerate().filter(|(_, var)| is_parameter(var)) {
-                if bundled && index == WEIGHT {
+                if micro_batched && index == WEIGHT {
                     weights.insert(var.0)
                 } else {
                     others.insert(var.0)
@@ -61,8 +63,8 @@ impl Bundles {
         }
         weights.retain(|weight| !others.contains(weight));
         let whole = |operands: &[Var]| operands.get(WEIGHT).is_some_and(|weight| !others.contains(&weight.0));
-        let bundled = forward.iter().filter_map(operation).filter(|(_, op, operands)| suits(op, operands) && whole(operands));
-        Self { nodes: bundled.map(|(node, ..)| node).collect(), weights }
+        let micro_batched = forward.iter().filter_map(operation).filter(|(_, op, operands)| suits(op, operands) && whole(operands));
+        Self { nodes: micro_batched.map(|(node, ..)| node).collect(), weights }
     }
 
     /// The weights with their places in the flat slab, sorted by these, each with its node; no steps yet.
@@ -114,7 +116,7 @@ mod tests {
                 loss = graph.apply(Add, &[loss, error])?;
             }
             let plan = Plan::train(&graph, loss, &[])?;
-            assert_eq!((plan.bundle > 1, plan.large_weights.len()), (!other_use, usize::from(!other_use)));
+            assert_eq!((plan.micro_batch > 1, plan.large_weights.len()), (!other_use, usize::from(!other_use)));
             assert_eq!(plan.shard_len(), if other_use { 256 * 256 } else { 0 });
         }
         Ok(())

@@ -3,10 +3,16 @@
 
 use super::super::graph::{Graph, Source, Var};
 use super::super::op::Memory;
-use super::{LARGEST_SLAB, Orders, Piece, Role, alignment, operation, shapes_of};
+use super::super::slab::alignment;
+use super::orders::{Orders, operation, shapes_of};
+use super::step::{Piece, Role};
 use crate::error::{Error, Result};
 use phyture_kernels::Real;
 use std::ops::Range;
+
+/// Most numbers that one sample may take: 4 GiB in f32, some hundred times what the paper's network takes. Sizes that come from a file
+/// meet this bound before any memory is asked for.
+pub(crate) const LARGEST_SLAB: usize = 1 << 30;
 
 /// A stretch of the slab and the times in which it is in use, both ends included.
 #[derive(Clone, Copy, Debug)]

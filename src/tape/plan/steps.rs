@@ -2,8 +2,10 @@
 
 use super::super::graph::{Graph, Source};
 use super::super::op::{Memory, WEIGHT};
-use super::large_weights::Bundles;
-use super::{Kept, LargeWeight, Layout, Piece, Role, Step, operation, shapes_of};
+use super::large_weights::{LargeWeight, MicroBatches};
+use super::layout::Layout;
+use super::orders::{operation, shapes_of};
+use super::step::{Kept, Piece, Role, Step};
 use phyture_kernels::{Real, Write};
 use std::ops::Range;
 use std::sync::Arc;
@@ -26,15 +28,20 @@ pub(super) struct KeptSize {
 pub(super) struct Steps<'a, T> {
     graph: &'a Graph<T>,
     layout: &'a Layout,
-    bundles: &'a Bundles,
+    micro_batches: &'a MicroBatches,
     summed: &'a [(Range<usize>, usize)],
     /// By node, whether a step made so far writes its gradient.
     written: Vec<bool>,
 }
 
 impl<'a, T: Real> Steps<'a, T> {
-    pub fn new(graph: &'a Graph<T>, layout: &'a Layout, bundles: &'a Bundles, summed: &'a [(Range<usize>, usize)]) -> Self {
-        Self { graph, layout, bundles, summed, written: vec![false; graph.nodes.len()] }
+    pub fn new(
+        graph: &'a Graph<T>,
+        layout: &'a Layout,
+        micro_batches: &'a MicroBatches,
+        summed: &'a [(Range<usize>, usize)],
+    ) -> Self {
+        Self { graph, layout, micro_batches, summed, written: vec![false; graph.nodes.len()] }
     }
 
     /// The steps of a list, and the length of its packed weights.
@@ -63,8 +70,8 @@ impl<'a, T: Real> Steps<'a, T> {
         let weight = operands.get(WEIGHT).and_then(|&var| self.parameter(var.0)).filter(|_| len > 0);
         let packed = weight.map(|weight| (weight, *packed_len..*packed_len + len));
         *packed_len += packed.as_ref().map_or(0, |(_, packed)| packed.len());
-        let bundled = self.bundles.nodes.contains(&node);
-        Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, bundled, kept: None }
+        let micro_batched = self.micro_batches.nodes.contains(&node);
+        Step { op, site: node as u64, shapes, pieces, parameters, parameter_gradients, packed, micro_batched, kept: None }
     }
 
     /// What a step reads, with its workspace and scratch, and the result of a forward step; and the parameters among its operands.
@@ -105,7 +112,7 @@ impl<'a, T: Real> Steps<'a, T> {
             let write = if std::mem::replace(&mut self.written[var.0], true) { Write::Add } else { Write::Set };
             let role = Role::Dx(index, write);
             match parameter {
-                Some(_) if self.bundles.weights.contains(&var.0) => {}
+                Some(_) if self.micro_batches.weights.contains(&var.0) => {}
                 Some(range) => parameter_gradients.push(Piece::new(self.in_shard(&range), role)),
                 None => pieces.push(Piece::new(self.layout.gradient(var.0), role)),
             }
@@ -115,7 +122,7 @@ impl<'a, T: Real> Steps<'a, T> {
     /// Notes in the backward steps of large weights what is kept of a sample for their gradients.
     pub fn keep(&self, order: &[usize], steps: &mut [Step<T>], large_weights: &mut [(usize, LargeWeight)]) -> KeptSize {
         let mut size = KeptSize { len: 0, scratch: 0 };
-        for (index, (&node, step)) in order.iter().zip(steps).enumerate().filter(|(_, (_, step))| step.bundled) {
+        for (index, (&node, step)) in order.iter().zip(steps).enumerate().filter(|(_, (_, step))| step.micro_batched) {
             let (_, operands) = operation(self.graph, node);
             let own = operands.get(WEIGHT).and_then(|var| large_weights.iter_mut().find(|(node, _)| *node == var.0));
             let Some((_, weight)) = own else { continue };
@@ -125,7 +132,7 @@ impl<'a, T: Real> Steps<'a, T> {
             let end = middle + from[1].len();
             step.kept = Some(Kept { from, to: [size.len..middle, middle..end] });
             size.len = end;
-            let scratch = step.op.bundled(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
+            let scratch = step.op.micro_batched(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
             size.scratch = size.scratch.max(scratch);
         }
         size

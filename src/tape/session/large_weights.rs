@@ -53,13 +53,13 @@ impl<T: Real> LargeWeights<'_, T> {
 
     /// What one step of the backward list gives to some rows.
     fn piece(&self, step: usize, rows: Range<usize>, gradient: Gradient<'_, T>, scratch: &mut [T]) {
-        let Replay { plan, level, samples, result_len, .. } = *self.replay;
+        let Replay { plan, isa, samples, result_len, .. } = *self.replay;
         let step = &plan.backward[step];
-        let (Some(op), Some(kept)) = (step.op.bundled(&step.shapes), &step.kept) else { return };
+        let (Some(op), Some(kept)) = (step.op.micro_batched(&step.shapes), &step.kept) else { return };
         let [x, dy] = kept.to.each_ref().map(|place| {
             let first = result_len - plan.kept_len + place.start;
             Rows::new(self.results.get(first..).unwrap_or_default(), samples, place.len(), result_len)
         });
-        op.weight_gradient(WeightGradient { x, dy, rows, gradient, scratch, shapes: &step.shapes, level });
+        op.weight_gradient(WeightGradient { x, dy, rows, gradient, scratch, shapes: &step.shapes, isa });
     }
 }

@@ -4,14 +4,14 @@ use crate::tape::op::{Pack, Pass};
 use crate::tape::plan::Step;
 use crate::tape::threads::Parallelism;
 use phyture_kernels::Real;
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 
 /// Packs the weights of a list of steps, whose packed forms lie one after another from `start` on.
 pub(super) fn pack<T: Real>(
     parallelism: Parallelism,
     steps: &[Step<T>],
     pass: Pass,
-    level: Level,
+    isa: InstructionSet,
     parameters: &[T],
     start: usize,
     packed: &mut [T],
@@ -21,7 +21,7 @@ pub(super) fn pack<T: Real>(
         [step] => {
             if let Some((weight, range)) = &step.packed {
                 let (weight, packed) = (&parameters[weight.clone()], &mut packed[range.start - start..range.end - start]);
-                step.op.pack(Pack { pass, weight, packed, shapes: &step.shapes, level });
+                step.op.pack(Pack { pass, weight, packed, shapes: &step.shapes, isa });
             }
         }
         _ => {
@@ -29,8 +29,8 @@ pub(super) fn pack<T: Real>(
             let middle = low.iter().rev().find_map(|step| step.packed.as_ref()).map_or(start, |(_, range)| range.end);
             let (low_packed, high_packed) = packed.split_at_mut(middle - start);
             parallelism.join(
-                || pack(parallelism, low, pass, level, parameters, start, low_packed),
-                || pack(parallelism, high, pass, level, parameters, middle, high_packed),
+                || pack(parallelism, low, pass, isa, parameters, start, low_packed),
+                || pack(parallelism, high, pass, isa, parameters, middle, high_packed),
             );
         }
     }

@@ -1,23 +1,23 @@
-//! The steps of a plan on the samples of a step: shards side by side, the samples of a shard in order, one or a bundle at a time.
+//! The steps of a plan on the samples of a step: shards side by side, the samples of a shard in order, one or a micro-batch at a time.
 //!
 //! This file moves borrowed pieces of slabs to operations; it knows no operation and no arithmetic.
 
 use super::shards::Shard;
 use super::{DropoutKey, Fill};
 use crate::tape::graph::MAX_INPUTS;
-use crate::tape::op::{BUNDLE, Backward, Coupled, Forward, Gradient, MAX_OPERANDS};
+use crate::tape::op::{Backward, Coupled, Forward, Gradient, MAX_OPERANDS, MICRO_BATCH};
 use crate::tape::parts::Parts;
 use crate::tape::plan::{Piece, Plan, Role, Step};
 use crate::tape::slab::Slabs;
 use crate::tape::threads::Parallelism;
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Write};
 
 /// What all workers of one step share.
 pub(super) struct Replay<'a, T> {
     pub plan: &'a Plan<T>,
-    pub level: Level,
+    pub isa: InstructionSet,
     pub poison: bool,
     pub parallelism: Parallelism,
     pub slabs: &'a Slabs<T>,
@@ -57,10 +57,10 @@ impl<T: Real> Replay<'_, T> {
             return;
         }
         self.slabs.lend(|slab| {
-            let most = self.plan.bundle;
+            let most = self.plan.micro_batch;
             for (index, losses) in losses.chunks_mut(most).enumerate() {
                 let results = &mut results[index * most * self.result_len..][..losses.len() * self.result_len];
-                self.bundle(slab, &mut shard.gradients, (first + index * most, index == 0), losses, results);
+                self.micro_batch(slab, &mut shard.gradients, (first + index * most, index == 0), losses, results);
             }
         });
     }
@@ -80,10 +80,17 @@ impl<T: Real> Replay<'_, T> {
         (self.fill)(sample, &mut inputs[..count]);
     }
 
-    /// Samples `first…`, step by step side by side, each in a stretch of the slab; the first bundle of a shard sets its gradients.
-    fn bundle(&self, slab: &mut [T], gradients: &mut [T], (first, sets): (usize, bool), losses: &mut [f64], results: &mut [T]) {
+    /// Samples `first…`, step by step side by side, each in a stretch of the slab; the first micro-batch of a shard sets its gradients.
+    fn micro_batch(
+        &self,
+        slab: &mut [T],
+        gradients: &mut [T],
+        (first, sets): (usize, bool),
+        losses: &mut [f64],
+        results: &mut [T],
+    ) {
         let mut stretches = slab.chunks_mut(self.plan.lane_len().max(1));
-        let mut lanes: [&mut [T]; BUNDLE] = std::array::from_fn(|_| stretches.next().unwrap_or_default());
+        let mut lanes: [&mut [T]; MICRO_BATCH] = std::array::from_fn(|_| stretches.next().unwrap_or_default());
         let lanes = &mut lanes[..losses.len()];
         for (index, lane) in lanes.iter_mut().enumerate() {
             self.begin(lane, first + index);
@@ -109,13 +116,13 @@ impl<T: Real> Replay<'_, T> {
     fn forward_step(&self, step: &Step<T>, lanes: &mut [&mut [T]], first: usize) {
         let count = lanes.len();
         let mut samples = (first..).zip(lanes);
-        match step.op.bundled(&step.shapes).filter(|_| step.bundled) {
+        match step.op.micro_batched(&step.shapes).filter(|_| step.micro_batched) {
             Some(op) => {
-                let mut bundle: [Forward<'_, T>; BUNDLE] = std::array::from_fn(|_| match samples.next() {
+                let mut micro_batch: [Forward<'_, T>; MICRO_BATCH] = std::array::from_fn(|_| match samples.next() {
                     Some((sample, lane)) => self.forward(step, lane, sample, None),
                     None => self.forward_of_nothing(step, first, None),
                 });
-                op.forward_bundle(&mut bundle[..count]);
+                op.forward_micro_batch(&mut micro_batch[..count]);
             }
             None => {
                 for (sample, lane) in samples {
@@ -128,15 +135,15 @@ impl<T: Real> Replay<'_, T> {
     fn backward_step(&self, step: &Step<T>, lanes: &mut [&mut [T]], gradients: &mut [T], (first, sets): (usize, bool)) {
         let count = lanes.len();
         let mut samples = (first..).zip(lanes);
-        match step.op.bundled(&step.shapes).filter(|_| step.bundled) {
+        match step.op.micro_batched(&step.shapes).filter(|_| step.micro_batched) {
             Some(op) => {
                 // Of all together: the first one's.
                 let mut gradients = Some(gradients);
-                let mut bundle: [Backward<'_, T>; BUNDLE] = std::array::from_fn(|_| match samples.next() {
+                let mut micro_batch: [Backward<'_, T>; MICRO_BATCH] = std::array::from_fn(|_| match samples.next() {
                     Some((sample, lane)) => self.backward(step, lane, gradients.take(), (sample, sets), None),
                     None => self.backward_of_nothing(step, first, None),
                 });
-                op.backward_bundle(&mut bundle[..count]);
+                op.backward_micro_batch(&mut micro_batch[..count]);
             }
             None => {
                 if let Some(op) = step.op.differentiable() {
@@ -182,7 +189,7 @@ impl<T: Real> Replay<'_, T> {
             scratch: Default::default(),
             packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[0][range.clone()]),
             shapes: &step.shapes,
-            level: self.level,
+            isa: self.isa,
             parts: Parts::of(self.parallelism, self.slabs, self.samples),
             stream: self.stream(step, sample),
             coupled,
@@ -223,7 +230,7 @@ impl<T: Real> Replay<'_, T> {
             scratch: Default::default(),
             packed: step.packed.as_ref().map_or(&[], |(_, range)| &self.packed[1][range.clone()]),
             shapes: &step.shapes,
-            level: self.level,
+            isa: self.isa,
             stream: self.stream(step, sample),
             coupled,
         };

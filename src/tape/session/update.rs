@@ -4,7 +4,7 @@
 use crate::tape::threads::Parallelism;
 use phyture_kernels::Real;
 use phyture_kernels::adam::{self, Adam};
-use phyture_kernels::level::Level;
+use phyture_kernels::instruction_set::InstructionSet;
 
 /// Most numbers that one thread takes at a time.
 const BLOCK: usize = 1 << 16;
@@ -13,7 +13,7 @@ const BLOCK: usize = 1 << 16;
 #[derive(Clone, Copy)]
 pub(super) struct Update<'a> {
     pub parallelism: Parallelism,
-    pub level: Level,
+    pub isa: InstructionSet,
     pub adam: &'a Adam,
     pub step: u64,
 }
@@ -22,7 +22,7 @@ impl Update<'_> {
     /// Parameters and both moments, from the gradient.
     pub fn work<T: Real>(self, gradient: &[T], [parameters, first, second]: [&mut [T]; 3]) {
         if gradient.len() <= BLOCK {
-            return adam::step(self.level, self.adam, self.step, 1.0, gradient, parameters, first, second);
+            return adam::step(self.isa, self.adam, self.step, 1.0, gradient, parameters, first, second);
         }
         let half = (gradient.len() / 2).next_multiple_of(BLOCK / 2);
         let (low_gradient, high_gradient) = gradient.split_at(half);

@@ -292,7 +292,7 @@ impl Queue<'_> {
                 continue;
             }
             let working = self.folder.working(&key);
-            let outcome = self.experiment.perform(run, &working, &mut |share| {
+            let outcome = self.experiment.run(run, &working, &mut |share| {
                 self.experiment.take_notes().iter().for_each(|note| self.context.say(note));
                 // What has no steps to count is taken to need its time.
                 let gone = (share * cost).max(begun.elapsed().as_secs_f64().min(0.95 * cost));

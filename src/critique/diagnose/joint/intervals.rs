@@ -5,7 +5,7 @@ use super::{Folds, Point};
 use crate::critique::diagnose::engine::Engine;
 use crate::critique::diagnose::influence::{Influences, decisive};
 use crate::physics::Correlation;
-use crate::student::quantile_975;
+use crate::student_t::quantile_975;
 
 impl Point {
     /// Notes 95 % intervals in the model: from what the numbers would be without each tenth of the blocks (the delete-a-group jackknife, Kott 2001,

@@ -8,7 +8,7 @@ use super::{rows, rows_mut};
 use crate::error::Result;
 use crate::tape::Shape;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
-use phyture_kernels::{Real, Write, rows};
+use phyture_kernels::{Real, Write, strided};
 
 /// Every second row of x [n, C], n even: y [n/2, C].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ impl<T: Real> Op<T> for Half {
         let [shape, ..] = io.shapes else { return };
         let x = rows(io.x[0], shape);
         let half = if *self == Self::Even { x.even() } else { x.odd() };
-        rows::copy(io.level, half, phyture_kernels::RowsMut::packed(io.y, half.rows(), half.cols()), Write::Set);
+        strided::copy(io.isa, half, phyture_kernels::RowsMut::packed(io.y, half.rows(), half.cols()), Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -61,9 +61,9 @@ impl<T: Real> Differentiable<T> for Half {
         let mut dx_rows = rows_mut(dx.values, shape);
         if dx.write == Write::Set {
             let other = dx_rows.reborrow();
-            rows::fill(if *self == Self::Even { other.odd() } else { other.even() }, T::ZERO);
+            strided::fill(if *self == Self::Even { other.odd() } else { other.even() }, T::ZERO);
         }
-        rows::copy(io.level, dy, if *self == Self::Even { dx_rows.even() } else { dx_rows.odd() }, dx.write);
+        strided::copy(io.isa, dy, if *self == Self::Even { dx_rows.even() } else { dx_rows.odd() }, dx.write);
     }
 }
 
@@ -85,7 +85,7 @@ impl<T: Real> Op<T> for Interleave {
         let [shape, ..] = io.shapes else { return };
         let (n, channels) = shape.rows();
         let y = phyture_kernels::RowsMut::packed(io.y, 2 * n, channels);
-        rows::interleave(io.level, rows(io.x[0], shape), rows(io.x[1], shape), y, Write::Set);
+        strided::interleave(io.isa, rows(io.x[0], shape), rows(io.x[1], shape), y, Write::Set);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -105,7 +105,7 @@ impl<T: Real> Differentiable<T> for Interleave {
         let [even, odd, ..] = io.dx;
         for (dx, half) in [(even, dy.even()), (odd, dy.odd())] {
             if let Some(dx) = dx {
-                rows::copy(io.level, half, rows_mut(dx.values, shape), dx.write);
+                strided::copy(io.isa, half, rows_mut(dx.values, shape), dx.write);
             }
         }
     }

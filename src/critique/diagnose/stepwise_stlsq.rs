@@ -17,7 +17,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 use ndarray::Array2;
 
 /// A column enters or stays above this partial F (SIDPAC's default: four times the 95 % value of some 5).
-const LARGEST_F: f64 = 20.0;
+const F_TO_ENTER: f64 = 20.0;
 /// Every so many-th block chooses the threshold.
 const HELD_OUT: usize = 5;
 /// Thresholds tried, relative to the largest coefficient of normalised columns.
@@ -30,7 +30,7 @@ pub type Named = Vec<String>;
 ///
 /// # Errors
 /// As [`super::diagnose`].
-pub fn textbook(flights: &[Flight], model: &Model, searched: &[Span], dynamic: bool) -> Result<(Named, Named)> {
+pub fn stepwise_and_stlsq(flights: &[Flight], model: &Model, searched: &[Span], dynamic: bool) -> Result<(Named, Named)> {
     let cut = blocks(flights, searched, 10.0);
     let fold = (0..cut.len()).map(|block| block % HELD_OUT).collect();
     let engine = Engine { flights, blocks: cut, fold, correlation: 1.0, held: Vec::new() };
@@ -189,7 +189,8 @@ impl<'a> Problem<'a> {
             });
             let Some((column, less)) = enter.min_by(|left, right| left.1.total_cmp(&right.1)) else { break };
             let freedom = self.rows - chosen.len() as f64 - 1.0;
-            if (error - less) / (less / freedom) < LARGEST_F || predicted(less, chosen.len() + 1) > predicted(error, chosen.len()) {
+            if (error - less) / (less / freedom) < F_TO_ENTER || predicted(less, chosen.len() + 1) > predicted(error, chosen.len())
+            {
                 break;
             }
             chosen.push(column);
@@ -199,7 +200,7 @@ impl<'a> Problem<'a> {
                 self.solve(&fewer).map(|solved| (column, solved.1))
             });
             if let Some((column, more)) = leave.min_by(|left, right| left.1.total_cmp(&right.1))
-                && (more - error) / (error / freedom) < LARGEST_F
+                && (more - error) / (error / freedom) < F_TO_ENTER
             {
                 chosen.retain(|&other| other != column);
                 error = more;

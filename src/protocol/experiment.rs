@@ -84,7 +84,7 @@ impl<'a> Experiment<'a> {
     /// # Errors
     /// [`Error::Interrupted`] if `go_on` said no; [`Error::Undetermined`] if the data hold too little for a division, training diverged
     /// or a prediction is not finite; otherwise what the parts give.
-    pub fn perform(&self, run: &Run, working: &Path, go_on: GoOn<'_>) -> Result<Outcome> {
+    pub fn run(&self, run: &Run, working: &Path, go_on: GoOn<'_>) -> Result<Outcome> {
         let split = self.split(run)?;
         let history = self.plan.settings.phyture()?.history;
         let judged = windows(&split.test, history, self.plan.settings.test_stride);

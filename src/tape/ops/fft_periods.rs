@@ -17,19 +17,19 @@ use phyture_kernels::{Real, Write};
 
 /// Operand x.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Periods {
+pub struct FftPeriods {
     count: usize,
     transform: Transform,
 }
 
-impl Periods {
+impl FftPeriods {
     /// The `count` strongest periods of sequences of this length.
     pub fn new(count: usize, length: usize) -> Self {
         Self { count, transform: Transform::new(length) }
     }
 }
 
-impl<T: Real> Op<T> for Periods {
+impl<T: Real> Op<T> for FftPeriods {
     fn name(&self) -> &'static str {
         "periods"
     }
@@ -59,7 +59,7 @@ impl<T: Real> Op<T> for Periods {
         let [x, ..] = io.shapes else { return };
         let (n, channels) = x.rows();
         let (amplitudes, scratch) = io.scratch.split_at_mut(spectrum::frequencies(n));
-        spectrum::amplitudes(io.level, &self.transform, rows(io.x[0], x), amplitudes, scratch);
+        spectrum::amplitudes(io.isa, &self.transform, rows(io.x[0], x), amplitudes, scratch);
         let (real, imaginary) = scratch.split_at(n * channels);
         let (chosen, parts) = io.workspace.split_at_mut(self.count);
         let y = io.y;
@@ -87,7 +87,7 @@ impl<T: Real> Op<T> for Periods {
     }
 }
 
-impl<T: Real> Differentiable<T> for Periods {
+impl<T: Real> Differentiable<T> for FftPeriods {
     fn reads(&self) -> Reads {
         Reads::result()
     }
@@ -104,7 +104,7 @@ impl<T: Real> Differentiable<T> for Periods {
         for (place, (weight, dweight)) in weights().enumerate() {
             let parts = parts[2 * place * channels..][..2 * channels].split_at(channels);
             let (f, damplitude) = (chosen[place].f64() as usize, *weight * (*dweight - mean));
-            spectrum::backward(io.level, &self.transform, f, parts, damplitude, rows_mut(dx.values, x), io.scratch);
+            spectrum::backward(io.isa, &self.transform, f, parts, damplitude, rows_mut(dx.values, x), io.scratch);
         }
     }
 }
@@ -116,15 +116,15 @@ mod tests {
     use phyture_kernels::Tolerance;
     use std::f64::consts::TAU;
 
-    gradcheck!(periods: Periods::new(3, 12), [[12, 3]]);
-    gradcheck!(one_period_of_a_prime_length: Periods::new(1, 7), [[7, 2]]);
+    gradcheck!(periods: FftPeriods::new(3, 12), [[12, 3]]);
+    gradcheck!(one_period_of_a_prime_length: FftPeriods::new(1, 7), [[7, 2]]);
 
     #[test]
     fn the_periods_of_sinusoids_are_found_and_the_stronger_comes_first() -> Result<()> {
         let (n, channels) = (1000, 2);
         let mut graph = Graph::<f64>::new();
         let x = graph.input("x", &[n, channels])?;
-        let y = graph.apply(Periods::new(3, n), &[x])?;
+        let y = graph.apply(FftPeriods::new(3, n), &[x])?;
         let mut session = Session::infer(&graph, &[y], Threads(1))?;
         // 20 and 3 periods in both channels, 7 in one of them; and a mean, which does not count.
         let wave = |f: f64, t: usize, phase: f64| (TAU * f * t as f64 / n as f64 + phase).sin();

@@ -13,7 +13,7 @@
 //! Taken for kernels of 3 and 5 taps whose channels fill whole panels at every level ([`applies`]). Not here: what is done with z.
 
 use super::Geometry;
-use crate::level::Isa;
+use crate::instruction_set::Isa;
 use crate::tile::{self, Pair, Sink, Store};
 use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};

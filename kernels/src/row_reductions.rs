@@ -3,7 +3,7 @@
 //! Not here: sums down the rows, which vectorise as they are written.
 
 use crate::Real;
-use crate::level::Isa;
+use crate::instruction_set::Isa;
 
 /// Lanes of a sum along a row: four registers of the widest level in f32.
 const LANES: usize = 64;

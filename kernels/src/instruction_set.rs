@@ -16,9 +16,9 @@ use crate::vector::Vector;
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
 pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
 
-/// A level this processor is known to have. Values other than [`Level::PLAIN`] exist only after the processor was asked.
+/// A level this processor is known to have. Values other than [`InstructionSet::PLAIN`] exist only after the processor was asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Level(Kind);
+pub struct InstructionSet(Kind);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
@@ -32,16 +32,16 @@ const NAMES: [(&str, Kind); 4] = [("plain", Kind::Plain), ("avx2", Kind::Avx2), 
 
 /// A level was asked for that cannot be had.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum LevelError {
+pub enum InstructionSetError {
     /// The name is none of the known ones.
     Unknown(String),
     /// The processor, or the architecture this was compiled for, does not have it.
     Unavailable(&'static str),
 }
 
-impl fmt::Display for LevelError {
+impl fmt::Display for InstructionSetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let available: Vec<_> = Level::available().iter().map(|level| level.name()).collect();
+        let available: Vec<_> = InstructionSet::available().iter().map(|isa| isa.name()).collect();
         let available = available.join(", ");
         match self {
             Self::Unknown(name) => {
@@ -57,9 +57,9 @@ impl fmt::Display for LevelError {
     }
 }
 
-impl std::error::Error for LevelError {}
+impl std::error::Error for InstructionSetError {}
 
-impl Level {
+impl InstructionSet {
     /// What every processor of the architecture has.
     pub const PLAIN: Self = Self(Kind::Plain);
 
@@ -67,8 +67,8 @@ impl Level {
     ///
     /// # Errors
     /// If `PHYTURE_ISA` names a level that is unknown or not available; nothing else is silently used in its place.
-    pub fn detect() -> Result<Self, LevelError> {
-        static CHOSEN: OnceLock<Result<Level, LevelError>> = OnceLock::new();
+    pub fn detect() -> Result<Self, InstructionSetError> {
+        static CHOSEN: OnceLock<Result<InstructionSet, InstructionSetError>> = OnceLock::new();
         CHOSEN
             .get_or_init(|| match std::env::var_os(ENVIRONMENT_VARIABLE) {
                 Some(name) if !name.is_empty() => Self::named(&name.to_string_lossy()),
@@ -81,9 +81,10 @@ impl Level {
     ///
     /// # Errors
     /// If the name is unknown or this processor does not have the level.
-    pub fn named(name: &str) -> Result<Self, LevelError> {
-        let (name, kind) = *NAMES.iter().find(|(known, _)| *known == name).ok_or_else(|| LevelError::Unknown(name.to_owned()))?;
-        if kind.is_available() { Ok(Self(kind)) } else { Err(LevelError::Unavailable(name)) }
+    pub fn named(name: &str) -> Result<Self, InstructionSetError> {
+        let (name, kind) =
+            *NAMES.iter().find(|(known, _)| *known == name).ok_or_else(|| InstructionSetError::Unknown(name.to_owned()))?;
+        if kind.is_available() { Ok(Self(kind)) } else { Err(InstructionSetError::Unavailable(name)) }
     }
 
     /// All levels of this processor, slowest first.
@@ -101,7 +102,7 @@ impl Level {
     pub(crate) fn run<K: Kernel>(self, kernel: K) {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: a Level of this kind is made only by `named` and `available`, after the processor reported avx2 and fma.
+            // SAFETY: a InstructionSet of this kind is made only by `named` and `available`, after the processor reported avx2 and fma.
             Kind::Avx2 => unsafe { avx2(kernel) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above, for avx512f, avx512bw, avx512dq, avx512vl, avx2 and fma.
@@ -120,7 +121,7 @@ impl Level {
     }
 }
 
-impl fmt::Display for Level {
+impl fmt::Display for InstructionSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }
@@ -281,29 +282,29 @@ mod tests {
 
     #[test]
     fn plain_is_always_there_and_names_round_trip() {
-        let available = Level::available();
-        assert_eq!(available.first(), Some(&Level::PLAIN));
-        for level in available {
-            assert_eq!(Level::named(level.name()), Ok(level));
+        let available = InstructionSet::available();
+        assert_eq!(available.first(), Some(&InstructionSet::PLAIN));
+        for isa in available {
+            assert_eq!(InstructionSet::named(isa.name()), Ok(isa));
         }
     }
 
     #[test]
     fn a_wrong_name_is_refused_and_told_what_there_is() {
-        let error = Level::named("sse9").unwrap_err();
-        assert_eq!(error, LevelError::Unknown("sse9".to_owned()));
+        let error = InstructionSet::named("sse9").unwrap_err();
+        assert_eq!(error, InstructionSetError::Unknown("sse9".to_owned()));
         assert!(error.to_string().contains("plain"));
         let missing = NAMES.iter().find(|(_, kind)| !kind.is_available()).map(|(name, _)| *name);
         let missing = missing.expect("no processor has both avx512 and neon");
-        assert_eq!(Level::named(missing), Err(LevelError::Unavailable(missing)));
+        assert_eq!(InstructionSet::named(missing), Err(InstructionSetError::Unavailable(missing)));
     }
 
     #[test]
     fn the_environment_variable_decides() {
         let expected = match std::env::var(ENVIRONMENT_VARIABLE) {
-            Ok(name) if !name.is_empty() => Level::named(&name),
-            _ => Ok(*Level::available().last().expect("plain is always there")),
+            Ok(name) if !name.is_empty() => InstructionSet::named(&name),
+            _ => Ok(*InstructionSet::available().last().expect("plain is always there")),
         };
-        assert_eq!(Level::detect(), expected);
+        assert_eq!(InstructionSet::detect(), expected);
     }
 }

@@ -4,7 +4,7 @@
 //! rows, a range of columns (an attention head) are views of the same numbers and cost nothing. A read-only view may even
 //! overlap itself (`stride < cols`). This file holds no arithmetic but sum and difference of two views.
 
-use crate::level::{Isa, Kernel, Level};
+use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Write};
 
 /// Bytes of a cache line.
@@ -239,14 +239,14 @@ impl<T: Real> Kernel for Scale<'_, T> {
 }
 
 /// y {=, +=} x, both `[n, C]`.
-pub fn copy<T: Real>(level: Level, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
-    scale(level, T::ONE, x, y, write);
+pub fn copy<T: Real>(isa: InstructionSet, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
+    scale(isa, T::ONE, x, y, write);
 }
 
 /// y {=, +=} factor·x, both `[n, C]`.
-pub fn scale<T: Real>(level: Level, factor: T, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
+pub fn scale<T: Real>(isa: InstructionSet, factor: T, x: Rows<'_, T>, y: RowsMut<'_, T>, write: Write) {
     same_shape(&x, &y.view());
-    T::rows_scale(level, Scale { factor, x, y, write });
+    T::rows_scale(isa, Scale { factor, x, y, write });
 }
 
 /// y = a + sign·b.
@@ -269,36 +269,36 @@ impl<T: Real> Kernel for Combine<'_, T> {
 }
 
 /// y = a + b, all `[n, C]`.
-pub fn add<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn add<T: Real>(isa: InstructionSet, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
-    T::rows_combine(level, Combine { a, b, sign: T::ONE, y });
+    T::rows_combine(isa, Combine { a, b, sign: T::ONE, y });
 }
 
 /// y = a − b, all `[n, C]`.
-pub fn subtract<T: Real>(level: Level, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
+pub fn subtract<T: Real>(isa: InstructionSet, a: Rows<'_, T>, b: Rows<'_, T>, y: RowsMut<'_, T>) {
     same_shape(&a, &b);
     same_shape(&a, &y.view());
-    T::rows_combine(level, Combine { a, b, sign: -T::ONE, y });
+    T::rows_combine(isa, Combine { a, b, sign: -T::ONE, y });
 }
 
 /// Splits a sequence x `[n, C]` into its even rows `[⌈n/2⌉, C]` and odd rows `[⌊n/2⌋, C]`. Exact.
-pub fn split<T: Real>(level: Level, x: Rows<'_, T>, even: RowsMut<'_, T>, odd: RowsMut<'_, T>) {
-    copy(level, x.even(), even, Write::Set);
-    copy(level, x.odd(), odd, Write::Set);
+pub fn split<T: Real>(isa: InstructionSet, x: Rows<'_, T>, even: RowsMut<'_, T>, odd: RowsMut<'_, T>) {
+    copy(isa, x.even(), even, Write::Set);
+    copy(isa, x.odd(), odd, Write::Set);
 }
 
 /// The inverse of [`split`], and with `Write::Add` its adjoint's accumulating form: `y[2i] {=, +=} even[i]`, `y[2i+1] {=, +=} odd[i]`.
-pub fn interleave<T: Real>(level: Level, even: Rows<'_, T>, odd: Rows<'_, T>, mut y: RowsMut<'_, T>, write: Write) {
-    copy(level, even, y.reborrow().even(), write);
-    copy(level, odd, y.odd(), write);
+pub fn interleave<T: Real>(isa: InstructionSet, even: Rows<'_, T>, odd: Rows<'_, T>, mut y: RowsMut<'_, T>, write: Write) {
+    copy(isa, even, y.reborrow().even(), write);
+    copy(isa, odd, y.odd(), write);
 }
 
 /// Σ x∘y over all elements, both `[n, C]`.
-pub fn inner<T: Real>(level: Level, x: Rows<'_, T>, y: Rows<'_, T>) -> T {
+pub fn inner<T: Real>(isa: InstructionSet, x: Rows<'_, T>, y: Rows<'_, T>) -> T {
     same_shape(&x, &y);
     let mut sum = T::ZERO;
-    T::rows_inner(level, Inner { x, y, sum: &mut sum });
+    T::rows_inner(isa, Inner { x, y, sum: &mut sum });
     sum
 }
 
@@ -313,7 +313,7 @@ impl<T: Real> Kernel for Inner<'_, T> {
     fn run<I: Isa>(self) {
         *self.sum = T::ZERO;
         for i in 0..self.x.rows {
-            *self.sum += crate::sums::dot::<T, I>(self.x.row(i), self.y.row(i));
+            *self.sum += crate::row_reductions::dot::<T, I>(self.x.row(i), self.y.row(i));
         }
     }
 }
@@ -337,12 +337,12 @@ mod tests {
         #[test]
         fn interleave_undoes_split_bit_for_bit(rows in 0_usize..200, cols in 0_usize..40, seed in 0_u64..1000) {
             let x = Matrix::<f32>::random(seed, (rows, cols));
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut even = Matrix::<f32>::poisoned(seed, (rows.div_ceil(2), cols));
                 let mut odd = Matrix::<f32>::poisoned(seed + 1, (rows / 2, cols));
                 let mut back = Matrix::<f32>::poisoned(seed + 2, (rows, cols));
-                split(level, x.view(), even.view_mut(), odd.view_mut());
-                interleave(level, even.view(), odd.view(), back.view_mut(), Write::Set);
+                split(isa, x.view(), even.view_mut(), odd.view_mut());
+                interleave(isa, even.view(), odd.view(), back.view_mut(), Write::Set);
                 assert_eq!(back.to_vec(), x.to_vec());
                 back.check_gaps();
             }
@@ -353,7 +353,7 @@ mod tests {
             let (x, y) = (Matrix::<f64>::random(seed, (rows, cols)), Matrix::<f64>::random(seed + 1, (rows, cols)));
             let (even, odd) = (y.view().even(), y.view().odd());
             let mut back = Matrix::<f64>::poisoned(seed, (rows, cols));
-            interleave(Level::PLAIN, even, odd, back.view_mut(), Write::Set);
+            interleave(InstructionSet::PLAIN, even, odd, back.view_mut(), Write::Set);
             let of = |x: &Matrix<f64>| inner(&x.to_vec(), &y.to_vec());
             assert_near("<split x, y> and <x, interleave y>", &[of(&x)], &[inner(&x.to_vec(), &back.to_vec())], Tolerance::Close);
         }
@@ -362,16 +362,16 @@ mod tests {
         fn sums_and_differences(rows in 0_usize..60, cols in 0_usize..200, seed in 0_u64..1000) {
             let (a, b) = (Matrix::<f32>::random(seed, (rows, cols)), Matrix::<f32>::random(seed + 1, (rows, cols)));
             let (a_values, b_values) = (a.to_vec(), b.to_vec());
-            for level in Level::available() {
+            for isa in InstructionSet::available() {
                 let mut y = Matrix::<f32>::poisoned(seed, (rows, cols));
-                add(level, a.view(), b.view(), y.view_mut());
+                add(isa, a.view(), b.view(), y.view_mut());
                 assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a + b).collect::<Vec<_>>());
-                subtract(level, a.view(), b.view(), y.view_mut());
+                subtract(isa, a.view(), b.view(), y.view_mut());
                 assert_eq!(y.to_vec(), a_values.iter().zip(&b_values).map(|(a, b)| a - b).collect::<Vec<_>>());
                 y.check_gaps();
                 let expected: f64 = a_values.iter().zip(&b_values).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum();
-                assert_near("inner", &[super::inner(level, a.view(), b.view())], &[expected as f32], Tolerance::Approximate);
-                check_writes("copy", &a, Tolerance::Close, |y, write| copy(level, a.view(), y, write));
+                assert_near("inner", &[super::inner(isa, a.view(), b.view())], &[expected as f32], Tolerance::Approximate);
+                check_writes("copy", &a, Tolerance::Close, |y, write| copy(isa, a.view(), y, write));
             }
         }
     }
