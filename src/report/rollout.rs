@@ -35,6 +35,7 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
     out.extend(rollouts.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
     out.extend(rollouts.position_from_velocity.then(|| POSITION_FROM_VELOCITY.to_owned()));
     out.extend(rollouts.caution());
+    let basis = out.len();
     for row in rollouts.rows.iter().filter(|row| row.name != rollouts.relative_to).skip(1) {
         let says = |quantity: Quantity| {
             let percent = (*row.whole.difference_percent.of(quantity))?;
@@ -50,6 +51,12 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
         let found: Vec<String> = Quantity::ALL.into_iter().filter_map(says).collect();
         let (name, other) = (&row.name, &rollouts.relative_to);
         out.push(format!("The errors of {name}, summed over the horizon, beside {other}: {}.", found.join(", ")));
+    }
+    // The last row is the one in focus: its errors are the verdict.
+    if out.len() > basis
+        && let Some(verdict) = out.pop()
+    {
+        out.insert(0, verdict);
     }
     for row in rollouts.rows.iter().filter(|row| row.whole.diverged > 0) {
         let (diverged, n) = (row.whole.diverged, row.whole.n);

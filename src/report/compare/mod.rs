@@ -119,7 +119,6 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
         let (finest, worst) = (says(finest), says(worst));
         out.insert(0, format!("{} predicts best the {finest}; worst the {worst}.", model.name));
     }
-    out.push(format!("{}.", report.comparison.basis()));
     let mean = |model: &ModelError| model.rmse.mean;
     let judged = report.comparison.models.iter().enumerate().filter(|(index, _)| report.yardstick != Some(*index));
     let best = judged.filter_map(|(index, model)| Some((index, model, mean(model)?))).min_by(|a, b| a.2.total_cmp(&b.2));

@@ -76,8 +76,10 @@ pub fn error_tables(comparison: &Comparison) -> Vec<Part> {
         let rows = rows.chain(floor).collect();
         Part::Table(Table { caption: format!("{title}, {words}"), rows, columns: columns.clone() })
     };
-    let note =
-        format!("{LEGEND} The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.");
+    let note = format!(
+        "{} The mean of the six mixes m/s² and rad/s²: it ranks models on the same data and means nothing else.",
+        LEGEND.replace("below each", "behind each")
+    );
     let mut parts: Vec<Part> = comparison.caution().map(Part::Text).into_iter().collect();
     let mut all = MEASURES.into_iter().map(table);
     parts.extend(all.next());

@@ -24,7 +24,7 @@ impl Kind {
     /// Class of its bar, and how it stands in the legend.
     const fn look(self) -> (&'static str, usize, Look, &'static str) {
         match self {
-            Self::Before => ("f0 thin", 0, Look::Bar, "before, or a yardstick"),
+            Self::Before => ("f0 thin", 0, Look::Faint, "before, or a yardstick"),
             Self::Physics => ("f1", 1, Look::Bar, "with more physics"),
             Self::Network => ("f3", 3, Look::Bar, "with a network"),
             Self::Suggested => ("h2", 2, Look::Hollow, "with the suggested formula, measured"),

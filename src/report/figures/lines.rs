@@ -155,7 +155,7 @@ fn trace_panel(number: usize, title: &str, unit: &str, trace: &Trace, x: Scale) 
         content.push(draw(&above, &class(place + 1), name, name, points(y), trace.sparse));
     }
     let content: String = content.into_iter().rev().collect();
-    let mut body = heading(title, unit) + &above.axes(Ticks { x: 0, y: 4, x_title: "" }) + &above.data(&content);
+    let mut body = heading(title, unit) + &above.axes(Ticks { x: 0, y: 5, x_title: "" }) + &above.data(&content);
     let residuals: Vec<&Vec<f64>> = trace.residuals.iter().filter_map(|of| of.get(number)).collect();
     let largest = ends(residuals.iter().flat_map(|of| of.iter().map(|value| value.abs()))).1.max(f64::MIN_POSITIVE);
     let below = area(172.0, 44.0, Scale::linear(-1.05 * largest, 1.05 * largest));
@@ -166,7 +166,7 @@ fn trace_panel(number: usize, title: &str, unit: &str, trace: &Trace, x: Scale) 
             &draw(&below, &class(place + 1), &format!("left of {name}"), &format!("measured − {name}"), points(y), trace.sparse);
     }
     body += &words("tk", "start", LEFT + 3.0, 169.0, "measured − predicted");
-    body += &(below.axes(Ticks { x: 0, y: 2, x_title: "" }) + &below.data(&rest));
+    body += &(below.axes(Ticks { x: 0, y: 3, x_title: "" }) + &below.data(&rest));
     let sticks = area(234.0, 34.0, Scale::around(trace.sticks.iter().flat_map(|(_, y)| y.iter().copied()).chain([0.0])));
     let mut moved = String::new();
     for (place, (name, y)) in trace.sticks.iter().enumerate() {

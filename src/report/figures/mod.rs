@@ -31,6 +31,8 @@ pub enum Look {
     Dashed,
     /// A filled area or bar.
     Bar,
+    /// The same, less strong.
+    Faint,
     /// An outline.
     Hollow,
     /// A dot.
@@ -221,6 +223,7 @@ impl Key {
             Look::Line => format!("<path class=\"l s{series}\" d=\"M1 6h24\"/>"),
             Look::Dashed => format!("<path class=\"l dash s{series}\" d=\"M1 6h24\"/>"),
             Look::Bar => format!("<rect class=\"f{series}\" x=\"4\" y=\"1\" width=\"18\" height=\"10\"/>"),
+            Look::Faint => format!("<rect class=\"f{series} thin\" x=\"4\" y=\"1\" width=\"18\" height=\"10\"/>"),
             Look::Hollow => format!("<rect class=\"h{series}\" x=\"4\" y=\"1\" width=\"18\" height=\"10\"/>"),
             Look::Dot => format!("<circle class=\"f{series}\" cx=\"13\" cy=\"6\" r=\"4\"/>"),
         }

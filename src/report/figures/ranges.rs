@@ -25,7 +25,7 @@ const NAME: usize = 15;
 
 /// Numbers with their intervals over a band of what is usual, each row on an axis of its own that holds zero, number and band; a panel an effect.
 pub fn ranges(title: &str, caption: &str, effects: &[(String, Vec<RangeRow>)]) -> Figure {
-    let keys = [("found, with its 95 % interval", 1, Look::Dot), ("usual, where it is known", 0, Look::Bar)];
+    let keys = [("found, with its 95 % interval", 1, Look::Dot), ("usual, where it is known", 0, Look::Faint)];
     Figure {
         title: title.to_owned(),
         caption: caption.to_owned(),

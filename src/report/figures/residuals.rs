@@ -46,7 +46,7 @@ fn binned_panel(panel: &BinnedPanel<'_>, unit: &str, y: Scale) -> Panel {
         Area { left: LEFT, top: 24.0, width: WIDTH - LEFT - RIGHT, height: 150.0, x: Scale::linear(low - room, high + room), y };
     let title = with_unit(panel.variable, panel.unit);
     let mut body = heading(&format!("{:.0} % goes with {}", 100.0 * panel.dependence.share, panel.variable), unit);
-    body += &area.axes(Ticks { x: 6, y: 4, x_title: &title });
+    body += &area.axes(Ticks { x: 6, y: 6, x_title: &title });
     let mut data = Vec::new();
     let mut number = |series: &str, bin: &Bin, interval: Option<[f64; 2]>| {
         data.push(Datum { series: series.into(), x: bin.at.to_string(), y: bin.mean, interval });
