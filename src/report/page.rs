@@ -254,21 +254,24 @@ fn map_html(map: &Map) -> String {
     for (name, detail, cells) in &map.rows {
         _ = write!(out, "<tr><th scope=\"row\">{}<small>{}</small></th>", escape(name), escape(detail));
         for cell in cells {
-            let style = |value: Option<f64>| {
-                let shade = value.filter(|_| largest > 0.0).map(|value| colour::shade(value / largest));
-                shade.map_or_else(String::new, |(paper, ink)| format!(" style=\"background:{paper};color:{ink}\""))
-            };
+            let shade = |value: Option<f64>| value.filter(|_| largest > 0.0).map(|value| colour::shade(value / largest));
+            let style =
+                shade(cell.value).map_or_else(String::new, |(paper, ink)| format!(" style=\"background:{paper};color:{ink}\""));
             let hint = cell.value.map(|value| format!(" title=\"{value:.3}\"")).unwrap_or_default();
-            let (text, detail, now) = (escape(&cell.text), escape(&cell.detail), style(cell.value));
-            _ = match &cell.before {
-                None => write!(out, "<td{now}{hint}>{text}<small>{detail}</small></td>"),
-                Some((before, value)) => write!(
-                    out,
-                    "<td class=\"pair\" title=\"before {0}, after {text} {detail}\"><span{1}>{0}</span><span{now}>{text}</span></td>",
-                    escape(before),
-                    style(*value)
-                ),
+            let (text, detail) = (escape(&cell.text), escape(&cell.detail));
+            let Some((before, old)) = &cell.before else {
+                _ = write!(out, "<td{style}{hint}>{text}<small>{detail}</small></td>");
+                continue;
             };
+            // Two shades in one cell, each as high as the row.
+            let blank = || ("transparent".to_owned(), "inherit");
+            let [(left, left_ink), (right, right_ink)] = [*old, cell.value].map(|value| shade(value).unwrap_or_else(blank));
+            _ = write!(
+                out,
+                "<td class=\"pair\" style=\"background:linear-gradient(to right,{left} 50%,{right} 50%)\" title=\"before {0}, after {text} {detail}\">\
+                 <span style=\"color:{left_ink}\">{0}</span><span style=\"color:{right_ink}\">{text}</span></td>",
+                escape(before)
+            );
         }
         out.push_str("</tr>\n");
     }

@@ -2,7 +2,7 @@
 
 use super::super::compare::bar_of;
 use super::super::figures::{self, Fall, FallPanel, Kind};
-use super::super::names::{channel_panels, listed, said};
+use super::super::names::{channel_panels, listed, named, said};
 use super::super::page::Part;
 use super::DiagnoseReport;
 use crate::critique::diagnose::sentences::{self, Told, change, percent, removable, rises, unseen};
@@ -13,6 +13,8 @@ use crate::flight::Column;
 /// Of as many effects the verdict says what each is; of more, those that are worth most are named.
 const EXPLAINED: usize = 2;
 const NAMED: usize = 3;
+/// A bar that differs from the one before by less than this share of it has not moved.
+const UNMOVED: f64 = 0.005;
 
 /// The verdict in one or two sentences, and what it rests on.
 pub(super) fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
@@ -91,9 +93,9 @@ fn removed(diagnosis: &Diagnosis, them: &str) -> String {
         [(worst, [least, ..]), .., (best, [most, ..])] => format!(
             "; adding {them} removes {} % ({}) to {} % ({}) of the squared error, on {on}.",
             percent(*least),
-            said(worst),
+            named(worst),
             percent(*most),
-            said(best)
+            named(best)
         ),
     }
 }
@@ -149,10 +151,17 @@ pub(super) fn bars<'a>(report: &DiagnoseReport<'a>) -> Vec<&'a Bar> {
 fn panel(report: &DiagnoseReport<'_>, bars: &[&Bar], channel: usize, title: String, unit: String) -> FallPanel {
     let of_bar = |(place, bar): (usize, &&Bar)| {
         let first = place == 0;
+        let value = bar.rmse.channels()[channel]?;
+        let before = place.checked_sub(1).and_then(|place| bars[place].rmse.channels()[channel]);
+        let unmoved = before.is_some_and(|before| (value - before).abs() < UNMOVED * before);
         Some(Fall {
             name: if first { "model before".into() } else { bar.name() },
-            kind: if first { Kind::Before } else { Kind::Physics },
-            value: bar.rmse.channels()[channel]?,
+            kind: match (first, unmoved) {
+                (true, _) => Kind::Before,
+                (false, true) => Kind::Unmoved,
+                (false, false) => Kind::Physics,
+            },
+            value,
             ci95: bar.rmse_ci95.channels()[channel],
             remark: String::new(),
         })

@@ -12,6 +12,8 @@ pub enum Kind {
     Before,
     /// The model with more physics.
     Physics,
+    /// The same where the physics that was added changes nothing.
+    Unmoved,
     /// With a network.
     Network,
     /// With a formula that is suggested and was measured, but is in no model.
@@ -26,6 +28,7 @@ impl Kind {
         match self {
             Self::Before => ("f0 thin", 0, Look::Faint, "before, or a yardstick"),
             Self::Physics => ("f1", 1, Look::Bar, "with more physics"),
+            Self::Unmoved => ("f1 thin", 1, Look::Faint, "added, but not in this channel"),
             Self::Network => ("f3", 3, Look::Bar, "with a network"),
             Self::Suggested => ("h2", 2, Look::Hollow, "with the suggested formula, measured"),
             Self::Region => ("f1", 1, Look::Bar, ""),
