@@ -243,7 +243,7 @@ fn determined<T>(found: Result<T>) -> Result<Option<T>> {
 fn bar_of(name: String, region: &Region) -> Fall {
     let remark = format!(" ({:.0} %, {:.0} %)", 100.0 * region.share_of_error, 100.0 * region.share_of_rows);
     let whole = region.split.is_some();
-    let kind = if whole { Kind::Before } else { Kind::Region };
+    let kind = if whole { Kind::Whole } else { Kind::Region };
     Fall { name, kind, value: region.rmse, ci95: region.ci95, remark: if whole { String::new() } else { remark } }
 }
 

@@ -18,8 +18,10 @@ pub enum Kind {
     Network,
     /// With a formula that is suggested and was measured, but is in no model.
     Suggested,
-    /// A region of flight.
+    /// A region of flight, whose name takes a line of its own.
     Region,
+    /// All of the flights, beside regions.
+    Whole,
 }
 
 impl Kind {
@@ -32,6 +34,7 @@ impl Kind {
             Self::Network => ("f3", 3, Look::Bar, "with a network"),
             Self::Suggested => ("h2", 2, Look::Hollow, "with the suggested formula, measured"),
             Self::Region => ("f1", 1, Look::Bar, ""),
+            Self::Whole => ("f0 thin", 0, Look::Faint, ""),
         }
     }
 }
@@ -64,8 +67,9 @@ pub struct FallPanel {
     pub floor: Option<f64>,
 }
 
-/// Characters of a bar's name at most.
+/// Characters of a bar's name at most, beside it and above it.
 const NAME: usize = 24;
+const LONG_NAME: usize = 62;
 
 /// Horizontal bars with their intervals, a panel a channel: how an error falls from step to step (a waterfall) down to its floor, or how it
 /// differs from region to region. Whiskers that reach far beyond all bars are cut where the picture ends.
@@ -93,7 +97,10 @@ pub fn falls(title: &str, caption: &str, panels: &[FallPanel]) -> Figure {
 
 fn fall_panel(panel: &FallPanel, step: f64) -> Panel {
     let longest = |texts: &mut dyn Iterator<Item = usize>| texts.max().unwrap_or(0) as f64;
-    let names = longest(&mut panel.bars.iter().map(|bar| bar.name.chars().count().min(NAME))) * CHARACTER + 8.0;
+    let stacked = panel.bars.iter().any(|bar| bar.kind == Kind::Region);
+    let (step, limit) = if stacked { (2.0 * step - 4.0, LONG_NAME) } else { (step, NAME) };
+    let beside = longest(&mut panel.bars.iter().map(|bar| bar.name.chars().count().min(NAME))) * CHARACTER + 8.0;
+    let names = if stacked { 6.0 } else { beside };
     let text = |bar: &Fall| significant(bar.value, 3) + &bar.remark;
     let numbers = longest(&mut panel.bars.iter().map(|bar| text(bar).chars().count())) * CHARACTER + 10.0;
     let largest = ends(panel.bars.iter().map(|bar| bar.value).chain(panel.floor)).1;
@@ -112,13 +119,17 @@ fn fall_panel(panel: &FallPanel, step: f64) -> Panel {
     body += &area.axes(Ticks { x: 4, y: 0, x_title: "" });
     let mut data = Vec::new();
     for (row, bar) in panel.bars.iter().enumerate() {
-        let (top, middle) = (area.top + step * row as f64, area.top + step * (row as f64 + 0.5));
+        let below = if stacked { 0.45 * step } else { 0.0 };
+        let top = area.top + step * row as f64 + below;
+        let middle = top + 0.5 * (step - below);
         let interval =
             bar.ci95.map_or_else(String::new, |[low, high]| format!(" [{}, {}]", significant(low, 3), significant(high, 3)));
         let says = format!("{}: {}{interval} {}", bar.name, significant(bar.value, 4), panel.unit);
-        body += &words("va", "end", names - 6.0, middle + 4.0, &clipped(&bar.name, NAME));
+        let (anchor, x, y) = if stacked { ("start", names, top) } else { ("end", names - 6.0, middle + 4.0) };
+        body += &words("va", anchor, x, y, &clipped(&bar.name, limit));
         if bar.value.is_finite() {
-            body += &rectangle(bar.kind.look().0, [area.left, top + 3.0, area.at_x(bar.value) - area.left, step - 6.0], &says);
+            body +=
+                &rectangle(bar.kind.look().0, [area.left, top + 3.0, area.at_x(bar.value) - area.left, step - below - 6.0], &says);
             body += &words("va", "start", WIDTH - numbers - RIGHT + 8.0, middle + 4.0, &text(bar));
             data.push(Datum { series: bar.kind.look().3.into(), x: bar.name.clone(), y: bar.value, interval: bar.ci95 });
         }
