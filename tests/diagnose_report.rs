@@ -1,4 +1,4 @@
-//! The page of `diagnose`, as a whole: the verdict first, ten views, the numbers of the JSON, nothing loaded; and the pages of diagnoses
+//! The page of `diagnose`, as a whole: the verdict and its strip first, the numbers of the JSON, nothing loaded; and the pages of diagnoses
 //! that found nothing.
 //!
 //! The page is left in `target/tmp/diagnose.html`, to be looked at.
@@ -12,8 +12,8 @@ use phyture::critique::diagnose::{
 use phyture::critique::shares::Share;
 use phyture::flight::{Column, Flight, Span, Targets};
 use phyture::physics::{Model, catalogue};
-use phyture::report::diagnose::VIEWS;
-use phyture::report::{DiagnoseReport, diagnose_page, page};
+use phyture::report::diagnose::{ENDS, VIEWS};
+use phyture::report::{DiagnoseReport, Page, diagnose_page, page};
 use phyture::{Error, Result};
 
 const EVIL: &str = "</script><script>alert('x')</script>";
@@ -135,18 +135,27 @@ fn models() -> [Model; 2] {
     [before, after]
 }
 
-/// The page's own text: without the embedded figure library, whose licence texts name addresses that are never opened.
 fn html(diagnoses: &[Diagnosis], absent: &[Column], models: [&Model; 2], seconds: usize) -> Result<String> {
     html_of([diagnoses, &[]], absent, models, seconds)
 }
 
 /// The same with the rounds of a loop as one beside them.
-fn html_of(
+fn html_of([diagnoses, together]: [&[Diagnosis]; 2], absent: &[Column], models: [&Model; 2], seconds: usize) -> Result<String> {
+    let html = page(&page_of([diagnoses, together], absent, models, seconds)?);
+    if diagnoses.len() == 1 && diagnoses[0].accepted.len() == 1 || !together.is_empty() {
+        let name = if together.is_empty() { "diagnose.html" } else { "loop.html" };
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        std::fs::write(&path, &html).map_err(Error::io(&path))?;
+    }
+    Ok(html)
+}
+
+fn page_of(
     [diagnoses, together]: [&[Diagnosis]; 2],
     absent: &[Column],
     [before, after]: [&Model; 2],
     seconds: usize,
-) -> Result<String> {
+) -> Result<Page> {
     let [_, truth] = models();
     let flights = ["a", "b", EVIL].iter().enumerate();
     let mut plain = truth.clone();
@@ -158,7 +167,7 @@ fn html_of(
     let span = |flight: usize| Span { flight, start: 0, end: flights[flight].len() };
     let provenance = [("command".to_owned(), "diagnose".to_owned())];
     let (searched, locked) = ([span(0), span(1)], [span(2)]);
-    let report = DiagnoseReport {
+    diagnose_page(&DiagnoseReport {
         title: "Missing physics",
         diagnoses,
         together: together.first(),
@@ -167,17 +176,9 @@ fn html_of(
         locked: &locked,
         before,
         after,
+        compared: None,
         provenance: &provenance,
-    };
-    let html = page(&diagnose_page(&report)?);
-    let Some(start) = html.find("<script type=\"text/javascript\">") else { return Ok(html) };
-    let end = start + html[start..].find("</script>").unwrap_or_default();
-    if diagnoses.len() == 1 && diagnoses[0].accepted.len() == 1 || !together.is_empty() {
-        let name = if together.is_empty() { "diagnose.html" } else { "loop.html" };
-        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        std::fs::write(&path, &html).map_err(Error::io(&path))?;
-    }
-    Ok(format!("{}{}", &html[..start], &html[end..]))
+    })
 }
 
 fn is_self_contained(own: &str) {
@@ -187,14 +188,18 @@ fn is_self_contained(own: &str) {
 }
 
 #[test]
-fn the_page_has_ten_views_after_the_verdict_and_the_numbers_of_the_json() -> Result<()> {
+fn the_verdict_and_the_strip_come_first_and_the_numbers_are_those_of_the_json() -> Result<()> {
     let [before, after] = models();
     let own = html(&[found()], &[], [&before, &after], 100)?;
     is_self_contained(&own);
-    let verdict = own.find("Verdict: effects missing.").ok_or_else(|| Error::Undetermined("no verdict".into()))?;
-    let mut last = verdict;
-    for view in VIEWS {
-        let at = own.find(&format!("<h2>{view}</h2>")).ok_or_else(|| Error::Undetermined(format!("no view {view}")))?;
+    let lead = "The model lacks ground_effect (near the ground); adding it removes 43 % [39, 46] of the squared error of vertical acceleration \
+                (vz_dot), on 40 s of flights that no search has seen.";
+    let verdict = own.find(lead).ok_or_else(|| Error::Undetermined("no verdict".into()))?;
+    let strip = own.find("The error from effect to effect").ok_or_else(|| Error::Undetermined("no strip".into()))?;
+    let mut last = own.find("<section").unwrap_or_default();
+    assert!(verdict < strip && strip < last);
+    for view in ["What was missing"].into_iter().chain(VIEWS).chain(ENDS) {
+        let at = own.find(&format!("<h2>{view}</h2>")).ok_or_else(|| Error::Undetermined(format!("no section {view}")))?;
         assert!(at > last, "{view} is out of order");
         last = at;
     }
@@ -215,12 +220,38 @@ fn the_page_has_ten_views_after_the_verdict_and_the_numbers_of_the_json() -> Res
         "4d1c",
         "model after",
         "&lt;/script&gt;",
+        "usual: 0.6 to 1.3",
     ] {
         assert!(own.contains(text), "the page lacks {text}");
     }
-    // The effect's own curve stands in the residual of its channel.
-    assert!(own.contains("\"name\":\"ground_effect\""));
-    assert!(own.len() < 3_000_000, "{} bytes", own.len());
+    // How the prediction changed runs through the residual of its channel.
+    assert!(own.contains("data-name=\"change of the whole prediction\""));
+    // What was tried and not named is folded.
+    let folded = own.find("Effects that were tried and not named").unwrap_or_default();
+    let opened = own[..folded].rfind("<details>").unwrap_or_default();
+    assert!(opened > 0 && !own[opened..folded].contains("</details>"), "it stands open");
+    assert!(own.len() < 1_500_000, "{} bytes", own.len());
+    Ok(())
+}
+
+/// The curve is the change of the whole prediction: it runs through the points where nothing is left, also where a number that was there moved.
+#[test]
+fn the_drawn_change_is_what_the_residual_lost() -> Result<()> {
+    let [before, after] = models();
+    let page = page_of([&[found()], &[]], &[], [&before, &after], 100)?;
+    let figures = page.figures();
+    let (_, figure) = figures
+        .iter()
+        .find(|(name, _)| name.contains("residual-of-vertical"))
+        .ok_or_else(|| Error::Undetermined("no figure".into()))?;
+    let panel = figure.panels.first().ok_or_else(|| Error::Undetermined("no panel".into()))?;
+    let of = |series: &str| panel.data.iter().filter(|datum| datum.series == series).map(|datum| datum.y).collect::<Vec<_>>();
+    let [points, change, rest] = ["before", "change of the prediction", "after"].map(of);
+    assert!(!points.is_empty() && points.len() == change.len() && rest.len() == points.len());
+    for ((before, change), after) in points.iter().zip(&change).zip(&rest) {
+        assert!((before - change - after).abs() < 1e-9 * (1.0 + before.abs()), "{before} {change} {after}");
+    }
+    assert!(change.iter().any(|change| change.abs() > 0.5));
     Ok(())
 }
 
@@ -230,7 +261,9 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
     for verdict in [Verdict::Explained, Verdict::TooLittleData, Verdict::ConventionFault] {
         let own = html(&[diagnosis(verdict)], &[], [&before, &before], 20)?;
         is_self_contained(&own);
-        assert!(own.contains(&format!("Verdict: {}.", verdict.words())) && !own.contains("model after"));
+        let mut head = verdict.words().to_owned();
+        head[..1].make_ascii_uppercase();
+        assert!(own.contains(&format!("{head}. Said in words")) && !own.contains("model after"));
         assert_eq!(own.contains(VIEWS[0]), verdict != Verdict::ConventionFault);
     }
     let unknown = UnknownChannel {
@@ -253,10 +286,10 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
         [found(), Diagnosis { unknown: Some(vec![unknown]), locked: found().locked, ..diagnosis(Verdict::NotInCatalogue) }];
     let own = html(&rounds, &[], [&before, &before], 20)?;
     for text in [
-        "Round 2: not in the catalogue",
+        "Not in the catalogue. Said in words",
         "formula = &quot;height ^ 2&quot;",
         "height (89 %)",
-        "+ suggested formulas",
+        "+ suggested formula",
         "0.216",
         "falls by 48 % [41, 55]",
     ] {
@@ -311,22 +344,18 @@ fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> 
     };
     let own = html_of([&rounds, std::slice::from_ref(&together)], &[], [&before, &after], 60)?;
     is_self_contained(&own);
-    let list = own.find("Effects found, the largest first").unwrap_or_default();
+    let list = own.find("What was missing").unwrap_or_default();
     let place = |text: &str| own[list..].find(text).ok_or_else(|| Error::Undetermined(format!("no {text}")));
     assert!(list > 0 && place("vz_dot 52 % [48, 56]")? < place("vz_dot 33 % [29, 37]")?);
-    assert!(own[..list].contains("Verdict: effects missing") && !own[..list].contains("Round 2"), "one verdict for all rounds");
-    // The waterfall goes on from round to round and ends with the floor, also as a line: its number is on the bar, in the table and, for
-    // each of four labels, in the line.
-    let waterfall = own.find(&format!("<h2>{}</h2>", VIEWS[7])).unwrap_or_default();
-    for text in ["0.876", "0.654", "0.432", "0.236"] {
-        assert!(own[waterfall..].contains(text), "the waterfall lacks {text}");
+    assert_eq!(own[..list].matches("The model lacks").count(), 1, "one verdict for all rounds");
+    // The strip goes on from round to round, down to the floor.
+    for text in ["0.876", "0.654", "0.432", "floor 0.236"] {
+        assert!(own[..list].contains(text), "the strip lacks {text}");
     }
-    assert!(own.contains("[0.2357,0.2357,0.2357,0.2357]"), "a line at the floor below model, two effects and itself");
     // (0.8764² − 0.4321²) / (0.8764² − 0.2357²)
-    assert!(own[waterfall..].contains("of the removable") && own[waterfall..].contains("81.6"), "share above the floor");
-    assert!(own.contains("The dashed line and the last bar are the floor"));
+    assert!(own[list..].contains("of the removable") && own[list..].contains("81.6"), "share above the floor");
     let plain = html(&rounds, &[], [&before, &after], 20)?;
-    assert!(!plain.contains("floor") && plain.contains("Round 2") && !plain.contains("Effects found"));
+    assert!(!plain.contains(">floor") && plain.contains("Round 2"));
     Ok(())
 }
 
@@ -350,7 +379,7 @@ fn what_unseen_flights_deny_is_no_missing_effect_and_what_fails_there_is_not_sug
         tried: Some(failed),
     }]);
     let own = html(&[denied], &[], [&before, &after], 60)?;
-    for text in ["nothing to add", "vz_dot grows by 8.3 % [4.4, 20]", "does not hold on 40 s of flights", "said why"] {
+    for text in ["Nothing to add", "vz_dot grows by 8.3 % [4.4, 20]", "does not hold on 40 s of flights", "tried and not named"] {
         assert!(own.contains(text), "the page lacks {text}");
     }
     for text in ["effects missing", "the interval holds zero", "To try, in the model file", "suggested_wx_dot"] {
@@ -380,6 +409,7 @@ fn a_page_without_a_diagnosis_or_with_a_span_elsewhere_is_refused() {
             locked,
             before: &before,
             after: &before,
+            compared: None,
             provenance: &[],
         };
         diagnose_page(&report).map(|_| ())

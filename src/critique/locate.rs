@@ -24,11 +24,22 @@ pub struct Stretch {
 pub struct Stretches {
     /// The block with the largest normalised error.
     pub worst: Stretch,
-    /// The block with the median normalised error (the lower median).
+    /// The block with the median normalised error (the lower median), or the block of another flight than the worst's that comes closest to it.
     pub typical: Stretch,
 }
 
-/// Finds the worst and the typical block of ten seconds of one model.
+/// What models predict at every sample of a stretch that they can, so that lines can be drawn.
+#[derive(Clone, Debug)]
+pub struct Traced {
+    /// The stretch.
+    pub stretch: Stretch,
+    /// Its samples, as windows.
+    pub windows: Vec<Window>,
+    /// The predictions there.
+    pub rows: Vec<Row>,
+}
+
+/// Finds the worst and the typical block of ten seconds of one model, of different flights where there are several.
 ///
 /// Blocks with less than half of the windows of the fullest block are passed over, as a short remainder at the end of a
 /// flight says little. `None` without windows, or where no channel varies or no prediction is finite.
@@ -60,8 +71,13 @@ pub fn stretches(flights: &[Flight], windows: &[Window], row: &Row) -> Result<Op
     };
     let mut found: Vec<Stretch> = sums.iter().enumerate().filter_map(stretch).collect();
     found.sort_by(|a, b| a.error.total_cmp(&b.error));
-    let typical = found.get(found.len().saturating_sub(1) / 2).copied();
-    Ok(found.last().copied().zip(typical).map(|(worst, typical)| Stretches { worst, typical }))
+    let Some((worst, median)) = found.last().copied().zip(found.get(found.len().saturating_sub(1) / 2).copied()) else {
+        return Ok(None);
+    };
+    let elsewhere = found.iter().filter(|stretch| stretch.span.flight != worst.span.flight);
+    let apart = |stretch: &Stretch| (stretch.error - median.error).abs();
+    let typical = elsewhere.min_by(|left, right| apart(left).total_cmp(&apart(right))).copied().unwrap_or(median);
+    Ok(Some(Stretches { worst, typical }))
 }
 
 /// A recorded quantity against which residuals are shown.
@@ -246,6 +262,7 @@ mod tests {
         let windows = every_window(&flights);
         let found = stretches(&flights, &windows, &zero(&windows))?;
         assert!(found.is_some_and(|found| found.worst.span == Span { flight: 1, start: 40, end: 60 }));
+        assert!(found.is_some_and(|found| found.typical.span.flight == 0), "typical is another flight's");
         assert!(found.is_some_and(|found| (found.worst.error - 5.0 * found.typical.error).abs() <= CLOSE * found.worst.error));
         assert_eq!(stretches(&flights, &[], &zero(&[]))?, None);
         Ok(())

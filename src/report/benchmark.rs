@@ -10,7 +10,7 @@ use crate::protocol::table::{self, Finished, TableRow};
 use crate::protocol::text::{basis, cell, is_best, row_name};
 use crate::protocol::{Method, Segment};
 
-/// Methods whose lines are shown before any click; the first is in focus.
+/// Methods whose lines are drawn; the first is in focus.
 const SHOWN: [&str; 4] = ["phyture", "phyture_amended", "cnn_lstm", "physical_baseline"];
 
 /// A method's errors on one part of the flights.
@@ -30,7 +30,7 @@ pub fn benchmark_page(finished: &Finished) -> Page {
         sections.push(Section { title: "Error on each segment of the test flights".into(), parts });
     }
     sections.extend(traces(finished));
-    Page { title: format!("Every method on {}", finished.plan.data), summary: basis(finished), sections }
+    Page { title: format!("Every method on {}", finished.plan.data), summary: basis(finished), first: Vec::new(), sections }
 }
 
 /// Place of a method's line: those shown first, in their order.
@@ -79,6 +79,7 @@ fn map(finished: &Finished, title: &str, part: impl Fn(&Segment) -> String) -> M
             detail: String::new(),
             // Errors of the worst rows are many times those of the best: the shade is their logarithm, from 0.1 to 10.
             value: value.map(|value| ((value.max(1e-9).log10() + 1.0) / 2.0).clamp(0.0, 1.0)),
+            before: None,
         };
         (name.clone(), String::new(), errors.iter().map(|(_, error)| cell(error.mean)).collect())
     };
@@ -106,18 +107,12 @@ fn segments_figure(finished: &Finished, part: impl Fn(&Segment) -> String) -> fi
         (0..6).map(values).collect::<Vec<_>>()
     };
     let number: Vec<f64> = (1..=parts.len()).map(|number| number as f64).collect();
-    let mut order = methods;
+    let mut order: Vec<&Method> = methods.into_iter().filter(|method| SHOWN.contains(&method.id)).collect();
     order.sort_by_key(|method| rank(method));
-    let data = |method: &Method| LineData {
-        name: method.name.into(),
-        x: number.clone(),
-        y: line(method.id),
-        hidden: !SHOWN.contains(&method.id),
-        markers: false,
-    };
+    let data = |method: &Method| LineData { name: method.name.into(), x: number.clone(), y: line(method.id) };
     let lines: Vec<LineData> = order.into_iter().map(data).collect();
     let panels: Vec<(String, String)> = channels().collect();
-    let caption = "RMSE of each method on each segment, in the order of the file figure6.csv, mean over seeds. Click a name to show its line.";
+    let caption = "RMSE of each method on each segment, in the order of the file figure6.csv, which has those of all methods; mean over seeds.";
     figures::log_lines("RMSE by test segment", caption, "segment", &panels, &lines)
 }
 
@@ -125,20 +120,18 @@ fn segments_figure(finished: &Finished, part: impl Fn(&Segment) -> String) -> fi
 fn traces(finished: &Finished) -> Option<Section> {
     let traces: Vec<_> = finished.traces().collect();
     let (_, first) = traces.first()?;
-    let mut order: Vec<_> = traces.iter().collect();
+    let mut order: Vec<_> = traces.iter().filter(|(method, _)| SHOWN.contains(&method.id)).collect();
     order.sort_by_key(|(method, _)| rank(method));
-    let measured =
-        LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.to_vec(), hidden: false, markers: false };
+    let measured = LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.to_vec() };
     let predicted = order.into_iter().map(|(method, trace)| LineData {
         name: method.name.into(),
         x: trace.time_s.clone(),
         y: trace.predicted.to_vec(),
-        hidden: !SHOWN.contains(&method.id),
-        markers: false,
     });
     let lines: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
     let panels: Vec<(String, String)> = channels().collect();
-    let caption = "A stretch of the test part; of a network with several seeds, the first. Click a name to show its line.";
+    let caption =
+        "A stretch of the test part; of a network with several seeds, the first. The lines of all methods are in figures7_8.csv.";
     let figure = figures::lines(&format!("Measured and predicted, {}", first.flight), caption, "time, s", &panels, &lines);
     Some(Section { title: "Measured against predicted".into(), parts: vec![Part::Figure(figure)] })
 }

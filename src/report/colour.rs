@@ -1,28 +1,67 @@
-//! Colours that people with a colour vision deficiency tell apart, and line styles to go with them.
+//! Colours that people with a colour vision deficiency tell apart, on light and on dark paper.
 //!
-//! Colour never carries a meaning alone: lines also differ in dash, and cells of a map also hold their number.
+//! Colour never carries a meaning alone: lines also differ in dash and width, bars in outline and name, and cells of a map also hold their number.
 
-use plotly::common::DashType;
+use std::fmt::Write;
 
-/// Colour of what was measured.
-pub const MEASURED: &str = "#000000";
+/// Colours of series of a [`Theme`].
+pub const SERIES: usize = 7;
 
-/// Okabe and Ito's palette without black and yellow (too faint on white): M. Okabe, K. Ito, *Color Universal Design*, 2008.
-pub const LINES: [&str; 6] = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"];
-
-/// The colour of the n-th line; they repeat.
-pub const fn line(index: usize) -> &'static str {
-    LINES[index % LINES.len()]
+/// The colours of a page or picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Theme {
+    /// Background.
+    pub paper: &'static str,
+    /// Words.
+    pub ink: &'static str,
+    /// Words and lines of less weight.
+    pub soft: &'static str,
+    /// Grid, rules, bands.
+    pub rule: &'static str,
+    /// Links and marks.
+    pub link: &'static str,
+    /// What was measured, then lines and bars in their order.
+    pub series: [&'static str; SERIES],
 }
 
-/// The dash of the n-th line; they repeat with another period than the colours.
-pub fn dash(index: usize) -> DashType {
-    match index % 5 {
-        0 => DashType::Solid,
-        1 => DashType::Dash,
-        2 => DashType::DashDot,
-        3 => DashType::Dot,
-        _ => DashType::LongDash,
+impl Theme {
+    /// Okabe and Ito's palette without yellow (too faint on white): M. Okabe, K. Ito, *Color Universal Design*, 2008.
+    pub const LIGHT: Self = Self {
+        paper: "#ffffff",
+        ink: "#1b1b1b",
+        soft: "#595959",
+        rule: "#d9d9d9",
+        link: "#005a8c",
+        series: ["#000000", "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"],
+    };
+    /// The same hues, lighter where the dark ones would drown.
+    pub const DARK: Self = Self {
+        paper: "#16181b",
+        ink: "#ececec",
+        soft: "#a9adb3",
+        rule: "#3a3e44",
+        link: "#7cc0ee",
+        series: ["#ffffff", "#4AA8E0", "#F0803C", "#2CC499", "#DE9CC0", "#9AD4F5", "#F2BC4B"],
+    };
+
+    fn names(&self) -> impl Iterator<Item = (String, &'static str)> {
+        let own = [("paper", self.paper), ("ink", self.ink), ("soft", self.soft), ("rule", self.rule), ("link", self.link)];
+        let series = self.series.into_iter().enumerate().map(|(number, colour)| (format!("s{number}"), colour));
+        own.into_iter().map(|(name, colour)| (name.to_owned(), colour)).chain(series)
+    }
+
+    /// The colours as variables of a style sheet.
+    pub fn variables(&self) -> String {
+        let mut out = String::new();
+        for (name, colour) in self.names() {
+            _ = write!(out, "--{name}:{colour};");
+        }
+        out
+    }
+
+    /// A style sheet with the colours in the place of the variables, for programs that know none.
+    pub fn resolve(&self, style: &str) -> String {
+        self.names().fold(style.to_owned(), |style, (name, colour)| style.replace(&format!("var(--{name})"), colour))
     }
 }
 
@@ -69,6 +108,25 @@ fn luminance(rgb: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn rgb(hex: &str) -> [f64; 3] {
+        let of = u32::from_str_radix(hex.trim_start_matches('#'), 16).unwrap_or(0).to_be_bytes();
+        std::array::from_fn(|channel| f64::from(of[channel + 1]))
+    }
+
+    #[test]
+    fn words_and_lines_stand_out_from_the_paper_in_both_themes() {
+        for theme in [Theme::LIGHT, Theme::DARK] {
+            let contrast = |colour: &str| {
+                let [a, b] = [theme.paper, colour].map(|colour| luminance(rgb(colour)) + 0.05);
+                a.max(b) / a.min(b)
+            };
+            // WCAG 2.1 asks for 4.5 for text, 3 for what pictures need; the last two series are in use for sticks alone, with their names.
+            assert!([theme.ink, theme.soft, theme.link].into_iter().all(|colour| contrast(colour) >= 4.5));
+            assert!(theme.series[..4].iter().all(|colour| contrast(colour) >= 3.0), "{theme:?}");
+            assert!(!theme.resolve("a { fill: var(--s3); color: var(--ink) }").contains("var("));
+        }
+    }
 
     #[test]
     fn shades_run_from_light_to_dark_with_legible_text() {

@@ -1,4 +1,4 @@
-//! Reports: self-contained HTML pages with interactive figures, for people without this program.
+//! Reports: self-contained HTML pages with figures as SVG, for people without this program.
 //!
 //! Numbers come in finished from the critique; nothing is computed here that a table or a JSON file would not also say.
 
@@ -8,6 +8,7 @@ pub mod colour;
 pub mod compare;
 pub mod diagnose;
 pub mod figures;
+mod names;
 pub mod page;
 pub mod rollout;
 

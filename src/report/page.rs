@@ -1,10 +1,11 @@
-//! One self-contained HTML page: text, tables, maps and figures in sections, with style and script inside.
+//! One self-contained HTML page: a verdict with its picture, then text, tables, maps and figures in sections, with style and script inside.
 //!
-//! The page loads nothing: a content security policy forbids it to, so it opens the same without a network. The figure
-//! library is embedded once. What a section says is decided by whoever builds the [`Page`]; what a figure shows, in `figures.rs`.
+//! The page loads nothing: a content security policy forbids it to, so it opens the same without a network. All of it is there without
+//! scripts; where they run, `page.js` adds zoom, a cross-hair that reads values, and sorting. What a section says is decided by whoever builds
+//! the [`Page`]; what a figure shows, in `figures/`.
 
-use super::colour;
-use super::figures::Figure;
+use super::colour::{self, Theme};
+use super::figures::{self, Figure};
 use std::fmt::Write;
 
 /// A page.
@@ -12,8 +13,10 @@ use std::fmt::Write;
 pub struct Page {
     /// Title, also of the browser window.
     pub title: String,
-    /// What the page found, in words; shown first. One entry a paragraph.
+    /// What the page found, in plain words; shown first. The first entry is the verdict, the others say what it rests on; one a paragraph.
     pub summary: Vec<String>,
+    /// What stands beneath the verdict, on the first screen.
+    pub first: Vec<Part>,
     /// The rest, in order.
     pub sections: Vec<Section>,
 }
@@ -36,12 +39,37 @@ pub enum Part {
     Table(Table),
     /// A table of shaded numbers.
     Map(Map),
-    /// An interactive figure.
+    /// A figure.
     Figure(Figure),
     /// Lines to be copied: a formula, a piece of a file.
     Code(String),
-    /// A long text under a line that opens it.
-    Details(String, String),
+    /// More, under a line that opens it.
+    Details(String, Vec<Part>),
+}
+
+impl Part {
+    fn figures(&self) -> Vec<&Figure> {
+        match self {
+            Self::Figure(figure) => vec![figure],
+            Self::Details(_, parts) => parts.iter().flat_map(Self::figures).collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
+impl Page {
+    /// Every figure in order, with a name that no other has: for files.
+    pub fn figures(&self) -> Vec<(String, &Figure)> {
+        let parts = self.first.iter().chain(self.sections.iter().flat_map(|section| &section.parts));
+        let mut known: Vec<(String, &Figure)> = Vec::new();
+        for figure in parts.flat_map(Part::figures) {
+            let slug = figure.slug();
+            let same = known.iter().filter(|(name, _)| name.split_once('_').is_some_and(|(_, name)| name == slug)).count();
+            let again = if same > 0 { format!("-{}", same + 1) } else { String::new() };
+            known.push((format!("{:02}_{slug}{again}", known.len() + 1), figure));
+        }
+        known
+    }
 }
 
 /// A cell of a [`Table`].
@@ -79,6 +107,8 @@ pub struct MapCell {
     pub detail: String,
     /// How dark the cell is, on the scale of the map; unshaded if absent.
     pub value: Option<f64>,
+    /// What it was before: number and shade, which stand beside those of now.
+    pub before: Option<(String, Option<f64>)>,
 }
 
 /// A table of numbers shaded by size. Shade and number may be different quantities: numbers in their units, shade comparable.
@@ -118,55 +148,73 @@ pub const DATA_NOTE: &str = "note on the data";
 /// Every note on the data, folded until it is asked for; nothing where there is none.
 pub fn data_notes(provenance: &[(String, String)]) -> Option<Part> {
     let notes: Vec<&str> = provenance.iter().filter(|(what, _)| what == DATA_NOTE).map(|(_, note)| note.as_str()).collect();
-    (!notes.is_empty()).then(|| Part::Details(format!("Notes on the data ({})", notes.len()), notes.join("\n")))
+    (!notes.is_empty()).then(|| Part::Details(format!("Notes on the data ({})", notes.len()), vec![Part::Code(notes.join("\n"))]))
 }
 
 /// The page as HTML, ready to be written to a file.
 pub fn page(page: &Page) -> String {
-    let mut body = String::new();
-    let mut figures = 0;
-    let mut summary: String = page.summary.iter().map(|text| format!("<p>{}</p>\n", escape(text))).collect();
-    if !summary.is_empty() {
-        summary = format!("<div class=\"summary\">\n{summary}</div>\n");
+    let mut body = Body::default();
+    let mut first = String::new();
+    for (number, text) in page.summary.iter().enumerate() {
+        let class = if number == 0 { " class=\"lead\"" } else { "" };
+        _ = writeln!(first, "<p{class}>{}</p>", escape(text));
     }
+    page.first.iter().for_each(|part| body.part(part));
+    first += &std::mem::take(&mut body.html);
     let mut contents = String::new();
     for (number, section) in page.sections.iter().enumerate() {
         let title = escape(&section.title);
         _ = writeln!(contents, "<li><a href=\"#section-{number}\">{title}</a></li>");
-        _ = writeln!(body, "<section id=\"section-{number}\">\n<h2>{title}</h2>");
-        for part in &section.parts {
-            match part {
-                Part::Text(text) => _ = writeln!(body, "<p>{}</p>", escape(text)),
-                Part::Table(table) => body.push_str(&table_html(table)),
-                Part::Map(map) => body.push_str(&map_html(map)),
-                Part::Code(text) => _ = writeln!(body, "<pre>{}</pre>", escape(text)),
-                Part::Details(line, text) => {
-                    _ = writeln!(body, "<details><summary>{}</summary><pre>{}</pre></details>", escape(line), escape(text));
-                }
-                Part::Figure(figure) => {
-                    body.push_str(&figure_html(figure, figures));
-                    figures += 1;
-                }
-            }
-        }
-        body.push_str("</section>\n");
+        _ = writeln!(body.html, "<section id=\"section-{number}\">\n<h2>{title}</h2>");
+        section.parts.iter().for_each(|part| body.part(part));
+        body.html.push_str("</section>\n");
     }
-    let title = escape(&page.title);
-    let scripts = if figures > 0 { format!("{}\n<script>{DRAW}</script>\n", library()) } else { String::new() };
+    let (title, main) = (escape(&page.title), body.html);
+    let (light, dark) = (Theme::LIGHT.variables(), Theme::DARK.variables());
+    let figure = figures::STYLE;
     format!(
         "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta http-equiv=\"Content-Security-Policy\" content=\"{POLICY}\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>{STYLE}</style>\n\
-         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{summary}<nav aria-label=\"Sections\"><ol>\n{contents}</ol></nav>\n\
-         <noscript><p>The figures need JavaScript; text, tables and maps do not.</p></noscript>\n</header>\n<main>\n{body}</main>\n{scripts}</body>\n</html>\n"
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n<style>\n\
+         :root {{ color-scheme: light dark; {light} }}\n\
+         @media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}\n{figure}{STYLE}</style>\n\
+         </head>\n<body>\n<header>\n<h1>{title}</h1>\n{first}<nav aria-label=\"Sections\"><ol>\n{contents}</ol></nav>\n</header>\n\
+         <main>\n{main}</main>\n<script>{SCRIPT}</script>\n</body>\n</html>\n"
     )
+}
+
+/// What has been written, and how many figures are in it.
+#[derive(Default)]
+struct Body {
+    html: String,
+    figures: usize,
+}
+
+impl Body {
+    fn part(&mut self, part: &Part) {
+        match part {
+            Part::Text(text) => _ = writeln!(self.html, "<p>{}</p>", escape(text)),
+            Part::Table(table) => self.html.push_str(&table_html(table)),
+            Part::Map(map) => self.html.push_str(&map_html(map)),
+            Part::Code(text) => _ = writeln!(self.html, "<pre tabindex=\"0\">{}</pre>", escape(text)),
+            Part::Details(line, parts) => {
+                _ = writeln!(self.html, "<details><summary>{}</summary>", escape(line));
+                parts.iter().for_each(|part| self.part(part));
+                self.html.push_str("</details>\n");
+            }
+            Part::Figure(figure) => {
+                self.html.push_str(&figure.html(&format!("figure-{}", self.figures)));
+                self.figures += 1;
+            }
+        }
+    }
 }
 
 /// Longest text of a cell that stays on one line. A column with a longer one is set as prose: wrapped and to the left.
 const ONE_LINE: usize = 30;
 
 fn table_html(table: &Table) -> String {
-    let mut out = format!("<div class=\"wide\"><table>\n<caption>{}</caption>\n", escape(&table.caption));
+    let mut out = opened("", &table.caption);
     let long = |row: &Vec<Cell>, column: usize| row.get(column).is_some_and(|cell| cell.text.chars().count() > ONE_LINE);
     let prose: Vec<bool> = (0..table.columns.len()).map(|column| table.rows.iter().any(|row| long(row, column))).collect();
     out.push_str(&head_html(&table.columns, &prose));
@@ -198,20 +246,32 @@ fn head_html(columns: &[(String, String)], prose: &[bool]) -> String {
 }
 
 fn map_html(map: &Map) -> String {
-    let values = map.rows.iter().flat_map(|(.., cells)| cells).filter_map(|cell| cell.value).filter(|value| value.is_finite());
-    let largest = values.chain(map.full).fold(0.0, f64::max);
-    let mut out = format!("<div class=\"wide\"><table class=\"map\">\n<caption>{}</caption>\n", escape(&map.caption));
+    let values = map.rows.iter().flat_map(|(.., cells)| cells);
+    let values = values.flat_map(|cell| [cell.value, cell.before.as_ref().and_then(|before| before.1)]).flatten();
+    let largest = values.filter(|value| value.is_finite()).chain(map.full).fold(0.0, f64::max);
+    let mut out = opened(" class=\"map\"", &map.caption);
     out.push_str(&head_html(&map.columns, &[]));
     for (name, detail, cells) in &map.rows {
         _ = write!(out, "<tr><th scope=\"row\">{}<small>{}</small></th>", escape(name), escape(detail));
         for cell in cells {
-            let style = cell.value.filter(|_| largest > 0.0).map(|value| {
-                let (paper, ink) = colour::shade(value / largest);
-                format!(" style=\"background:{paper};color:{ink}\"")
-            });
+            let shade = |value: Option<f64>| value.filter(|_| largest > 0.0).map(|value| colour::shade(value / largest));
+            let style =
+                shade(cell.value).map_or_else(String::new, |(paper, ink)| format!(" style=\"background:{paper};color:{ink}\""));
             let hint = cell.value.map(|value| format!(" title=\"{value:.3}\"")).unwrap_or_default();
             let (text, detail) = (escape(&cell.text), escape(&cell.detail));
-            _ = write!(out, "<td{}{hint}>{text}<small>{detail}</small></td>", style.unwrap_or_default());
+            let Some((before, old)) = &cell.before else {
+                _ = write!(out, "<td{style}{hint}>{text}<small>{detail}</small></td>");
+                continue;
+            };
+            // Two shades in one cell, each as high as the row.
+            let blank = || ("transparent".to_owned(), "inherit");
+            let [(left, left_ink), (right, right_ink)] = [*old, cell.value].map(|value| shade(value).unwrap_or_else(blank));
+            _ = write!(
+                out,
+                "<td class=\"pair\" style=\"background:linear-gradient(to right,{left} 50%,{right} 50%)\" title=\"before {0}, after {text} {detail}\">\
+                 <span style=\"color:{left_ink}\">{0}</span><span style=\"color:{right_ink}\">{text}</span></td>",
+                escape(before)
+            );
         }
         out.push_str("</tr>\n");
     }
@@ -225,83 +285,21 @@ fn map_html(map: &Map) -> String {
     out
 }
 
-fn figure_html(figure: &Figure, number: usize) -> String {
-    // Inside a script element only `<` could end it early; JSON allows to write it as an escape.
-    let data = figure.json().replace('<', "\\u003c");
-    format!(
-        "<figure>\n<figcaption><b>{}</b> {}</figcaption>\n<div class=\"figure\" data-figure=\"figure-{number}\" style=\"height:{}px\"></div>\n\
-         <script type=\"application/json\" id=\"figure-{number}\">{data}</script>\n</figure>\n",
-        escape(&figure.title),
-        escape(&figure.caption),
-        figure.height_px
-    )
+/// A table that scrolls by itself where it is too wide or too long, also by the keyboard.
+fn opened(class: &str, caption: &str) -> String {
+    let (name, line) = match caption {
+        "" => ("table".to_owned(), String::new()),
+        caption => (escape(caption), format!("<caption>{}</caption>\n", escape(caption))),
+    };
+    format!("<div class=\"wide\" role=\"region\" tabindex=\"0\" aria-label=\"{name}\"><table{class}>\n{line}")
 }
 
-/// The figure library as one script element. The crate hands out a formula typesetter after it, which the page does not need.
-fn library() -> String {
-    const END: &str = "</script>";
-    let all = plotly::Plot::offline_js_sources();
-    let end = all.find(END).map_or(all.len(), |at| at + END.len());
-    all[..end].to_owned()
-}
+/// Nothing may be loaded; scripts and styles stand in the page.
+const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'";
 
-/// Nothing may be loaded; scripts and styles stand in the page; figures can be saved as images.
-const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:";
+const SCRIPT: &str = include_str!("page.js");
 
-const DRAW: &str = r#"
-for (const place of document.querySelectorAll("[data-figure]")) {
-  const figure = JSON.parse(document.getElementById(place.dataset.figure).textContent);
-  Plotly.newPlot(place, figure.data, figure.layout, {
-    responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-  });
-}
-for (const event of ["beforeprint", "afterprint"]) {
-  addEventListener(event, () => document.querySelectorAll("[data-figure]").forEach((place) => Plotly.Plots.resize(place)));
-}
-"#;
-
-const STYLE: &str = r#"
-:root { color-scheme: light; font-size: 16px; --ink: #1b1b1b; --soft: #595959; --rule: #d4d4d4; }
-* { box-sizing: border-box; }
-body { margin: 0 auto; padding: 2rem 1.5rem 4rem; max-width: 80rem; background: #fff; color: var(--ink);
-  font: 1rem/1.5 system-ui, -apple-system, "Segoe UI", Roboto, "Noto Sans", "Liberation Sans", sans-serif; }
-h1 { font-size: 1.9rem; line-height: 1.2; margin: 0 0 1rem; }
-h2 { font-size: 1.35rem; margin: 2.8rem 0 .6rem; padding-top: .8rem; border-top: 2px solid var(--ink); }
-p { max-width: 46rem; margin: .6rem 0; }
-.summary { border-left: 4px solid #0072B2; padding: .1rem 0 .1rem 1rem; font-size: 1.08rem; }
-nav ol { display: flex; flex-wrap: wrap; gap: .2rem 1.6rem; padding: 0; margin: 1.2rem 0 0; list-style: none; }
-nav a { color: #005a8c; }
-.wide { overflow-x: auto; margin: 1.2rem 0; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .95rem; }
-caption { text-align: left; font-weight: 600; padding-bottom: .4rem; }
-th, td { padding: .3rem .7rem; text-align: right; vertical-align: top; border-bottom: 1px solid var(--rule); white-space: nowrap; }
-thead th { border-bottom: 2px solid var(--ink); font-weight: 600; }
-th:first-child { text-align: left; }
-tbody th { font-weight: 500; }
-small { display: block; color: var(--soft); font-weight: 400; font-size: .78rem; line-height: 1.25; }
-.star { display: inline-block; width: .6em; text-align: left; font-weight: 700; }
-td.prose, thead th.prose { white-space: normal; text-align: left; min-width: 9.5rem; overflow-wrap: anywhere; }
-pre { background: #f4f4f4; padding: .6rem .9rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
-summary { cursor: pointer; color: #005a8c; }
-.map td { min-width: 6.2rem; border: 2px solid #fff; }
-.map td small { color: inherit; }
-.map tbody th { border-bottom-color: #fff; }
-.ramp { display: flex; flex-wrap: wrap; align-items: center; gap: .5rem; font-size: .88rem; color: var(--soft); max-width: none; }
-.ramp i { width: 12rem; height: .8rem; }
-figure { margin: 1.6rem 0; }
-figcaption { max-width: 46rem; }
-.figure { width: 100%; }
-@page { margin: 14mm 12mm; }
-@media print {
-  :root { font-size: 10.5px; }
-  body { padding: 0; max-width: none; }
-  p, figcaption { max-width: none; }
-  .wide { overflow: visible; break-inside: avoid; }
-  h2, h2 + p, caption, figcaption { break-after: avoid; } tr, figure { break-inside: avoid; }
-  * { print-color-adjust: exact; -webkit-print-color-adjust: exact; }
-  nav, .modebar { display: none !important; }
-}
-"#;
+const STYLE: &str = include_str!("page.css");
 
 #[cfg(test)]
 mod tests {
@@ -312,6 +310,7 @@ mod tests {
         Page {
             title: "A <b> & \"c\"".into(),
             summary: vec!["x < y".into()],
+            first: Vec::new(),
             sections: vec![Section { title: "<i>s</i>".into(), parts }],
         }
     }
@@ -321,7 +320,7 @@ mod tests {
         let evil = "</script><script>alert(1)</script>";
         let table =
             Table { caption: evil.into(), columns: vec![(evil.into(), evil.into())], rows: vec![vec![evil.into(), evil.into()]] };
-        let map_cell = MapCell { text: evil.into(), detail: evil.into(), value: Some(1.0) };
+        let map_cell = MapCell { text: evil.into(), detail: evil.into(), value: Some(1.0), before: Some((evil.into(), None)) };
         let map = Map {
             caption: evil.into(),
             shade: evil.into(),
@@ -329,10 +328,15 @@ mod tests {
             columns: vec![(evil.into(), evil.into())],
             rows: vec![(evil.into(), evil.into(), vec![map_cell])],
         };
-        let html = page(&with(vec![Part::Text(evil.into()), Part::Table(table), Part::Map(map)]));
-        assert!(!html.contains("<script"), "no figure, no script");
+        let html = page(&with(vec![
+            Part::Text(evil.into()),
+            Part::Table(table),
+            Part::Map(map),
+            Part::Details(evil.into(), vec![Part::Code(evil.into())]),
+        ]));
+        assert_eq!(html.matches("<script").count(), 1, "the page's own");
         assert!(html.contains("<title>A &lt;b&gt; &amp; &quot;c&quot;</title>") && html.contains("<h2>&lt;i&gt;s&lt;/i&gt;</h2>"));
-        assert_eq!(html.matches("&lt;/script&gt;&lt;script&gt;alert(1)").count(), 14);
+        assert_eq!(html.matches("&lt;/script&gt;&lt;script&gt;alert(1)").count(), 20);
     }
 
     #[test]

@@ -8,12 +8,11 @@ use crate::critique::table::OWN_FROM_FIRST_HALF;
 
 /// The page of one set of rollouts; `provenance` says where the numbers come from: (what, value).
 pub fn rollout_page(rollouts: &Rollouts, provenance: &[(String, String)]) -> Page {
-    let mut sections = vec![
-        Section { title: "Error over the horizon".into(), parts: vec![Part::Figure(figure(rollouts))] },
-        Section { title: "Errors by step".into(), parts: error_tables(rollouts) },
-    ];
+    let mut sections = vec![Section { title: "Errors by step".into(), parts: error_tables(rollouts) }];
     if rollouts.rows.first().is_some_and(|row| row.by_manoeuvre.len() > 1) {
-        sections.push(Section { title: "By manoeuvre".into(), parts: manoeuvre_tables(rollouts) });
+        let classes = format!("{} classes", rollouts.rows[0].by_manoeuvre.len());
+        let parts = vec![Part::Details(classes, manoeuvre_tables(rollouts))];
+        sections.push(Section { title: "By manoeuvre".into(), parts });
     }
     let rows = provenance.iter().filter(|(what, _)| what != DATA_NOTE);
     let rows = rows.map(|(what, value)| vec![Cell::from(what.clone()), Cell::from(value.clone())]).collect();
@@ -22,7 +21,12 @@ pub fn rollout_page(rollouts: &Rollouts, provenance: &[(String, String)]) -> Pag
     parts.extend(data_notes(provenance));
     sections.push(Section { title: "Where these numbers come from".into(), parts });
     let focus = rollouts.rows.last().map_or("", |row| row.name.as_str());
-    Page { title: format!("Open-loop prediction: {focus}"), summary: summary(rollouts), sections }
+    Page {
+        title: format!("Open-loop prediction: {focus}"),
+        summary: summary(rollouts),
+        first: vec![Part::Figure(figure(rollouts))],
+        sections,
+    }
 }
 
 /// The verdict in words.
@@ -31,6 +35,7 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
     out.extend(rollouts.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
     out.extend(rollouts.position_from_velocity.then(|| POSITION_FROM_VELOCITY.to_owned()));
     out.extend(rollouts.caution());
+    let basis = out.len();
     for row in rollouts.rows.iter().filter(|row| row.name != rollouts.relative_to).skip(1) {
         let says = |quantity: Quantity| {
             let percent = (*row.whole.difference_percent.of(quantity))?;
@@ -46,6 +51,12 @@ fn summary(rollouts: &Rollouts) -> Vec<String> {
         let found: Vec<String> = Quantity::ALL.into_iter().filter_map(says).collect();
         let (name, other) = (&row.name, &rollouts.relative_to);
         out.push(format!("The errors of {name}, summed over the horizon, beside {other}: {}.", found.join(", ")));
+    }
+    // The last row is the one in focus: its errors are the verdict.
+    if out.len() > basis
+        && let Some(verdict) = out.pop()
+    {
+        out.insert(0, verdict);
     }
     for row in rollouts.rows.iter().filter(|row| row.whole.diverged > 0) {
         let (diverged, n) = (row.whole.diverged, row.whole.n);
@@ -63,8 +74,6 @@ fn figure(rollouts: &Rollouts) -> super::Figure {
         name: row.name.clone(),
         x: time.clone(),
         y: Quantity::ALL.map(|quantity| [0.0].iter().chain(row.error.of(quantity)).copied().collect()).into(),
-        hidden: false,
-        markers: false,
     };
     // The yardstick of no change in black, the last row wide.
     let mut order: Vec<&RolloutRow> = rollouts.rows.iter().collect();
@@ -74,8 +83,7 @@ fn figure(rollouts: &Rollouts) -> super::Figure {
         order.insert(1, focus);
     }
     let panels = Quantity::ALL.map(|quantity| (quantity.name().to_owned(), quantity.unit().to_owned()));
-    let caption =
-        "Mean size of the error over all starts. Drag to zoom, double-click to go back; click a name to hide or show its line.";
+    let caption = "Mean size of the error over all starts.";
     let data: Vec<LineData> = order.into_iter().map(line).collect();
     lines("Error over the horizon", caption, "time from the start, s", &panels, &data)
 }

@@ -1,6 +1,7 @@
 //! Models and networks compared on flights that were kept back, beside honest yardsticks. The numbers themselves are made in `critique`.
 
 use crate::critique::diagnose::{Met, met};
+use crate::critique::locate::{Traced, stretches};
 use crate::critique::shares::{self, shares};
 use crate::critique::uncertainty::{Effort, uncertainty};
 use crate::critique::{Comparison, Row, compare, finite_difference, floor, ridge};
@@ -104,6 +105,9 @@ pub struct Judged {
     pub windows: Vec<Window>,
     /// What each row predicts there; the first is the yardstick of finite differences.
     pub rows: Vec<Row>,
+    /// The worst and a typical stretch of the last row, predicted at every sample by all rows: for lines to be drawn. Empty until
+    /// [`Contest::trace`].
+    pub traced: Vec<Traced>,
 }
 
 impl Contest<'_> {
@@ -128,16 +132,7 @@ impl Contest<'_> {
                 }
             )));
         }
-        let mut rows = vec![finite_difference(&set.flights, &windows)?];
-        if let Some(lags) = self.ridge {
-            let training = crate::flight::windows::windows(&split.training, lags, 1);
-            rows.push(ridge(&set.flights, &training, &windows, &LinearConfig { lags, ..LinearConfig::default() })?);
-        }
-        for ((name, _), model) in self.models.iter().zip(models) {
-            let columns = set.flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
-            let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
-            rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
-        }
+        let mut rows = self.without_networks(set, split, models, &windows)?;
         let reference = rows.len() - self.models.len();
         let mut judged = Vec::new();
         let networks = self.networks.iter().zip(of_networks).map(|((name, hybrid), model)| Ok((name, hybrid.on(model.clone())?)));
@@ -161,7 +156,47 @@ impl Contest<'_> {
             let effort = Effort::for_history(hybrid.description().config.history(), self.seed);
             comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, self.threads)?);
         }
-        Ok(Judged { comparison, windows, rows })
+        Ok(Judged { comparison, windows, rows, traced: Vec::new() })
+    }
+
+    /// The rows of all that has no network.
+    fn without_networks(&self, set: &DataSet, split: &Split, models: &[Model], windows: &[Window]) -> Result<Vec<Row>> {
+        let mut rows = vec![finite_difference(&set.flights, windows)?];
+        if let Some(lags) = self.ridge {
+            let training = crate::flight::windows::windows(&split.training, lags, 1);
+            rows.push(ridge(&set.flights, &training, windows, &LinearConfig { lags, ..LinearConfig::default() })?);
+        }
+        for ((name, _), model) in self.models.iter().zip(models) {
+            let columns = set.flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
+            let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
+            rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
+        }
+        Ok(rows)
+    }
+
+    /// Predicts the worst and a typical stretch of the last row at every sample, with all rows.
+    ///
+    /// # Errors
+    /// As [`Contest::run`].
+    pub fn trace(&self, set: &DataSet, split: &Split, judged: &mut Judged) -> Result<()> {
+        let found = judged.rows.last().map(|row| stretches(&set.flights, &judged.windows, row)).transpose()?.flatten();
+        let of_networks = self.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
+        let all: Vec<&Model> = self.models.iter().map(|(_, model)| model).chain(of_networks).collect();
+        let Met { models, judged: spans, .. } = met(&set.flights, &all, &split.test)?;
+        let (models, of_networks) = models.split_at(self.models.len());
+        for stretch in found.into_iter().flat_map(|found| [found.worst, found.typical]) {
+            let inside = |window: &Window| {
+                window.flight == stretch.span.flight && (stretch.span.start..stretch.span.end).contains(&window.last)
+            };
+            let windows: Vec<Window> = windows(&spans, self.history, 1).into_iter().filter(inside).collect();
+            let mut rows = self.without_networks(set, split, models, &windows)?;
+            for ((name, hybrid), model) in self.networks.iter().zip(of_networks) {
+                let predicted = hybrid.on(model.clone())?.stages(&set.flights, &windows, self.threads)?.hybrid;
+                rows.push(Row { name: name.clone(), predicted });
+            }
+            judged.traced.push(Traced { stretch, windows, rows });
+        }
+        Ok(())
     }
 }
 
@@ -175,21 +210,19 @@ impl Judged {
         Ok(())
     }
 
-    /// The page, to be written or put into a larger one.
-    ///
-    /// # Errors
-    /// As [`compare_page`](crate::report::compare_page).
+    /// What a page of it, or a larger one, shows.
     #[cfg(feature = "report")]
-    pub fn page(&self, set: &DataSet, provenance: &[(String, String)]) -> Result<crate::report::Page> {
-        crate::report::compare_page(&crate::report::CompareReport {
+    pub fn report<'a>(&'a self, set: &'a DataSet, provenance: &'a [(String, String)]) -> crate::report::CompareReport<'a> {
+        crate::report::CompareReport {
             comparison: &self.comparison,
             flights: &set.flights,
             windows: &self.windows,
             rows: &self.rows,
             focus: self.rows.len() - 1,
             yardstick: Some(0),
+            traced: &self.traced,
             provenance,
-        })
+        }
     }
 }
 

@@ -8,6 +8,7 @@ mod context;
 mod folder;
 mod notes;
 mod output;
+mod pages;
 mod style;
 
 use clap::Parser;

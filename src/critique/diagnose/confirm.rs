@@ -5,7 +5,7 @@ use super::own::{Halves, Judgement, judged_errors};
 use super::report::{Bar, Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
 use crate::blocks::{BlockMean, BlockSum};
-use crate::critique::channels::PerChannel;
+use crate::critique::channels::{Intervals, PerChannel};
 use crate::critique::shares::Share;
 use crate::error::Result;
 use crate::flight::{Column, Flight, Span};
@@ -62,23 +62,37 @@ pub(super) fn confirm(
         rmse_before: rmse(first),
         rmse_after: rmse(last),
         mse_fall,
-        waterfall: waterfall(rungs, &errors, &rmse),
+        waterfall: waterfall(rungs, &errors, &counts, &rmse),
         floor: None,
         removable_removed: None,
     }))
 }
 
 /// A bar for each model.
-fn waterfall(rungs: &[Rung], errors: &[Errors], rmse: &dyn Fn(&Errors) -> PerChannel) -> Vec<Bar> {
+fn waterfall(rungs: &[Rung], errors: &[Errors], counts: &[usize], rmse: &dyn Fn(&Errors) -> PerChannel) -> Vec<Bar> {
     let pairs: Vec<[&Errors; 2]> = errors.windows(2).map(|pair| [&pair[0], &pair[1]]).collect();
     let differing = |[before, after]: &[&Errors; 2]| (0..6).filter(|&channel| before[channel] != after[channel]).count();
     let comparisons: usize = pairs.iter().map(differing).sum();
-    let bar = |((added, _), own): (&Rung, &Errors)| Bar { added: added.clone(), rmse: rmse(own), rises: BTreeMap::new() };
+    let bar = |((added, _), own): (&Rung, &Errors)| Bar {
+        added: added.clone(),
+        rmse: rmse(own),
+        rmse_ci95: intervals(own, counts),
+        rises: BTreeMap::new(),
+    };
     let mut bars: Vec<Bar> = rungs.iter().zip(errors).map(bar).collect();
     for (bar, pair) in bars.iter_mut().skip(1).zip(pairs) {
         bar.rises = rises(pair, comparisons);
     }
     bars
+}
+
+/// The interval of each root mean square error, from the blocks' sums of squares and their rows.
+fn intervals(errors: &Errors, counts: &[usize]) -> Intervals {
+    let of = |channel: usize| {
+        let blocks = errors[channel].iter().zip(counts);
+        BlockMean::new(blocks.map(|(sum, rows)| BlockSum { samples: *rows as f64, sum: *sum }))?.root_interval()
+    };
+    Intervals::new(std::array::from_fn(of))
 }
 
 /// Channels whose error is larger than before by more than chance, block against block; one of so many comparisons.

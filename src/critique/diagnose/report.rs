@@ -1,6 +1,6 @@
 //! What a diagnosis holds, as data and as JSON. Its sentences are in `sentences`, its layout for a terminal in `text`; no measuring here.
 
-use crate::critique::channels::PerChannel;
+use crate::critique::channels::{Intervals, PerChannel};
 use crate::critique::shares::Share;
 use crate::flight::Span;
 use crate::physics::SignFinding;
@@ -231,6 +231,9 @@ pub struct Bar {
     pub added: Vec<String>,
     /// Root mean square error with them.
     pub rmse: PerChannel,
+    /// Its 95 % interval, from the scatter between blocks; for pictures.
+    #[serde(skip)]
+    pub rmse_ci95: Intervals,
     /// Channels in which the mean squared error rises against the bar before by more than chance: by which share, and its interval; those of all
     /// bars hold together with 95 %.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

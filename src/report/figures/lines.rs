@@ -1,12 +1,10 @@
-//! Lines: measured against predicted over time in panels, and training curves.
+//! Lines over a common horizontal axis: errors by step, spectra, training curves; and measured against predicted over time, with what is left
+//! and the sticks below.
 
-use super::grid::{Grid, axis_name, set_x, set_y};
-use super::{Figure, figure, rounded, thin};
-use crate::report::colour;
-use crate::report::page::escape;
-use plotly::common::{DashType, Line, Marker, MarkerSymbol, Mode, Visible};
-use plotly::layout::{AxisType, HoverMode, SpikeMode, SpikeSnap, TraceOrder};
-use plotly::{Scatter, Traces};
+use super::scale::{Scale, ends};
+use super::svg::{Area, LEFT, RIGHT, Ticks, WIDTH, heading, line, words};
+use super::{Datum, Figure, Key, Look, Panel, series, thin};
+use crate::critique::digits::significant;
 
 /// One line of a [`lines`] figure.
 #[derive(Clone, Debug)]
@@ -15,134 +13,255 @@ pub struct LineData {
     pub name: String,
     /// Horizontal values.
     pub x: Vec<f64>,
-    /// Vertical values of each panel, each as long as `x`.
+    /// Vertical values of each panel, each as long as `x`; what is not finite breaks the line.
     pub y: Vec<Vec<f64>>,
-    /// Whether the line is drawn only once its name in the legend is clicked.
-    pub hidden: bool,
-    /// Whether points are drawn without lines between them: samples that are further apart than a line would make them look.
-    pub markers: bool,
 }
 
-/// Lines in panels with linked horizontal axes and one legend: measured against predicted. The first line is what was measured,
-/// thin and black on top of all; the second, wide, the model in focus. `panels` are (title, unit of the vertical axis).
+/// Lines in panels with one horizontal axis and one legend. The first line is what the others are seen against, in the colour of the words; the
+/// second, wide, the one in focus. `panels` are (title, unit of the vertical axis).
 pub fn lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
-    lines_on(AxisType::Linear, title, caption, x_title, panels, data)
-}
-
-/// Marker of the n-th line: shapes differ, not colours alone.
-fn symbol(number: usize) -> MarkerSymbol {
-    match number % 4 {
-        1 => MarkerSymbol::Circle,
-        2 => MarkerSymbol::Cross,
-        3 => MarkerSymbol::DiamondOpen,
-        _ => MarkerSymbol::SquareOpen,
-    }
-}
-
-fn colour_of(number: usize) -> &'static str {
-    if number == 0 { colour::MEASURED } else { colour::line(number - 1) }
+    lines_on(false, title, caption, x_title, panels, data)
 }
 
 /// As [`lines`], on logarithmic vertical axes.
 pub fn log_lines(title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
-    lines_on(AxisType::Log, title, caption, x_title, panels, data)
+    lines_on(true, title, caption, x_title, panels, data)
 }
 
-fn lines_on(
-    vertical: AxisType,
-    title: &str,
-    caption: &str,
-    x_title: &str,
-    panels: &[(String, String)],
-    data: &[LineData],
-) -> Figure {
-    let grid = Grid::new(panels.len(), 2, 150, 34).by_column();
-    let mut traces = Traces::new();
-    // Drawn in this order: other models, the first model, and on top what was measured.
-    for (number, line) in data.iter().enumerate().rev() {
-        for (panel, y) in line.y.iter().enumerate().take(grid.panels) {
-            let (x, y) = thin(&line.x, y);
-            let style = match number {
-                0 => Line::new().color(colour::MEASURED).width(1.2),
-                1 => Line::new().color(colour::line(0)).width(3.0),
-                n => Line::new().color(colour::line(n - 1)).dash(colour::dash(n - 1)).width(1.6),
-            };
-            let shown = if line.hidden { Visible::LegendOnly } else { Visible::True };
-            let trace = Scatter::new(rounded(&x), rounded(&y))
-                .mode(if line.markers { Mode::Markers } else { Mode::Lines })
-                .marker(Marker::new().size(if number == 1 { 6 } else { 4 }).symbol(symbol(number)).color(colour_of(number)))
-                .name(escape(&line.name))
-                .legend_group(number.to_string())
-                .show_legend(panel == 0)
-                .visible(shown)
-                .line(style);
-            traces.push(trace.x_axis(axis_name('x', grid.column(panel))).y_axis(axis_name('y', panel)));
+fn lines_on(log: bool, title: &str, caption: &str, x_title: &str, panels: &[(String, String)], data: &[LineData]) -> Figure {
+    let (low, high) = ends(data.iter().flat_map(|line| line.x.iter().copied()));
+    let x = Scale::linear(low, high);
+    let draw = |(number, (title, unit)): (usize, &(String, String))| {
+        let of = |line: &LineData| line.y.get(number).map_or_else(Vec::new, |y| thin(&line.x, y));
+        let drawn: Vec<Vec<(f64, f64)>> = data.iter().map(of).collect();
+        let values = || drawn.iter().flatten().map(|(_, y)| *y);
+        let y = if log { Scale::decades(values()) } else { Scale::around(values()) };
+        let area = Area { left: LEFT, top: 24.0, width: WIDTH - LEFT - RIGHT, height: 150.0, x, y };
+        let content: Vec<String> = data
+            .iter()
+            .zip(&drawn)
+            .enumerate()
+            .map(|(number, (line, points))| area.path(&class(number), &line.name, points.iter().copied()))
+            .collect();
+        // What the others are seen against lies on top.
+        let content: String = content.into_iter().rev().collect();
+        let body = heading(title, unit)
+            + &area.axes(Ticks { x: 6, y: 4, x_title })
+            + &area.data(&content)
+            + &cross(area.top, area.bottom());
+        Panel { title: title.clone(), says: says(data, &drawn, unit), height: 210.0, body, data: numbers(data, &drawn) }
+    };
+    Figure {
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        panels: panels.iter().enumerate().map(draw).collect(),
+        keys: keys(data.iter().map(|line| line.name.as_str())),
+        linked: true,
+    }
+}
+
+/// The class of the n-th line: lines differ in more than colour.
+fn class(number: usize) -> String {
+    let dash = match number {
+        0 => " fine",
+        1 => " wide",
+        n if n % 2 == 0 => " dash",
+        _ => " dots",
+    };
+    format!("s{}{dash}", series(number))
+}
+
+fn keys<'a>(names: impl Iterator<Item = &'a str>) -> Vec<Key> {
+    let look = |number: usize| if number < 2 { Look::Line } else { Look::Dashed };
+    names.enumerate().map(|(number, name)| Key { name: name.into(), series: series(number), look: look(number) }).collect()
+}
+
+/// Where the script puts the cross-hair.
+fn cross(top: f64, bottom: f64) -> String {
+    format!("<path class=\"cross\" data-from=\"{top:.0}\" data-to=\"{bottom:.0}\" d=\"\"/>\n")
+}
+
+/// The range of each line in words.
+fn says(data: &[LineData], drawn: &[Vec<(f64, f64)>], unit: &str) -> String {
+    let one = |(line, points): (&LineData, &Vec<(f64, f64)>)| {
+        let (low, high) = ends(points.iter().map(|(_, y)| *y));
+        (low <= high).then(|| format!("{} from {} to {} {unit}", line.name, significant(low, 2), significant(high, 2)))
+    };
+    let said: Vec<String> = data.iter().zip(drawn).filter_map(one).collect();
+    if said.is_empty() { "Nothing to draw.".into() } else { format!("Lines: {}.", said.join("; ")) }
+}
+
+fn numbers(data: &[LineData], drawn: &[Vec<(f64, f64)>]) -> Vec<Datum> {
+    let of = |(line, points): (&LineData, &Vec<(f64, f64)>)| {
+        let finite = points.iter().filter(|(x, y)| x.is_finite() && y.is_finite());
+        finite.map(|(x, y)| Datum { series: line.name.clone(), x: x.to_string(), y: *y, interval: None }).collect::<Vec<_>>()
+    };
+    data.iter().zip(drawn).flat_map(of).collect()
+}
+
+/// Measured and predicted over one stretch of a flight.
+#[derive(Clone, Debug)]
+pub struct Trace {
+    /// Time of the measurements, s.
+    pub time_s: Vec<f64>,
+    /// What was measured, a panel each.
+    pub measured: Vec<Vec<f64>>,
+    /// Time of the predictions, s; every sample, or only some.
+    pub predicted_s: Vec<f64>,
+    /// Whether predictions are further apart than the samples, and so are drawn as dots.
+    pub sparse: bool,
+    /// Name of each model and what it predicts, a panel each.
+    pub models: Vec<(String, Vec<Vec<f64>>)>,
+    /// Measured − predicted of each model at the times of the predictions, a panel each; of as many models as are to be seen.
+    pub residuals: Vec<Vec<Vec<f64>>>,
+    /// Name and course of each stick at the times of the measurements; none where none was recorded.
+    pub sticks: Vec<(String, Vec<f64>)>,
+}
+
+/// Measured against predicted in panels of channels; under each what is left, and the sticks, which are the same in all. The first model is in
+/// focus. `panels` are (title, unit).
+pub fn traces(title: &str, caption: &str, panels: &[(String, String)], trace: &Trace) -> Figure {
+    let (low, high) = ends(trace.time_s.iter().copied());
+    let x = Scale::linear(low, high);
+    let draw = |(number, (title, unit)): (usize, &(String, String))| trace_panel(number, title, unit, trace, x);
+    let mut names = vec!["measured"];
+    names.extend(trace.models.iter().map(|(name, _)| name.as_str()));
+    Figure {
+        title: title.to_owned(),
+        caption: caption.to_owned(),
+        panels: panels.iter().enumerate().map(draw).collect(),
+        keys: keys(names.into_iter()),
+        linked: true,
+    }
+}
+
+fn trace_panel(number: usize, title: &str, unit: &str, trace: &Trace, x: Scale) -> Panel {
+    let empty = Vec::new();
+    let measured = trace.measured.get(number).unwrap_or(&empty);
+    let models: Vec<(&String, &Vec<f64>)> = trace.models.iter().filter_map(|(name, y)| Some((name, y.get(number)?))).collect();
+    let predicted = models.iter().flat_map(|(_, y)| y.iter().copied());
+    let area = |top: f64, height: f64, y: Scale| Area { left: LEFT, top, width: WIDTH - LEFT - RIGHT, height, x, y };
+    let above = area(24.0, 130.0, Scale::around(measured.iter().copied().chain(predicted)));
+    let points = |y: &[f64]| trace.predicted_s.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
+    let mut data = Vec::new();
+    let mut draw = |area: &Area, class: &str, name: &str, series: &str, points: Vec<(f64, f64)>, dots: bool| {
+        let finite = points.iter().filter(|(_, y)| y.is_finite());
+        data.extend(finite.map(|(x, y)| Datum { series: series.into(), x: x.to_string(), y: *y, interval: None }));
+        if dots { area.dots(class, name, points.into_iter()) } else { area.path(class, name, points.into_iter()) }
+    };
+    let mut content = Vec::new();
+    content.push(draw(&above, "s0 fine", "measured", "measured", thin(&trace.time_s, measured), false));
+    for (place, (name, y)) in models.iter().enumerate() {
+        content.push(draw(&above, &class(place + 1), name, name, points(y), trace.sparse));
+    }
+    let content: String = content.into_iter().rev().collect();
+    let mut body = heading(title, unit) + &above.axes(Ticks { x: 0, y: 5, x_title: "" }) + &above.data(&content);
+    let residuals: Vec<&Vec<f64>> = trace.residuals.iter().filter_map(|of| of.get(number)).collect();
+    let largest = ends(residuals.iter().flat_map(|of| of.iter().map(|value| value.abs()))).1.max(f64::MIN_POSITIVE);
+    let below = area(172.0, 44.0, Scale::linear(-1.05 * largest, 1.05 * largest));
+    let mut rest = String::new();
+    for (place, y) in residuals.iter().enumerate().rev() {
+        let name = models.get(place).map_or("", |(name, _)| name.as_str());
+        rest +=
+            &draw(&below, &class(place + 1), &format!("left of {name}"), &format!("measured − {name}"), points(y), trace.sparse);
+    }
+    body += &words("tk", "start", LEFT + 3.0, 169.0, "measured − predicted");
+    body += &(below.axes(Ticks { x: 0, y: 3, x_title: "" }) + &below.data(&rest));
+    let sticks = area(234.0, 34.0, Scale::around(trace.sticks.iter().flat_map(|(_, y)| y.iter().copied()).chain([0.0])));
+    let mut moved = String::new();
+    for (place, (name, y)) in trace.sticks.iter().enumerate() {
+        moved += &draw(&sticks, &format!("s{} fine", 3 + place), name, name, thin(&trace.time_s, y), false);
+    }
+    if !moved.is_empty() {
+        let mut at = LEFT + 3.0;
+        body += &words("tk", "start", at, 231.0, "sticks");
+        at += 38.0;
+        for (place, (name, _)) in trace.sticks.iter().enumerate() {
+            body += &line(&format!("l s{}", 3 + place), [at, 227.0], [at + 12.0, 227.0]);
+            body += &words("tk", "start", at + 15.0, 231.0, name);
+            at += 22.0 + 7.0 * name.chars().count() as f64;
         }
     }
-    let layout = grid.layout().legend(grid.legend().trace_order(TraceOrder::Reversed));
-    let mut layout = layout.hover_mode(HoverMode::XUnified).annotations(grid.titles(panels.iter().map(|(title, _)| title)));
-    for (panel, (_, unit)) in panels.iter().enumerate().take(grid.panels) {
-        let y = grid.y(panel).title(escape(unit)).anchor(axis_name('x', grid.column(panel)));
-        layout = set_y(layout, panel, if matches!(vertical, AxisType::Log) { y.type_(AxisType::Log).n_ticks(5) } else { y });
+    let last = if moved.is_empty() { below } else { sticks };
+    if !moved.is_empty() {
+        body += &sticks.data(&moved);
     }
-    for panel in (0..grid.panels).filter(|panel| grid.is_lowest(*panel)) {
-        let column = grid.column(panel);
-        let x = grid.x(column).anchor(axis_name('y', panel)).title(escape(x_title)).show_spikes(true).spike_mode(SpikeMode::Across);
-        let x = x.spike_snap(SpikeSnap::Cursor).spike_thickness(1).spike_color("#595959").spike_dash(DashType::Dot);
-        layout = set_x(layout, column, if column > 0 { x.matches("x") } else { x });
-    }
-    figure(title, caption, traces, layout, grid.height_px())
-}
-
-/// Loss against epoch on a logarithmic axis. `curves` are (name, one value an epoch, counted from 1).
-pub fn training(title: &str, caption: &str, curves: &[(String, Vec<f64>)]) -> Figure {
-    let mut traces = Traces::new();
-    for (number, (name, loss)) in curves.iter().enumerate() {
-        let epoch: Vec<f64> = (1..=loss.len()).map(|epoch| epoch as f64).collect();
-        let (x, y) = thin(&epoch, loss);
-        let style = Line::new().color(colour::line(number)).dash(colour::dash(number)).width(2.0);
-        traces.push(Scatter::new(rounded(&x), rounded(&y)).mode(Mode::Lines).name(escape(name)).line(style));
-    }
-    let grid = Grid::new(1, 1, 220, 0);
-    let layout = grid.layout().hover_mode(HoverMode::XUnified);
-    let layout = set_x(layout, 0, grid.x(0).title("epoch"));
-    // Labels at whole decades once there are some: those between would stand on top of each other.
-    let loss = curves.iter().flat_map(|(_, loss)| loss).filter(|loss| **loss > 0.0);
-    let (low, high) = loss.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(*value), high.max(*value)));
-    let y = grid.y(0).type_(AxisType::Log).title("loss");
-    let layout = set_y(layout, 0, if high > 10.0 * low { y.dtick(1.0) } else { y.n_ticks(6) });
-    figure(title, caption, traces, layout, grid.height_px())
+    body += &last.axes(Ticks { x: 6, y: 2, x_title: "time, s" });
+    body += &cross(above.top, last.bottom());
+    let left: Vec<String> = residuals
+        .iter()
+        .zip(&models)
+        .map(|(of, (name, _))| {
+            let (low, high) = ends(of.iter().copied());
+            format!("{name} is off by {} to {} {unit}", significant(low, 2), significant(high, 2))
+        })
+        .collect();
+    let says =
+        format!("Measured acceleration over time with the predictions, what is left below, and the sticks. {}.", left.join("; "));
+    Panel { title: title.to_owned(), says, height: last.bottom() + 36.0, body, data }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{json, panels};
+    use super::super::tests::panels;
     use super::*;
 
-    #[test]
-    fn lines_share_their_horizontal_axes() {
-        let x: Vec<f64> = (0..50).map(f64::from).collect();
-        let data = ["measured", "<model>"].map(|name| LineData {
-            name: name.into(),
-            x: x.clone(),
-            y: vec![x.clone(); 6],
-            hidden: name != "measured",
-            markers: name != "measured",
-        });
-        let found = json(&lines("t", "c", "time, s", &panels(6), &data));
-        assert_eq!(found["data"].as_array().map(Vec::len), Some(12));
-        assert_eq!((&found["data"][6]["line"]["color"], &found["data"][0]["name"]), (&"#000000".into(), &"&lt;model&gt;".into()));
-        assert_eq!(found["layout"]["xaxis2"]["matches"], "x");
-        assert_eq!((&found["data"][5]["xaxis"], &found["data"][5]["yaxis"]), (&"x2".into(), &"y6".into()));
-        assert!(found["layout"]["yaxis6"]["title"]["text"] == "m/s²" && found["layout"]["xaxis"]["title"]["text"] == "time, s");
-        assert_eq!((&found["data"][0]["visible"], &found["data"][6]["visible"]), (&"legendonly".into(), &true.into()));
-        assert_eq!((&found["data"][0]["mode"], &found["data"][6]["mode"]), (&"markers".into(), &"lines".into()));
-        assert_ne!(found["data"][0]["line"]["width"], found["data"][6]["line"]["width"], "lines differ by more than colour");
+    fn points_of(path: &str) -> usize {
+        path.split(" d=\"M").nth(1).map_or(0, |d| {
+            let d = d.split('"').next().unwrap_or_default();
+            let numbers = d
+                .split(['M', 'l'])
+                .flat_map(|part| part.split(' '))
+                .flat_map(|part| part.split_inclusive(|c: char| c.is_ascii_digit()));
+            numbers.count();
+            // Numbers are parted by blanks, signs and commands; two make a point.
+            let mut count = 0;
+            let mut inside = false;
+            for character in d.chars() {
+                match character {
+                    '0'..='9' if !inside => (count, inside) = (count + 1, true),
+                    '0'..='9' => {}
+                    _ => inside = false,
+                }
+            }
+            count / 2
+        })
     }
 
     #[test]
-    fn training_curves_are_logarithmic() {
-        let found = json(&training("t", "c", &[("training".into(), vec![1.0, 0.5]), ("validation".into(), vec![1.5, 0.7])]));
-        assert_eq!((&found["layout"]["yaxis"]["type"], &found["data"][1]["y"][1]), (&"log".into(), &0.7.into()));
+    fn every_sample_is_drawn_and_said_in_the_numbers() {
+        let time: Vec<f64> = (0..1000).map(|sample| 0.01 * f64::from(sample)).collect();
+        let wave: Vec<f64> = time.iter().map(|t| (3.0 * t).sin()).collect();
+        let model = ("model".to_owned(), vec![wave.iter().map(|y| 0.9 * y).collect::<Vec<_>>()]);
+        let trace = Trace {
+            time_s: time.clone(),
+            measured: vec![wave.clone()],
+            predicted_s: time.clone(),
+            sparse: false,
+            models: vec![model],
+            residuals: vec![vec![wave.iter().map(|y| 0.1 * y).collect()]],
+            sticks: vec![("u1".into(), wave.clone())],
+        };
+        let figure = traces("t", "c", &panels(1), &trace);
+        let panel = &figure.panels[0];
+        let paths: Vec<&str> = panel.body.split("<path class=\"l ").filter(|part| part.contains("data-name")).collect();
+        assert_eq!(paths.len(), 4, "measured, model, what is left, one stick");
+        assert!(
+            paths.iter().all(|path| points_of(path) == 1000),
+            "{:?}",
+            paths.iter().map(|path| points_of(path)).collect::<Vec<_>>()
+        );
+        assert_eq!(panel.data.len(), 4000);
+        assert!(panel.data.iter().any(|datum| datum.series == "measured − model" && (datum.y - 0.1 * wave[500]).abs() < 1e-12));
+        let dots = traces("t", "c", &panels(1), &Trace { sparse: true, ..trace });
+        assert!(dots.panels[0].body.contains("class=\"l dot s1 wide\""), "predictions far apart are no line");
+    }
+
+    #[test]
+    fn a_logarithmic_figure_says_so_and_zero_lies_at_its_end() {
+        let line = |name: &str, y: Vec<f64>| LineData { name: name.into(), x: vec![1.0, 2.0, 3.0], y: vec![y] };
+        let figure = log_lines("t", "c", "f", &panels(1), &[line("a", vec![1.0, 0.1, 0.01]), line("b", vec![1.0, 0.0, 10.0])]);
+        assert!(figure.panels[0].body.contains("data-log=\"1\""));
+        assert_eq!(figure.panels[0].data.len(), 6);
     }
 }

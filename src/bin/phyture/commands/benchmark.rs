@@ -1,9 +1,9 @@
 //! `benchmark`: the runs of the paper's tables, and the tables of finished runs.
 
-use super::compare::write_page;
 use crate::arguments::{Data, count};
 use crate::context::{Context, data_sha256, interruption};
 use crate::output::Progress;
+use crate::pages::write_page;
 use phyture::disk::{Existing, Target};
 use phyture::flight::DataSet;
 use phyture::flight::split::{Split, class_folds};

@@ -4,16 +4,16 @@ use super::explainable;
 use super::predict::read_network;
 use crate::arguments::{Data, Division, STRIDES, count};
 use crate::context::Context;
+use crate::pages::Pages;
 use phyture::critique::table::ordinal;
 use phyture::critique::wrap::wrapped;
-use phyture::disk::{Target, write_atomically};
 use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::windows;
 use phyture::flight::{DataSet, Flight, Span, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
-use phyture::report::{Page, page};
+use phyture::report::compare_page;
 use phyture::workflow::{Contest, affordable_stride, provenance};
 use phyture::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -34,9 +34,9 @@ pub struct Args {
     /// Trained network: a run folder; repeatable
     #[arg(short, long)]
     pub network: Vec<PathBuf>,
-    /// Folder for the page comparison.html
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
+    /// The page comparison.html.
+    #[command(flatten)]
+    pub pages: Pages,
     /// Samples between evaluated windows [default: 1, or what lets the networks take about a minute]
     #[arg(long, allow_negative_numbers = true, value_parser = count(STRIDES))]
     pub stride: Option<usize>,
@@ -60,7 +60,7 @@ pub struct Args {
 /// Compares on the test part (locked flights where there are any) and prints; writes the page if asked to.
 pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let Args { data, division, explainable: truth, .. } = wanted;
-    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, "comparison.html")).transpose()?;
+    let page = wanted.pages.open(context, "comparison.html")?;
     truth.as_deref().map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let networks = wanted.network.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
     let models = wanted.model.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
@@ -98,12 +98,12 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
         result.set_floor(&set, &explainable::read(data, folder)?)?;
     }
     context.say(format!("\n{}", result.comparison));
-    if let Some(target) = page {
+    if let Some(page) = page {
+        contest.trace(&set, &split, &mut result)?;
         let names: Vec<&str> =
             models.iter().map(|(name, _)| name).chain(networks.iter().map(|(name, _)| name)).map(String::as_str).collect();
         let provenance = provenance("compare", &data.data, &set, &names, context.seed());
-        write_page(&result.page(&set, &provenance)?, &target)?;
-        context.say(format!("report: {}", target.path().display()));
+        page.write(context, &compare_page(&result.report(&set, &provenance))?)?;
     }
     context.json(&result.comparison)?;
     Ok(ExitCode::SUCCESS)
@@ -144,10 +144,4 @@ pub fn tested(set: &DataSet, split: Result<Split>, all: bool) -> Result<Split> {
 /// What a row of a file or folder is called.
 pub fn name(path: &Path) -> String {
     path.file_stem().map_or_else(|| path.display().to_string(), |stem| stem.to_string_lossy().into_owned())
-}
-
-/// Writes a page.
-pub fn write_page(content: &Page, target: &Target) -> Result<()> {
-    let html = page(content);
-    write_atomically(target.path(), |file| file.write_all(html.as_bytes()))
 }

@@ -4,11 +4,11 @@
 //! locked away; the paper's baseline calibrated on the rest; what is missing found, added, calibrated; the residual network trained on
 //! the baseline and on the amended model; everything judged on the locked flights.
 
-use super::compare::write_page;
 use super::diagnose;
 use super::train::{Told, digest};
 use super::{CHECK_FAILED, calibrate, simulate::starting_model};
 use crate::context::{Context, interruption};
+use crate::pages::Figures;
 use phyture::Result;
 use phyture::critique::Comparison;
 use phyture::critique::check::check;
@@ -85,6 +85,9 @@ pub struct Args {
     /// A smaller data set and a shorter training
     #[arg(long)]
     pub quick: bool,
+    /// Figures.
+    #[command(flatten)]
+    pub figures: Figures,
 }
 
 /// The flights of the truth, what a model could explain of them, and what they hide, in words.
@@ -139,11 +142,13 @@ fn trained(context: &Context, settings: &Settings, model: &Model, name: &str, in
 }
 
 /// Tells the story and writes data, models, network and page into `out`.
-pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
+pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
     let interrupted = interruption()?;
     let folder = context.new_folder(out)?;
-    let page = context.new_page(out, "report.html")?;
+    let target = context.new_page(out, "report.html")?;
+    let report_path = target.path().to_path_buf();
+    let outlet = figures.beside(context, target)?;
     let Scale { minutes, config } = Scale::new(*quick, context.seed());
 
     let Flown { set, explainable, hidden } = fly(context, out, minutes)?;
@@ -193,6 +198,7 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
     };
     let mut judged = contest.run(&set, &split)?;
     judged.set_floor(&set, &explainable.flights)?;
+    contest.trace(&set, &split, &mut judged)?;
     context.say(format!("\n{}", judged.comparison));
     let provenance = [
         ("data".to_owned(), format!("built-in truth helicopter, seed {}, {minutes} min; hidden: {hidden}", context.seed())),
@@ -208,17 +214,13 @@ pub fn run(context: &Context, Args { out, quick }: &Args) -> Result<ExitCode> {
         locked: &split.test,
         before: &model,
         after: &amended,
+        compared: Some(&judged.report(&set, &[])),
         provenance: &provenance,
     };
-    // One page: what was missing, then the network, then where everything stands.
-    let mut whole = diagnose_page(&told)?;
-    let compared = judged.page(&set, &provenance)?;
-    whole.summary.extend(compared.summary);
-    whole.sections.extend(compared.sections);
-    write_page(&whole, &page)?;
+    outlet.write(context, &diagnose_page(&told)?)?;
     folder.close()?;
-    let (report, seconds) = (page.path().to_path_buf(), begun.elapsed().as_secs_f64());
-    context.say(format!("report: {}   ({seconds:.0} s)", report.display()));
+    let (report, seconds) = (report_path, begun.elapsed().as_secs_f64());
+    context.say(format!("done in {seconds:.0} s"));
     context.json(&Output { rounds, together, comparison: judged.comparison, report, seconds })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,15 +1,14 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
-use super::compare::write_page;
 use super::predict::read_network;
 use super::{CHECK_FAILED, explainable};
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, data_sha256};
+use crate::pages::{Outlet, Pages};
 use phyture::Result;
 use phyture::critique::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, LoopText, Options, calibrated, searched};
 use phyture::critique::wrap::wrapped;
-use phyture::disk::Target;
 use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
@@ -20,9 +19,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// The page of a diagnosis: where it goes, and what stands in it besides.
-struct DiagnosisPage<'a> {
+struct DiagnosisPage {
     title: String,
-    target: &'a Target,
+    outlet: Outlet,
     command: &'static str,
     model: String,
     seed: u64,
@@ -33,12 +32,12 @@ struct DiagnosisPage<'a> {
 /// Its name, for `diagnose` and `loop`.
 const PAGE: &str = "diagnosis.html";
 
-impl<'a> DiagnosisPage<'a> {
-    fn new(context: &Context, command: &'static str, data: &Data, model: &Model, target: &'a Target) -> Self {
+impl DiagnosisPage {
+    fn new(context: &Context, command: &'static str, data: &Data, model: &Model, outlet: Outlet) -> Self {
         let name = data.data.file_name().unwrap_or(data.data.as_os_str()).to_string_lossy();
         Self {
             title: format!("Which physics is missing: {} on {name}", model.name),
-            target,
+            outlet,
             provenance: Vec::new(),
             command,
             seed: context.seed(),
@@ -53,7 +52,7 @@ impl<'a> DiagnosisPage<'a> {
 
     /// Writes the page: of one diagnosis, or of the rounds of a loop and those together.
     fn write(
-        &self,
+        self,
         context: &Context,
         [diagnoses, together]: [&[Diagnosis]; 2],
         flights: &[Flight],
@@ -71,11 +70,10 @@ impl<'a> DiagnosisPage<'a> {
             locked: &split.test,
             before,
             after,
+            compared: None,
             provenance: &self.provenance,
         };
-        write_page(&diagnose_page(&report)?, self.target)?;
-        context.say(format!("report: {}", self.target.path().display()));
-        Ok(())
+        self.outlet.write(context, &diagnose_page(&report)?)
     }
 }
 
@@ -85,7 +83,7 @@ fn prepare(
     data: &Data,
     model: &Model,
     division: &Division,
-    page: &mut Option<DiagnosisPage<'_>>,
+    page: &mut Option<DiagnosisPage>,
 ) -> Result<Option<(DataSet, Split, String)>> {
     let set = context.flights(data, 1)?;
     page.iter_mut().for_each(|page| page.note(data, &set));
@@ -95,7 +93,7 @@ fn prepare(
         // The notes on the data have been said, and folded.
         context.say(format!("\n{}", check::CheckReport { notes: Vec::new(), ..report.clone() }));
         let diagnosis = convention_fault(&report, sha);
-        if let Some(page) = &page {
+        if let Some(page) = page.take() {
             let split = Split { training: Vec::new(), validation: Vec::new(), test: Vec::new(), tested: Part::Test };
             page.write(context, [std::slice::from_ref(&diagnosis), &[]], &set.flights, &split, [model, model])?;
         }
@@ -128,9 +126,9 @@ pub struct Args {
     /// Search what a trained network learned (a run folder), in place of the measured accelerations; the run's model unless one is given
     #[arg(long, value_name = "RUN")]
     pub of_network: Option<PathBuf>,
-    /// Folder for the page diagnosis.html
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
+    /// The page diagnosis.html.
+    #[command(flatten)]
+    pub pages: Pages,
     /// Stop after so many effects, one found after the other; without it, where much is missing, all effects that apply are fitted at once
     /// and the needless left out
     #[arg(long, allow_negative_numbers = true, value_parser = count(1..=MOST_EFFECTS))]
@@ -159,8 +157,8 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
         (_, model) => context.model(model, data)?,
     };
     truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
-    let target = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
-    let mut page = target.as_ref().map(|target| DiagnosisPage::new(context, "diagnose", data, &model, target));
+    let outlet = wanted.pages.open(context, PAGE)?;
+    let mut page = outlet.map(|outlet| DiagnosisPage::new(context, "diagnose", data, &model, outlet));
     let Some((mut set, mut split, data_sha256)) = prepare(context, data, &model, division, &mut page)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
@@ -258,9 +256,9 @@ pub struct LoopArgs {
     /// Model file to write; the ledger is beside it, ending in `.ledger.jsonl`
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Folder for the page diagnosis.html
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
+    /// The page diagnosis.html.
+    #[command(flatten)]
+    pub pages: Pages,
     /// Explainable part of simulated flights, as `simulate --explainable` writes it: shows the floor of the error on flights that no search
     /// has seen, and how much of what lies above it the effects remove
     #[arg(long, value_name = "DIR")]
@@ -275,10 +273,10 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     let LoopArgs { data, output, division, .. } = wanted;
     let (model, truth) = (wanted.model.as_deref(), wanted.explainable.as_deref());
     let target = context.new_file(output, model.as_slice())?;
-    let page_file = wanted.report.as_deref().map(|folder| context.new_page(folder, PAGE)).transpose()?;
+    let outlet = wanted.pages.open(context, PAGE)?;
     truth.map_or(Ok(()), |folder| explainable::apart(data, folder))?;
     let model = context.model(model, data)?;
-    let mut page = page_file.as_ref().map(|page_file| DiagnosisPage::new(context, "loop", data, &model, page_file));
+    let mut page = outlet.map(|outlet| DiagnosisPage::new(context, "loop", data, &model, outlet));
     let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut page)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };

@@ -1,9 +1,10 @@
 //! `rollout`: models and networks integrated forward from measured states, their errors by step.
 
-use super::compare::{name, tested, write_page};
+use super::compare::{name, tested};
 use super::predict::read_network;
 use crate::arguments::{Data, Division, HORIZONS, STRIDES, count};
 use crate::context::Context;
+use crate::pages::Pages;
 use phyture::physics::Model;
 use phyture::report::rollout_page;
 use phyture::workflow::{Rolling, provenance};
@@ -32,9 +33,9 @@ pub struct Args {
     /// Samples between starts
     #[arg(long, default_value_t = 10, allow_negative_numbers = true, value_parser = count(STRIDES))]
     pub stride: usize,
-    /// Folder for the page rollout.html
-    #[arg(long, value_name = "DIR")]
-    pub report: Option<PathBuf>,
+    /// The page rollout.html.
+    #[command(flatten)]
+    pub pages: Pages,
     /// Start in every flight, also in those that were trained on
     #[arg(long)]
     pub all: bool,
@@ -45,7 +46,7 @@ pub struct Args {
 
 /// Rolls out on the test part (locked flights where there are any) and prints; writes the page if asked to.
 pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
-    let page = wanted.report.as_deref().map(|folder| context.new_page(folder, "rollout.html")).transpose()?;
+    let page = wanted.pages.open(context, "rollout.html")?;
     let networks = wanted.network.iter().map(|path| Ok((name(path), read_network(path)?))).collect::<Result<Vec<_>>>()?;
     let models = wanted.model.iter().map(|path| Ok((name(path), Model::read(path)?))).collect::<Result<Vec<_>>>()?;
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
@@ -65,12 +66,11 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let rolling = Rolling { models: &models, networks: &networks, horizon: wanted.horizon, stride: wanted.stride };
     let result = rolling.run(&set, &split)?;
     context.say(format!("\n{result}"));
-    if let Some(target) = page {
+    if let Some(page) = page {
         let names: Vec<&str> =
             models.iter().map(|(name, _)| name).chain(networks.iter().map(|(name, _)| name)).map(String::as_str).collect();
         let provenance = provenance("rollout", &wanted.data.data, &set, &names, context.seed());
-        write_page(&rollout_page(&result, &provenance), &target)?;
-        context.say(format!("report: {}", target.path().display()));
+        page.write(context, &rollout_page(&result, &provenance))?;
     }
     context.json(&result)?;
     Ok(ExitCode::SUCCESS)
