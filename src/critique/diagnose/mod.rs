@@ -38,6 +38,7 @@ mod suggest;
 mod text;
 mod textbook;
 mod verdict;
+mod watch;
 
 pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
@@ -50,3 +51,4 @@ pub use signs::number_remark;
 pub use text::LoopText;
 pub use textbook::{Named, textbook};
 pub use verdict::{Options, Outcome, diagnose};
+pub use watch::Watch;
