@@ -66,8 +66,14 @@ pub struct ChannelText {
 }
 
 /// Names of the accelerations in words, in the order of [`Column::TARGETS`].
-const CHANNELS: [&str; 6] =
-    ["forward acceleration", "sideward acceleration", "vertical acceleration", "roll acceleration", "pitch acceleration", "yaw acceleration"];
+const CHANNELS: [&str; 6] = [
+    "forward acceleration",
+    "sideward acceleration",
+    "vertical acceleration",
+    "roll acceleration",
+    "pitch acceleration",
+    "yaw acceleration",
+];
 
 /// The model of a state.
 #[derive(Clone, Debug, Serialize)]

@@ -14,6 +14,9 @@ use std::sync::Arc;
 /// What put an effect into a model here, unless a search did.
 const ADDED_BY: &str = "studio";
 
+/// What a formula is called while it is tried.
+const DRAFT: &str = "formula_being_written";
+
 /// What a formula of the user's own adds to.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -126,7 +129,12 @@ impl Studio {
             }
             Edit::Move(moved) => {
                 let model = moved_model(&model, moved)?;
-                let did = format!("{} of {} moved to {}", moved.number, moved.effect, crate::critique::digits::significant(moved.value, 4));
+                let did = format!(
+                    "{} of {} moved to {}",
+                    moved.number,
+                    moved.effect,
+                    crate::critique::digits::significant(moved.value, 4)
+                );
                 return Ok(State { id: 0, did, model, calibration: None, found: None });
             }
             Edit::Calibrate => "calibrated".to_owned(),
@@ -154,7 +162,11 @@ impl Studio {
         model.effects.retain(|known| known.name != name);
         model.effects.push(Effect { enabled: true, ..effect });
         if !model.acts(model.effects.len() - 1)?.contains(&true) {
-            return Err(fault("effect", format!("`{name}`, which changes nothing here"), "an effect whose signals some effect of the model reads"));
+            return Err(fault(
+                "effect",
+                format!("`{name}`, which changes nothing here"),
+                "an effect whose signals some effect of the model reads",
+            ));
         }
         Ok((format!("added {name}"), found))
     }
@@ -175,7 +187,7 @@ impl Studio {
     /// Whether a formula could be added, without adding it.
     pub fn check_formula(&self, owner: &Owner, formula: &str) -> FormulaCheck {
         let mut model = self.now().model.clone();
-        let tried = own_effect(&model, "new_formula", owner, formula).and_then(|effect| {
+        let tried = own_effect(&model, DRAFT, owner, formula).and_then(|effect| {
             let caution = effect.caution();
             model.effects.push(effect);
             self.check_inputs(&model, formula)?;
@@ -183,7 +195,10 @@ impl Studio {
         });
         match tried {
             Ok(caution) => FormulaCheck { caution, ..FormulaCheck::default() },
-            Err(Error::Formula { message, at, .. }) => FormulaCheck { message: Some(message), at: Some(at), caution: None },
+            Err(Error::Formula { message, at, .. }) => {
+                let message = message.strip_prefix(&format!("effect `{DRAFT}`: ")).unwrap_or(&message).to_owned();
+                FormulaCheck { message: Some(message), at: Some(at), caution: None }
+            }
             Err(error) => FormulaCheck { message: Some(error.to_string()), ..FormulaCheck::default() },
         }
     }
@@ -201,7 +216,8 @@ fn known<'a>(model: &'a mut Model, name: &str) -> Result<&'a mut Effect> {
 
 /// An effect of the catalogue that makes sense for the model's vehicle.
 fn of_catalogue(model: &Model, name: &str) -> Result<Effect> {
-    let definition = catalogue::definition(name).ok_or_else(|| fault("effect", format!("`{name}`"), "an effect of the catalogue"))?;
+    let definition =
+        catalogue::definition(name).ok_or_else(|| fault("effect", format!("`{name}`"), "an effect of the catalogue"))?;
     if definition.notes.is_some_and(|notes| !notes.vehicles.contains(&model.vehicle)) {
         return Err(fault("effect", format!("`{name}`"), format!("an effect that makes sense for a {}", model.vehicle.name())));
     }
@@ -211,7 +227,8 @@ fn of_catalogue(model: &Model, name: &str) -> Result<Effect> {
 /// An effect of the user's own.
 fn own_effect(model: &Model, name: &str, owner: &Owner, formula: &str) -> Result<Effect> {
     let is_name = |name: &str| {
-        name.starts_with(|first: char| first.is_ascii_lowercase()) && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+        name.starts_with(|first: char| first.is_ascii_lowercase())
+            && name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
     };
     if !is_name(name) {
         return Err(fault("name", format!("`{name}`"), "small letters, digits and `_`, a letter first"));

@@ -2,8 +2,8 @@
 //! after. States never change.
 
 use super::{Studio, held};
-use crate::critique::{Intervals, PerChannel};
 use crate::critique::diagnose::Diagnosis;
+use crate::critique::{Intervals, PerChannel};
 use crate::error::Result;
 use crate::physics::{Calibration, Model};
 use serde::Serialize;

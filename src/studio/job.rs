@@ -53,8 +53,12 @@ pub(super) struct Job {
     watch: Watch,
     begun: Instant,
     state: Arc<State>,
-    ended: Option<(f64, Result<(Arc<Diagnosis>, Arc<Model>)>)>,
+    /// After how long, s, and with what.
+    ended: Option<(f64, Result<Heard>)>,
 }
+
+/// What a search found, and the model with it.
+type Heard = (Arc<Diagnosis>, Arc<Model>);
 
 impl Studio {
     /// Begins a search for what the present state lacks.
@@ -74,7 +78,8 @@ impl Studio {
             let run = move || {
                 // A fault in the search is told like any other failure; the studio goes on.
                 let searched = catch_unwind(AssertUnwindSafe(|| studio.search(&own.1.model, own.0)));
-                let broken = || Err(Error::Undetermined("the search broke off; its message is on the terminal of the studio".into()));
+                let broken =
+                    || Err(Error::Undetermined("the search broke off; its message is on the terminal of the studio".into()));
                 let outcome = searched.unwrap_or_else(|_| broken());
                 let outcome = outcome.map(|outcome| (Arc::new(outcome.diagnosis), Arc::new(outcome.model)));
                 if let Some(job) = held(&studio.job).as_mut() {
@@ -137,7 +142,7 @@ impl Studio {
     }
 
     /// What the last search found, and the model with it.
-    pub(super) fn outcome(&self) -> Option<(Arc<Diagnosis>, Arc<Model>)> {
+    pub(super) fn outcome(&self) -> Option<Heard> {
         held(&self.job).as_ref().and_then(|job| Some(job.ended.as_ref()?.1.as_ref().ok()?.clone()))
     }
 }

@@ -1,8 +1,8 @@
 //! States judged: their errors on flights that no fit has seen, or on all, by the same comparison as `compare`. Results are kept, since a person
 //! looks at one state in several ways.
 
-use super::history::State;
 use super::held;
+use super::history::State;
 use crate::critique::{Intervals, PerChannel, Row};
 use crate::error::Result;
 use crate::flight::split::{Part, Split};
@@ -41,6 +41,9 @@ type Key = (u64, PartWanted, bool);
 /// An error by channel with its interval.
 type Errors = (PerChannel, Intervals);
 
+/// The errors of a state, what they were judged on, and whether that is second halves.
+type Known = (Errors, String, bool);
+
 /// The errors of states on the way to the present one.
 pub(super) struct OfPath {
     pub of: Vec<Errors>,
@@ -53,7 +56,7 @@ pub(super) struct Judge {
     strides: BTreeMap<PartWanted, usize>,
     all: Split,
     whole: Mutex<Vec<(Key, Arc<Judged>)>>,
-    errors: Mutex<BTreeMap<(u64, bool), (Errors, String, bool)>>,
+    errors: Mutex<BTreeMap<(u64, bool), Known>>,
 }
 
 /// What the prediction of a state is called in a comparison.

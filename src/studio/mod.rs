@@ -64,6 +64,7 @@ pub struct Studio {
     changing: Mutex<()>,
     job: Mutex<Option<Job>>,
     predictions: Mutex<trace::Predictions>,
+    dependences: Mutex<views::Dependences>,
     file: Mutex<save::ModelFile>,
 }
 
@@ -107,6 +108,7 @@ impl Studio {
             changing: Mutex::default(),
             job: Mutex::default(),
             predictions: Mutex::default(),
+            dependences: Mutex::default(),
             file,
         })
     }
@@ -122,7 +124,9 @@ impl Studio {
     /// [`Error::Config`] where no such state is left.
     fn state(&self, id: Option<u64>) -> Result<Arc<State>> {
         let Some(id) = id else { return Ok(self.now()) };
-        held(&self.history).state(id).ok_or_else(|| fault("state", id.to_string(), "a state of the history; it was replaced by a later step"))
+        held(&self.history)
+            .state(id)
+            .ok_or_else(|| fault("state", id.to_string(), "a state of the history; it was replaced by a later step"))
     }
 }
 

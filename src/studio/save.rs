@@ -83,7 +83,8 @@ impl Studio {
         let mut round = 0;
         let mut noted: Vec<String> = Vec::new();
         for found in path.iter().filter_map(|state| state.found.as_ref()) {
-            let new = |name: &str| model.effect(name).is_some_and(|effect| effect.enabled) && !noted.iter().any(|known| known == name);
+            let new =
+                |name: &str| model.effect(name).is_some_and(|effect| effect.enabled) && !noted.iter().any(|known| known == name);
             let steps: Vec<_> = found.steps.iter().filter(|step| new(&step.effect)).cloned().collect();
             if steps.is_empty() {
                 continue;

@@ -1,16 +1,18 @@
 //! Where the error lies: by manoeuvre or regime and channel, the ten seconds to look at in each, and the residual over recorded variables.
 
 use super::judge::{PartWanted, row};
-use super::{Studio, fault};
+use super::{Studio, fault, held};
 use crate::critique::compare::{ModelError, PartError};
-use crate::critique::locate::{Bin, Variable, dependences, stretches_in};
+use crate::critique::locate::{Bin, Dependence, Variable, dependences, stretches_in};
 use crate::critique::predictions::deviation;
 use crate::critique::{PerChannel, Regime, Row};
 use crate::error::Result;
-use crate::report::colour::shade;
 use crate::flight::{Column, Window};
+use crate::report::colour::shade;
 use crate::workflow::Judged;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// By what the error is divided.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, Serialize)]
@@ -135,7 +137,9 @@ impl Studio {
         let mut rows: Vec<MapRow> = match by {
             By::Manoeuvre => model.by_manoeuvre.iter().map(|(name, part)| map_row(name, None, part, &deviation)).collect(),
             By::Regime => {
-                let of = |regime: Regime| Some(map_row(regime.name(), Some(regime.rule()), model.by_regime.get(regime.name())?, &deviation));
+                let of = |regime: Regime| {
+                    Some(map_row(regime.name(), Some(regime.rule()), model.by_regime.get(regime.name())?, &deviation))
+                };
                 Regime::ALL.into_iter().filter_map(of).collect()
             }
         };
@@ -188,19 +192,44 @@ impl Studio {
         if channel >= Column::TARGETS.len() {
             return Err(fault("channel", channel.to_string(), "0 to 5"));
         }
-        let judged = self.judge.state(&self.set, &self.split, &self.now(), part)?;
-        let of = |variable: &Variable| dependences(&self.set.flights, &judged.windows, row(&judged), std::slice::from_ref(variable));
-        let found: Vec<_> = {
-            use rayon::prelude::*;
-            Variable::ALL.par_iter().map(of).collect::<Result<Vec<_>>>()?
+        let now = self.now();
+        let judged = self.judge.state(&self.set, &self.split, &now, part)?;
+        let found = self.dependences(&judged, (now.id, part))?;
+        let text = |(variable, channels): &(Variable, [Dependence; 6])| {
+            let Dependence { bins, share } = channels[channel].clone();
+            VariableText { name: variable.name(), unit: variable.unit(), share, bins }
         };
-        let text = |(variable, mut channels): (Variable, [crate::critique::locate::Dependence; 6])| {
-            let found = std::mem::replace(&mut channels[channel], crate::critique::locate::Dependence { bins: Vec::new(), share: 0.0 });
-            VariableText { name: variable.name(), unit: variable.unit(), share: found.share, bins: found.bins }
-        };
-        let mut variables: Vec<VariableText> = found.into_iter().flatten().map(text).collect();
+        let mut variables: Vec<VariableText> = found.iter().map(text).collect();
         variables.sort_by(|left, right| right.share.total_cmp(&left.share));
         Ok(DependenceText { variables, basis: judged.comparison.basis() })
+    }
+}
+
+/// Residuals over variables, by state and part.
+pub(super) type Dependences = Vec<((u64, PartWanted), Arc<Vec<OverVariable>>)>;
+
+/// The residuals of the six channels over a variable.
+type OverVariable = (Variable, [Dependence; 6]);
+
+/// States whose residuals over variables are kept.
+const KEPT: usize = 6;
+
+impl Studio {
+    /// The residuals over every variable; kept, as a person looks at one channel after the other.
+    fn dependences(&self, judged: &Judged, key: (u64, PartWanted)) -> Result<Arc<Vec<OverVariable>>> {
+        if let Some((_, known)) = held(&self.dependences).iter().find(|known| known.0 == key) {
+            return Ok(Arc::clone(known));
+        }
+        let share = Variable::ALL.len().div_ceil(rayon::current_num_threads());
+        let of = |variables: &[Variable]| dependences(&self.set.flights, &judged.windows, row(judged), variables);
+        let found: Vec<Vec<OverVariable>> = Variable::ALL.par_chunks(share).map(of).collect::<Result<_>>()?;
+        let found = Arc::new(found.into_iter().flatten().collect::<Vec<_>>());
+        let mut kept = held(&self.dependences);
+        if kept.len() >= KEPT {
+            kept.remove(0);
+        }
+        kept.push((key, Arc::clone(&found)));
+        Ok(found)
     }
 }
 
@@ -210,11 +239,11 @@ fn whole(model: &ModelError, blocks: usize) -> PartError {
 }
 
 fn map_row(name: &str, rule: Option<&'static str>, part: &PartError, deviation: &PerChannel) -> MapRow {
-    let values = part.rmse.channels().into_iter().zip(part.rmse_ci95.channels()).zip(deviation.channels());
-    let cell = |((rmse, ci95), deviation): ((Option<f64>, Option<[f64; 2]>), Option<f64>)| {
-        let relative = rmse.zip(deviation).map(|(rmse, deviation)| rmse / deviation);
+    let (rmse, ci95, deviation) = (part.rmse.channels(), part.rmse_ci95.channels(), deviation.channels());
+    let cell = |channel: usize| {
+        let relative = rmse[channel].zip(deviation[channel]).map(|(rmse, deviation)| rmse / deviation);
         let (paper, ink) = shade(relative.unwrap_or(0.0));
-        MapCell { rmse, ci95, relative, paper, ink }
+        MapCell { rmse: rmse[channel], ci95: ci95[channel], relative, paper, ink }
     };
-    MapRow { name: name.into(), rule, n: part.n, blocks: part.blocks, cells: values.map(cell).collect() }
+    MapRow { name: name.into(), rule, n: part.n, blocks: part.blocks, cells: (0..Column::TARGETS.len()).map(cell).collect() }
 }

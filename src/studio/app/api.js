@@ -19,7 +19,7 @@ import { read } from './place.js';
  *   numbers: Numeral[] }} Effect
  * @typedef {{ name: string, vehicle: string, state: number, effects: Effect[], addable: [string, string][],
  *   calibration: { condition_number: number, rows: number, last_change: number } | null, doubts: string[], toml: string | null }} Model
- * @typedef {{ t: number[], measured: number[], predicted: number[], residual: number[], against: number[] | null, against_residual: number[] | null,
+ * @typedef {{ t: number[], measured: number[], predicted: number[], residual: number[], against: number[] | null, against_residual: (number | null)[] | null,
  *   sticks: number[][], whole_s: [number, number], samples_per_point: number, rmse: number, against_rmse: number | null }} Trace
  * @typedef {{ effect: string, number: string, value: number }} Moved
  * @typedef {{ flight: number, channel: number, from_s: number | null, to_s: number | null, pixels: number, against: number | null,

@@ -2,7 +2,7 @@
 // Small pictures as SVG: the residual over a variable, an interval beside its usual range, the errors over the steps.
 
 import { h, s } from './dom.js';
-import { interval, measure, number, percent, ticks } from './format.js';
+import { interval, measure, number, percent, ticks, tickText } from './format.js';
 
 /**
  * A scale from numbers to pixels.
@@ -34,10 +34,12 @@ export function binned(bins, variable, channel) {
     bin.ci95 ? s('line', { class: 'whisker', x1: x(bin.at), x2: x(bin.at), y1: y(bin.ci95[0]), y2: y(bin.ci95[1]) }) : null,
     s('circle', { class: bin.blocks < 5 ? 'thin' : 'dot', cx: x(bin.at), cy: y(bin.mean), r: 4 },
       s('title', {}, `${variable.name} ${measure(bin.at, variable.unit)}: ${measure(bin.mean, channel.unit)} [${interval(bin.ci95)}], ${bin.n} samples in ${bin.blocks} blocks`)));
-  const across = ticks(first, last, 7).map((at) => s('g', {}, s('line', { class: 'grid', x1: x(at), x2: x(at), y1: top, y2: height - bottom }),
-    s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, number(at))));
-  const up = ticks(low - room, high + room, 5).map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width - 4, y1: y(at), y2: y(at) }),
-    s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, number(at))));
+  const [atX, atY] = [ticks(first, last, 7), ticks(low - room, high + room, 5)];
+  const [textX, textY] = [tickText(atX), tickText(atY)];
+  const across = atX.map((at) => s('g', {}, s('line', { class: 'grid', x1: x(at), x2: x(at), y1: top, y2: height - bottom }),
+    s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, textX(at))));
+  const up = atY.map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width - 4, y1: y(at), y2: y(at) }),
+    s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, textY(at))));
   const title = `mean of measured − predicted ${channel.symbol} over ${variable.name}`;
   return s('svg', { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': title },
     across, up, s('line', { class: 'zero', x1: left, x2: width - 4, y1: y(0), y2: y(0) }),
@@ -88,7 +90,9 @@ export function waterfall(channel, steps, chosen, choose) {
       end ? s('line', { class: 'whisker', x1: x + 0.35 * pitch, x2: x + 0.35 * pitch, y1: y(end[0]), y2: y(end[1]) }) : null,
       s('text', { x: x + 0.35 * pitch, y: height - 5, 'text-anchor': 'middle' }, String(steps.indexOf(step) + 1)));
   };
-  const grid = ticks(0, high, 3).map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width, y1: y(at), y2: y(at) }), s('text', { x: left - 4, y: y(at) + 4, 'text-anchor': 'end' }, number(at, 2))));
+  const places = ticks(0, high, 3);
+  const text = tickText(places);
+  const grid = places.map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width, y1: y(at), y2: y(at) }), s('text', { x: left - 4, y: y(at) + 4, 'text-anchor': 'end' }, text(at))));
   const [first, now] = [values[0], values[values.length - 1]];
   const change = first ? now / first - 1 : 0;
   return h('button', { type: 'button', class: 'fallbox', 'aria-pressed': String(chosen), onclick: choose, 'data-channel': channel.symbol, 'data-rmse': String(now) },

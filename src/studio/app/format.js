@@ -43,11 +43,30 @@ export function interval(ends) {
 }
 
 /**
+ * A formula with its numbers cut to five digits.
+ * @param {string} text
+ */
+export function shorter(text) {
+  return text.replace(/\d+\.\d{5,}(e-?\d+)?/g, (found) => String(Number(Number(found).toPrecision(5))));
+}
+
+/**
  * A time of flight.
  * @param {number} seconds
  */
 export function time(seconds) {
   return seconds >= 600 ? `${(seconds / 60).toFixed(0)} min` : `${number(seconds)} s`;
+}
+
+/**
+ * Ticks as text, all with the places that the finest of them needs.
+ * @param {number[]} places
+ * @returns {(value: number) => string}
+ */
+export function tickText(places) {
+  const step = places.length > 1 ? Math.abs(places[1] - places[0]) : 1;
+  const digits = step >= 1 ? 0 : Math.min(6, Math.ceil(-Math.log10(step) - 1e-9));
+  return (value) => (Math.abs(value) < 1e-9 * step ? '0' : value.toFixed(digits).replace('-', '−'));
 }
 
 /**

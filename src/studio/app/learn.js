@@ -4,7 +4,7 @@
 import { ask } from './api.js';
 import { range } from './charts.js';
 import { h } from './dom.js';
-import { interval, measure, number, percent } from './format.js';
+import { interval, measure, number, percent, shorter } from './format.js';
 import { go, read } from './place.js';
 
 /** How often a running search is asked how far it is, ms. */
@@ -18,10 +18,11 @@ let timer = 0;
  */
 export async function show(app, into) {
   window.clearTimeout(timer);
-  /** @type {import('./api.js').Job} */
-  const job = await ask('job');
+  /** @type {[import('./api.js').Job, import('./api.js').Model]} */
+  const [job, model] = await Promise.all([ask('job'), ask('model')]);
   if (read().view !== 'learn') return;
-  into.replaceChildren(control(app, job, into), job.diagnosis ? findings(app, job) : invitation(job));
+  const has = new Set(model.effects.filter((effect) => effect.enabled).map((effect) => effect.name));
+  into.replaceChildren(control(app, job, into), job.diagnosis ? findings(app, job, has) : invitation(job));
   const runs = job.progress === 'running' || job.progress === 'stopping';
   if (runs) watch(app, into);
 }
@@ -97,16 +98,18 @@ function invitation(job) {
 /**
  * @param {import('./main.js').App} app
  * @param {import('./api.js').Job} job
+ * @param {Set<string>} has effects that take part already
  */
-function findings(app, job) {
+function findings(app, job, has) {
   const found = /** @type {import('./api.js').Diagnosis} */ (job.diagnosis);
   const order = (found.worth ?? []).map((worth) => worth.effect);
   const place = (/** @type {string} */ name) => (order.includes(name) ? order.indexOf(name) : order.length);
   const steps = [...found.steps].sort((left, right) => place(left.effect) - place(right.effect));
-  const all = steps.length > 1 ? h('button', { type: 'button', id: 'add-all', onclick: () => app.edit({ do: 'add_all' }) }, `Add all ${steps.length}`) : null;
+  const open = steps.filter((step) => !has.has(step.effect));
+  const all = open.length > 1 ? h('button', { type: 'button', id: 'add-all', onclick: () => app.edit({ do: 'add_all' }) }, `Add all ${open.length}`) : null;
   return h('div', { id: 'findings' },
     h('div', { class: 'verdict' }, h('p', {}, found.summary), all),
-    steps.map((step) => effect(app, found, step)),
+    steps.map((step) => effect(app, found, step, has.has(step.effect))),
     (found.unknown ?? []).map((one) => unknown(app, one)),
     found.notes.length ? h('details', { class: 'card' }, h('summary', {}, `What to know besides (${found.notes.length})`), h('ul', {}, found.notes.map((note) => h('li', {}, note)))) : null,
     tried(found));
@@ -116,16 +119,17 @@ function findings(app, job) {
  * @param {import('./main.js').App} app
  * @param {import('./api.js').Diagnosis} found
  * @param {import('./api.js').Found} step
+ * @param {boolean} isIn whether it takes part already
  */
-function effect(app, found, step) {
+function effect(app, found, step, isIn) {
   const worth = found.worth?.find((one) => one.effect === step.effect);
   const falls = worth
     ? Object.entries(worth.share).map(([channel, share]) => /** @type {[string, number, [number, number] | null]} */ ([channel, share.share, share.ci95]))
     : Object.entries(step.held_out_mse_fall).map(([channel, fall]) => /** @type {[string, number, [number, number] | null]} */ ([channel, fall, null]));
   falls.sort((left, right) => right[1] - left[1]);
-  const add = h('button', { type: 'button', class: 'main', 'data-add': step.effect, onclick: async () => {
+  const add = h('button', { type: 'button', class: isIn ? '' : 'main', disabled: isIn, 'data-add': step.effect, onclick: async () => {
     if (await app.edit({ do: 'add', effect: step.effect })) app.note(`${step.effect} added and calibrated`);
-  } }, 'Add');
+  } }, isIn ? 'in the model' : 'Add');
   const coefficients = step.coefficients.map((one) => h('tr', {}, h('th', { scope: 'row' }, one.name), h('td', {}, measure(one.value, one.unit)), h('td', {}, interval(one.ci95)),
     h('td', {}, range(one.value, one.ci95, one.expected)), h('td', {}, one.expected ? `usually ${interval(one.expected)}` : '', one.sign === 'wrong' ? h('b', { class: 'rise' }, ' wrong sign') : null)));
   const parameters = step.parameters.filter((one) => !one.fixed).map((one) => h('tr', {}, h('th', { scope: 'row' }, one.name), h('td', {}, measure(one.value, one.unit)), h('td', {}, interval(one.profile)), h('td', {}, range(one.value, one.profile, null)), h('td')));
@@ -135,7 +139,7 @@ function effect(app, found, step) {
     h('div', { class: 'falls' }, falls.slice(0, 6).map(([channel, share, ci95]) => h('span', { title: ci95 ? `95 % interval ${percent(ci95[0])} … ${percent(ci95[1])}` : '' }, h('b', {}, channel), ` ${percent(share)}`)),
       h('small', { class: 'quiet' }, worth ? 'of the error on unseen flights would come back without it' : 'of the error on held-out blocks removed')),
     h('table', { class: 'numbers' }, h('tbody', {}, coefficients, parameters)),
-    h('pre', {}, step.formula),
+    h('pre', {}, shorter(step.formula)),
     step.indistinguishable.length ? h('p', {}, `These flights cannot tell it from ${step.indistinguishable.join(', ')}. What would: ${step.would_tell_apart}`) : null,
     step.fault_of_log ? h('p', { class: 'quiet' }, `Or the log: ${step.fault_of_log}`) : null,
     step.rests_on_flight ? h('p', { class: 'rise' }, `It rests on one flight: ${step.rests_on_flight}`) : null,

@@ -137,7 +137,7 @@ function score() {
       title: `${of.name}, root mean square error on ${app.steps.judged_on}`, onclick: () => slide({ channel: index }) },
       h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}`),
       h('span', { class: 'rmse' }, number(after), h('small', {}, ` ${of.unit}`)),
-      h('span', { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' }, fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : 'at the start'));
+      h('span', { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' }, fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : ''));
   };
   byId('score').replaceChildren(h('h2', { class: 'unseen' }, 'Errors'), ...overview.channels.map(cell));
 }

@@ -5,7 +5,7 @@ import { ask } from './api.js';
 import { waterfall } from './charts.js';
 import { choice, h } from './dom.js';
 import { editor } from './editor.js';
-import { interval, measure, number } from './format.js';
+import { interval, measure, number, shorter } from './format.js';
 import { read, slide } from './place.js';
 import { stack } from './plots.js';
 
@@ -26,9 +26,11 @@ export async function show(app, into) {
   const channel = app.overview.channels[place.channel];
   const pictures = h('div', { class: 'stack', id: 'model-plots' });
   const preview = previewer(app, pictures, channel);
+  const [baseline, own] = [true, false].map((is) => model.effects.filter((effect) => effect.baseline === is));
   const scroll = into.querySelector('.effects')?.scrollTop ?? 0;
   into.replaceChildren(h('div', { class: 'columns model' },
-    h('div', { class: 'effects' }, calibration(app, model), model.effects.map((effect) => effectCard(app, effect, preview)), adder(app, model), editor(app)),
+    h('div', { class: 'effects' }, calibration(app, model), own.map((effect) => effectCard(app, effect, preview)), adder(app, model), editor(app),
+      h('h2', {}, 'Baseline'), baseline.map((effect) => effectCard(app, effect, preview))),
     h('div', { class: 'watch' }, falls(app), residual(app, pictures, channel), steps(app))));
   const effects = into.querySelector('.effects');
   if (effects) effects.scrollTop = scroll;
@@ -68,7 +70,7 @@ function effectCard(app, effect, preview) {
   const details = h('details', { open: open.has(effect.name), ontoggle: () => (details.open ? open.add(effect.name) : open.delete(effect.name)) },
     h('summary', {}, 'numbers and formula'),
     effect.numbers.filter((one) => !one.fixed).map((one) => slider(app, effect, one, preview)),
-    h('pre', {}, effect.formula),
+    h('pre', {}, shorter(effect.formula)),
     effect.baseline ? null : h('button', { type: 'button', 'data-remove': effect.name, onclick: () => app.edit({ do: 'remove', effect: effect.name }) }, 'Take it out'));
   return h('article', { class: effect.enabled ? 'card effect' : 'card effect off', 'data-effect': effect.name },
     h('header', {}, h('label', { class: 'switch' }, box, h('b', {}, effect.name)), h('span', { class: 'gap' }), h('span', { class: 'tag' }, effect.baseline ? 'baseline' : effect.added_by === 'diagnose' ? 'found' : effect.kind === 'formula' ? 'own formula' : 'added')),
@@ -110,7 +112,7 @@ function previewer(app, pictures, channel) {
     const wanted = { flight, channel: place.channel, from_s: place.from, to_s: place.to, against: moved ? app.steps.steps[app.steps.at].id : null, moved, pixels: Math.round(plots?.width() ?? 600) };
     /** @type {import('./api.js').Trace} */
     const trace = await ask('trace', wanted);
-    plots?.draw(trace.against ? trace : { ...trace, against: trace.predicted, against_residual: trace.residual });
+    plots?.draw(trace.against ? trace : { ...trace, against: [], against_residual: trace.t.map(() => null) });
     const told = pictures.parentElement?.querySelector('[data-told]');
     told?.replaceChildren(`root mean square ${number(trace.rmse)} ${channel.unit}${trace.against_rmse === null ? '' : `, before ${number(trace.against_rmse)}`}`);
     pictures.dataset.rmse = String(trace.rmse);

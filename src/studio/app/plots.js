@@ -80,9 +80,12 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
   const { ink, lines } = colours();
   const other = against === null ? [] : [{ label: against, stroke: lines[1], dash: DASHES[1] }];
   const all = which === 'all';
-  const top = all ? [plot(`${channel.symbol}`, 260, [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other], channel.unit, false, zoom, whole)] : [];
-  const residual = plot('residual', all ? 150 : 190, [{ label: `measured − ${now}`, stroke: lines[0] }, ...other.map((line) => ({ ...line, label: `measured − ${against}` }))], channel.unit, !all, zoom, whole);
-  const sticks = all ? [plot('sticks', 150, STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })), '1', true, zoom, whole)] : [];
+  // All three on one screen: what is left of the window below head and controls, less a legend each.
+  const left = Math.max(360, Math.min(820, window.innerHeight - 330));
+  const [tall, middle, low] = [0.46, 0.26, 0.28].map((share) => Math.round(share * left));
+  const top = all ? [plot(channel.symbol, tall, [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other], channel.unit, false, zoom, whole)] : [];
+  const residual = plot('residual', all ? middle : 170, [{ label: `measured − ${now}`, stroke: lines[0] }, ...other.map((line) => ({ ...line, label: `measured − ${against}` }))], channel.unit, !all, zoom, whole);
+  const sticks = all ? [plot('sticks', low, STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })), '1', true, zoom, whole)] : [];
   const plots = [...top, residual, ...sticks];
   into.replaceChildren(...plots.map((one) => one.holder));
   const width = () => Math.max(200, Math.floor(into.clientWidth));
@@ -92,12 +95,13 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
   return {
     draw(trace) {
       const { t } = trace;
+      /** @type {(number | null)[][][]} */
       const sets = [
         ...top.map(() => [t, trace.measured, trace.predicted, ...(trace.against ? [trace.against] : [])]),
         [t, trace.residual, ...(trace.against_residual ? [trace.against_residual] : [])],
         ...sticks.map(() => [t, ...trace.sticks]),
       ];
-      plots.forEach((one, index) => one.made.setData(sets[index]));
+      plots.forEach((one, index) => one.made.setData(/** @type {uPlot.AlignedData} */ (/** @type {unknown} */ (sets[index]))));
       resize();
     },
     destroy() {

@@ -13,11 +13,11 @@ pub use guard::Token;
 
 use super::Studio;
 use crate::error::{Error, Result};
+use axum::Router;
 use axum::body::{Body, to_bytes};
 use axum::extract::{Request, State};
 use axum::http::{HeaderName, HeaderValue, Method, Response, StatusCode, header};
 use axum::routing::any;
-use axum::Router;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -120,10 +120,7 @@ impl Server {
 
 /// One request.
 async fn answer(State(shared): State<Arc<Shared>>, request: Request) -> Response<Body> {
-    let answered = match admitted(&shared, request).await {
-        Ok(answered) => Ok(answered),
-        Err(refusal) => Err(refusal),
-    };
+    let answered = admitted(&shared, request).await;
     let (status, kind, body) = answered.unwrap_or_else(|refusal| (refusal.status, files::JSON, refusal.body().into()));
     let mut response = Response::new(body);
     *response.status_mut() = StatusCode::from_u16(status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
@@ -154,9 +151,9 @@ async fn admitted(shared: &Arc<Shared>, request: Request) -> std::result::Result
     if parts.method != Method::POST {
         return Err(Refusal::new(405, "method", "requests to /api/ are made by POST"));
     }
-    let body = to_bytes(body, LARGEST_BODY).await.map_err(|_| {
-        Refusal::new(413, "body", format!("the body is cut off, or longer than {LARGEST_BODY} bytes"))
-    })?;
+    let body = to_bytes(body, LARGEST_BODY)
+        .await
+        .map_err(|_| Refusal::new(413, "body", format!("the body is cut off, or longer than {LARGEST_BODY} bytes")))?;
     let (studio, name) = (Arc::clone(&shared.studio), name.to_owned());
     let answered = tokio::task::spawn_blocking(move || routes::answer(&studio, &name, &body)).await;
     let json = answered.map_err(|_| Refusal::new(500, "panic", "the request broke off; the terminal of the studio says why"))??;
