@@ -85,7 +85,15 @@ impl Studio {
     pub fn edit(&self, edit: &Edit) -> Result<Steps> {
         {
             let _one_at_a_time = held(&self.changing);
-            let state = self.changed(edit)?;
+            let changed = self.changed(edit)?;
+            let (id, mut path) = {
+                let mut history = held(&self.history);
+                (history.new_id(), history.path())
+            };
+            let state = Arc::new(State { id, ..changed });
+            path.push(Arc::clone(&state));
+            // What cannot be judged, such as a formula that is no number in some flight, is no step.
+            self.judge.path(&self.set, &self.split, &path)?;
             held(&self.history).push(state);
         }
         self.steps()

@@ -53,10 +53,16 @@ impl History {
         self.states[..=self.at].to_vec()
     }
 
-    pub fn push(&mut self, state: State) {
+    /// An identifier that no state has had.
+    pub fn new_id(&mut self) -> u64 {
+        self.next += 1;
+        self.next - 1
+    }
+
+    pub fn push(&mut self, state: Arc<State>) {
         self.states.truncate(self.at + 1);
-        self.states.push(Arc::new(State { id: self.next, ..state }));
-        (self.at, self.next) = (self.at + 1, self.next + 1);
+        self.states.push(state);
+        self.at += 1;
     }
 
     /// Shows another state; whether there is one.
@@ -173,13 +179,17 @@ mod tests {
     fn a_step_after_an_undo_replaces_what_came_after() {
         let state = |did: &str| State::first(did, Model::paper("a", 4.0, [0.2, 0.3, 0.3], 0.8));
         let mut history = History::new(state("first"));
-        history.push(state("second"));
-        history.push(state("third"));
+        let step = |history: &mut History, did: &str| {
+            let id = history.new_id();
+            history.push(Arc::new(State { id, ..state(did) }));
+        };
+        step(&mut history, "second");
+        step(&mut history, "third");
         assert!(!history.step(1), "there is nothing after the last");
         assert!(history.step(-1) && history.now().did == "second");
         assert!(history.step(1) && history.now().did == "third");
         assert!(history.go_to(1) && history.now().did == "second" && !history.go_to(9));
-        history.push(state("other"));
+        step(&mut history, "other");
         assert_eq!(history.path().iter().map(|state| state.did.as_str()).collect::<Vec<_>>(), ["first", "second", "other"]);
         assert_eq!(history.now().id, 3, "identifiers are not used twice");
         assert!(history.state(2).is_none() && history.state(1).is_some());

@@ -114,6 +114,8 @@ fn a_formula_of_ones_own_is_told_the_character_that_is_wrong() -> Result<()> {
     let after = studio.edit(&formula)?;
     assert!(yaw(&after) < 0.9 * yaw(&before), "it is nearly the hidden effect: {} to {}", yaw(&before), yaw(&after));
     assert!(matches!(studio.edit(&formula), Err(Error::Config { .. })), "the name is taken");
+    let infinite = Edit::Formula { name: "pole".into(), owner: channel, formula: "1 / (t - t)".into() };
+    assert!(studio.edit(&infinite).is_err() && studio.steps()?.steps.len() == 2, "what is no number is no step");
     Ok(())
 }
 

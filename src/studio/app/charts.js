@@ -24,14 +24,16 @@ function scale(low, high, from, to) {
  */
 export function binned(bins, variable, channel) {
   const [width, height, left, bottom, top] = [640, 320, 64, 46, 12];
-  const ends = bins.flatMap((bin) => bin.ci95 ?? [bin.mean, bin.mean]);
+  // Bins that few blocks carry have intervals that would leave nothing of the rest.
+  const ends = bins.flatMap((bin) => (bin.ci95 && bin.blocks >= 5 ? bin.ci95 : [bin.mean]));
   const [low, high] = [Math.min(0, ...ends), Math.max(0, ...ends)];
   const room = 0.08 * (high - low || 1);
   const [first, last] = [bins[0].at, bins[bins.length - 1].at];
   const x = scale(first, last, left + 14, width - 14);
   const y = scale(low - room, high + room, height - bottom, top);
+  const within = (/** @type {number} */ value) => Math.min(height - bottom, Math.max(top, y(value)));
   const dot = (/** @type {import('./api.js').Bin} */ bin) => s('g', {},
-    bin.ci95 ? s('line', { class: 'whisker', x1: x(bin.at), x2: x(bin.at), y1: y(bin.ci95[0]), y2: y(bin.ci95[1]) }) : null,
+    bin.ci95 ? s('line', { class: 'whisker', x1: x(bin.at), x2: x(bin.at), y1: within(bin.ci95[0]), y2: within(bin.ci95[1]) }) : null,
     s('circle', { class: bin.blocks < 5 ? 'thin' : 'dot', cx: x(bin.at), cy: y(bin.mean), r: 4 },
       s('title', {}, `${variable.name} ${measure(bin.at, variable.unit)}: ${measure(bin.mean, channel.unit)} [${interval(bin.ci95)}], ${bin.n} samples in ${bin.blocks} blocks`)));
   const [atX, atY] = [ticks(first, last, 7), ticks(low - room, high + room, 5)];

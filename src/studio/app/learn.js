@@ -92,7 +92,7 @@ function invitation(job) {
   }
   return h('div', { class: 'empty' }, h('h2', {}, 'Which physics is missing?'),
     h('p', {}, 'Diagnose tries every effect of the catalogue beside the present model: by the error on blocks of flight that its numbers have not seen, by chance, and once more on flights that the whole search has not seen.'),
-    h('p', { class: 'quiet' }, 'Twenty minutes of flight take about ten seconds, two hours some minutes.'));
+    h('p', { class: 'quiet' }, 'It takes seconds to minutes, by the length of the flights and by how much is missing; the other views go on meanwhile.'));
 }
 
 /**

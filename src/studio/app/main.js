@@ -84,7 +84,11 @@ async function edit(/** @type {object} */ wanted) {
 
 async function step(/** @type {string} */ name, /** @type {object} */ body = {}) {
   const steps = await working(() => ask(name, body));
-  if (!steps) return false;
+  if (!steps) {
+    // What was moved or switched on the page goes back to what is.
+    await draw();
+    return false;
+  }
   byId('banner').replaceChildren();
   app.steps = steps;
   await draw();
@@ -105,7 +109,7 @@ function head() {
   const tool = (/** @type {string} */ id, /** @type {string} */ text, /** @type {string} */ title, /** @type {boolean} */ on, /** @type {() => void} */ act) =>
     h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
   byId('head').replaceChildren(
-    h('div', { class: 'brand' }, h('strong', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
+    h('div', { class: 'brand' }, h('h1', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
     h('nav', { role: 'tablist', 'aria-label': 'Views' }, VIEWS.map(tab)),
     h('div', { class: 'tools' },
       h('span', { class: 'state', title: steps.file ?? 'no model file yet' },
