@@ -95,6 +95,11 @@ impl Judge {
         Ok(judged)
     }
 
+    /// The samples of a part.
+    pub fn spans<'a>(&'a self, split: &'a Split, part: PartWanted) -> &'a [Span] {
+        if part == PartWanted::All { &self.all.test } else { &split.test }
+    }
+
     /// Models on a part of the flights.
     pub fn contest(&self, set: &DataSet, split: &Split, models: &[(String, Model)], part: PartWanted) -> Result<Judged> {
         let contest = Contest {

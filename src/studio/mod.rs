@@ -12,6 +12,7 @@ mod job;
 mod judge;
 mod save;
 pub mod server;
+mod surfaces;
 mod trace;
 mod views;
 
@@ -21,6 +22,7 @@ pub use history::{StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
 pub use save::Saved;
+pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
 pub use views::{By, DependenceText, ErrorMap, MapCell, MapRow, Place, PlaceWanted, VariableText};
 
@@ -65,6 +67,7 @@ pub struct Studio {
     job: Mutex<Option<Job>>,
     predictions: Mutex<trace::Predictions>,
     dependences: Mutex<views::Dependences>,
+    tables: Mutex<surfaces::Tables>,
     file: Mutex<save::ModelFile>,
 }
 
@@ -109,6 +112,7 @@ impl Studio {
             job: Mutex::default(),
             predictions: Mutex::default(),
             dependences: Mutex::default(),
+            tables: Mutex::default(),
             file,
         })
     }

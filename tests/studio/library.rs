@@ -2,7 +2,7 @@
 
 use crate::support::{HIDDEN, blank, folder, studio};
 use phyture::physics::Model;
-use phyture::studio::{By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, Steps, Studio, TraceWanted};
+use phyture::studio::{By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, Steps, Studio, SurfaceWanted, TraceWanted};
 use phyture::{Error, Result};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -138,6 +138,11 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
     assert!(typical.is_some_and(|typical| typical.error <= place.error));
     let depends = studio.dependence(PartWanted::Judged, 5)?;
     assert_eq!(depends.variables.first().map(|variable| variable.name), Some("vy"), "the side wind on the fin");
+    let over = |variables| studio.surface(&SurfaceWanted { part: PartWanted::Judged, channel: 5, variables });
+    let surface = over(Some(["vy".into(), "airspeed".into()]))?.surface.ok_or_else(|| Error::Undetermined("no surface".into()))?;
+    assert!(surface.share > depends.variables[0].share, "two tell more than one: {}", surface.share);
+    assert!(over(Some(["vy".into(), "no_such".into()])).is_err());
+    assert!(over(None)?.surface.is_some_and(|surface| surface.variables.contains(&"vy".to_owned())), "the pair that tells most");
     let all = studio.map(PartWanted::All, By::Regime)?;
     assert!(all.whole.n > map.whole.n && all.rows.iter().all(|row| row.rule.is_some()));
     // Peaks stay where little is drawn.

@@ -29,6 +29,9 @@ import { read } from './place.js';
  * @typedef {{ rows: MapRow[], whole: MapRow, deviation: PerChannel, basis: string, caution: string | null }} ErrorMap
  * @typedef {{ at: number, mean: number, ci95: [number, number] | null, n: number, blocks: number }} Bin
  * @typedef {{ variables: { name: string, unit: string, share: number, bins: Bin[] }[], basis: string }} Dependence
+ * @typedef {{ surface: { channel: string, variables: [string, string], edges: [number[], number[]], share: number,
+ *   cells: { column: number, row: number, mean: number, ci95: [number, number] | null, n: number, blocks: number, thin: boolean }[] } | null,
+ *   units: [string, string], names: string[] }} Surface
  * @typedef {{ share: number, ci95: [number, number] | null }} Share
  * @typedef {{ effect: string, meaning: string, channels: string[], held_out_mse_fall: Record<string, number>, p_value: number, stability: string,
  *   selection_frequency: number, indistinguishable: string[], coefficients: (Numeral & { expected?: [number, number], sign?: string })[],

@@ -23,7 +23,7 @@ function scale(low, high, from, to) {
  * @param {import('./api.js').Channel} channel
  */
 export function binned(bins, variable, channel) {
-  const [width, height, left, bottom, top] = [640, 320, 64, 46, 12];
+  const [width, height, left, bottom, top] = [520, 290, 60, 44, 12];
   // Bins that few blocks carry have intervals that would leave nothing of the rest.
   const ends = bins.flatMap((bin) => (bin.ci95 && bin.blocks >= 5 ? bin.ci95 : [bin.mean]));
   const [low, high] = [Math.min(0, ...ends), Math.max(0, ...ends)];
@@ -48,6 +48,38 @@ export function binned(bins, variable, channel) {
     s('polyline', { class: 'mean', points: bins.map((bin) => `${x(bin.at)},${y(bin.mean)}`).join(' ') }), bins.map(dot),
     s('text', { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' }, variable.unit === '1' ? variable.name : `${variable.name}, ${variable.unit}`),
     s('text', { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, `residual of ${channel.symbol}, ${channel.unit}`));
+}
+
+/**
+ * Means of the residual in cells of two variables: orange above the prediction, blue below; small where few blocks carry a cell.
+ * @param {import('./api.js').Surface} over
+ * @param {import('./api.js').Channel} channel
+ */
+export function surface(over, channel) {
+  const found = over.surface;
+  if (!found) return h('p', { class: 'quiet' }, 'These two variables hardly vary here.');
+  const [width, height, left, bottom, top] = [520, 330, 60, 44, 8];
+  const [xs, ys] = found.edges;
+  const x = scale(xs[0], xs[xs.length - 1], left, width - 12);
+  const y = scale(ys[0], ys[ys.length - 1], height - bottom, top);
+  const most = Math.max(...found.cells.filter((cell) => !cell.thin).map((cell) => Math.abs(cell.mean)), 1e-12);
+  const cell = (/** @type {typeof found.cells[number]} */ one) => {
+    const [x0, x1, y0, y1] = [x(xs[one.column]), x(xs[one.column + 1]), y(ys[one.row + 1]), y(ys[one.row])];
+    const shrink = one.thin ? 0.25 : 0;
+    const rect = s('rect', { class: one.mean < 0 ? 'below' : 'above', x: x0 + shrink * (x1 - x0) + 0.5, y: y0 + shrink * (y1 - y0) + 0.5, width: (1 - 2 * shrink) * (x1 - x0) - 1, height: (1 - 2 * shrink) * (y1 - y0) - 1,
+      'fill-opacity': Math.max(0.06, Math.min(1, Math.abs(one.mean) / most)).toFixed(3) },
+    s('title', {}, `${number(one.mean)} ${channel.unit} [${interval(one.ci95)}], ${one.n} rows in ${one.blocks} blocks`));
+    return rect;
+  };
+  const [atX, atY] = [ticks(xs[0], xs[xs.length - 1], 7), ticks(ys[0], ys[ys.length - 1], 5)];
+  const [textX, textY] = [tickText(atX), tickText(atY)];
+  const named = (/** @type {number} */ index) => (over.units[index] === '1' || over.units[index] === '' ? found.variables[index] : `${found.variables[index]}, ${over.units[index]}`);
+  return s('svg', { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `mean of measured − predicted ${channel.symbol} over ${found.variables.join(' and ')}` },
+    found.cells.map(cell),
+    atX.map((at) => s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, textX(at))),
+    atY.map((at) => s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, textY(at))),
+    s('text', { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' }, named(0)),
+    s('text', { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, named(1)));
 }
 
 /**

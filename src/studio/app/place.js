@@ -13,6 +13,7 @@
  * @property {'judged' | 'all'} part
  * @property {'manoeuvre' | 'regime'} by
  * @property {string} variable name; empty is the one on which the error depends most
+ * @property {string} second name of a second variable; empty is none
  */
 
 export const VIEWS = /** @type {const} */ (['compare', 'where', 'learn', 'model']);
@@ -43,6 +44,7 @@ export function read() {
     part: oneOf('part', /** @type {const} */ (['judged', 'all'])),
     by: oneOf('by', /** @type {const} */ (['manoeuvre', 'regime'])),
     variable: given.get('variable') ?? '',
+    second: given.get('second') ?? '',
   };
 }
 

@@ -2,7 +2,7 @@
 // Where it fails: the error by manoeuvre or regime and channel, and the residual over recorded variables.
 
 import { ask } from './api.js';
-import { binned } from './charts.js';
+import { binned, surface } from './charts.js';
 import { choice, h, toggle } from './dom.js';
 import { interval, measure, number, percent } from './format.js';
 import { go, read, slide } from './place.js';
@@ -12,8 +12,11 @@ import { go, read, slide } from './place.js';
  * @param {HTMLElement} into
  */
 export async function show(app, into) {
-  const { part, by, channel } = read();
+  const { part, by, channel, second, variable } = read();
   const [map, dependence] = await Promise.all([ask('map', { part, by }), ask('dependence', { part, channel })]);
+  const first = dependence.variables.find((/** @type {{ name: string }} */ one) => one.name === variable) ?? dependence.variables[0];
+  /** @type {import('./api.js').Surface | null} */
+  const over = second && first && second !== first.name ? await ask('surface', { part, channel, variables: [first.name, second] }) : null;
   if (read().view !== 'where') return;
   const parts = /** @type {[string, string][]} */ ([['judged', 'Flights no fit sees'], ['all', 'All flights']]);
   const kinds = /** @type {[string, string][]} */ ([['manoeuvre', 'Manoeuvre'], ['regime', 'Regime']]);
@@ -22,7 +25,7 @@ export async function show(app, into) {
       toggle('Part of the data', parts, part, (value) => slide({ part: /** @type {'judged' | 'all'} */ (value) })),
       toggle('Rows', kinds, by, (value) => slide({ by: /** @type {'manoeuvre' | 'regime'} */ (value) })),
       h('span', { class: 'gap' }), h('small', { class: 'quiet' }, 'click a cell: its worst ten seconds')),
-    h('div', { class: 'columns' }, table(app, map), variables(app, dependence)));
+    h('div', { class: 'columns' }, table(app, map), variables(app, dependence, over)));
 }
 
 /**
@@ -63,8 +66,9 @@ function table(app, map) {
 /**
  * @param {import('./main.js').App} app
  * @param {import('./api.js').Dependence} dependence
+ * @param {import('./api.js').Surface | null} over a second variable
  */
-function variables(app, dependence) {
+function variables(app, dependence, over) {
   const { channel, variable: wanted } = read();
   const of = app.overview.channels[channel];
   const variable = dependence.variables.find((one) => one.name === wanted) ?? dependence.variables[0];
@@ -78,8 +82,14 @@ function variables(app, dependence) {
       h('span', {}, one.name), h('span', { class: 'track' }, fill), h('span', {}, percent(one.share)));
   };
   return h('section', { class: 'card', 'aria-label': 'Residual over a variable' }, title,
-    h('div', { class: 'bar' }, choice('Variable', 'variable', options, variable.name, (value) => slide({ variable: value }))),
-    binned(variable.bins, variable, of),
-    h('p', { class: 'quiet' }, `Mean of measured − predicted in each bin with its 95 % interval from blocks of ten seconds; hollow where fewer than five blocks carry it. A flat line on zero is what a complete model leaves.`),
+    h('div', { class: 'bar' }, choice('Variable', 'variable', options, variable.name, (value) => slide({ variable: value })),
+      choice('and', 'second', [['', 'nothing more'], ...options.filter(([name]) => name !== variable.name).map(([name]) => /** @type {[string, string]} */ ([name, name]))], over ? read().second : '', (value) => slide({ second: value }))),
+    over ? surface(over, of) : binned(variable.bins, variable, of),
+    h('p', { class: 'quiet' }, over ? `Mean of measured − predicted in each cell, orange above zero, blue below, full at ${measure(largest(over), of.unit)}; small where fewer than five blocks carry it. Both together account for ${percent(over.surface?.share)} of the residual.` : `Mean of measured − predicted in each bin with its 95 % interval from blocks of ten seconds; hollow where fewer than five blocks carry it. A flat line on zero is what a complete model leaves.`),
     h('div', { class: 'shares', 'aria-label': 'Share of the residual by variable' }, dependence.variables.slice(0, 8).map(bar)));
+}
+
+/** @param {import('./api.js').Surface} over */
+function largest(over) {
+  return Math.max(0, ...(over.surface?.cells ?? []).filter((cell) => !cell.thin).map((cell) => Math.abs(cell.mean)));
 }

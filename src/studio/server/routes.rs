@@ -1,7 +1,7 @@
 //! Requests by name: JSON in, a method of the studio, JSON out.
 
 use super::Refusal;
-use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, TraceWanted};
+use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -71,6 +71,7 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
             let DependenceWanted { part, channel } = parsed(body)?;
             json(&studio.dependence(part, channel)?)
         }
+        "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
         "stop" => json(&studio.stop()),
