@@ -113,7 +113,10 @@ fn the_way_from_the_error_to_the_effect_in_a_browser() -> Result<()> {
     browser.reload()?;
     browser.wait("document.querySelector('#waterfall')")?;
     assert_eq!((browser.value("location.href")?, number(&browser, YAW)?), (address, shown), "the same after a reload");
-    assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
+    // A browser notes every refusal: that the file was there is the one of this test.
+    let mut faults = browser.faults()?;
+    faults.retain(|fault| !(fault.contains("/api/save ") && fault.contains("status of 409")));
+    assert_eq!(faults, Vec::<String>::new(), "the console is free of faults");
     let own = format!("http://127.0.0.1:{}/", server.port);
     let asked = browser.asked()?;
     let strange: Vec<&String> = asked.iter().filter(|url| !url.starts_with(&own) && !url.starts_with("data:")).collect();

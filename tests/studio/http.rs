@@ -36,7 +36,7 @@ pub fn request(port: u16, method: &str, path: &str, headers: &[(&str, &str)], bo
     // A server that refuses an oversized body may close before it has read it.
     let _ = stream.write_all(body);
     let mut reader = BufReader::new(stream);
-    let mut line = |reader: &mut BufReader<TcpStream>| -> Result<String> {
+    let line = |reader: &mut BufReader<TcpStream>| -> Result<String> {
         let mut line = String::new();
         reader.read_line(&mut line).map_err(fault())?;
         Ok(line.trim_end().to_owned())

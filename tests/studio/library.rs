@@ -163,6 +163,11 @@ fn a_search_stops_when_it_is_asked_to_and_another_may_begin() -> Result<()> {
     assert_eq!(studio.job().progress, Progress::Idle);
     studio.diagnose()?;
     assert!(matches!(studio.diagnose(), Err(Error::Config { .. })), "one at a time");
+    let begun = Instant::now();
+    while studio.job().stage.is_empty() {
+        assert!(begun.elapsed() < Duration::from_secs(120));
+        std::thread::sleep(Duration::from_millis(5));
+    }
     studio.stop();
     let begun = Instant::now();
     while studio.job().progress == Progress::Stopping {

@@ -1,14 +1,14 @@
 //! The studio in a browser on this machine: a server on 127.0.0.1 that hands out the app and answers its requests. It computes nothing.
 //!
 //! Whoever is asked for: static files by GET, requests by POST to `/api/NAME` with JSON. Every request has to name this server as its host and
-//! come from the server's own page ([`guard`]); those to `/api/` also carry the token that stands in the address which the program prints.
+//! come from the server's own page; those to `/api/` also carry the token that stands in the address which the program prints.
 
 mod fault;
 mod files;
 mod guard;
 mod routes;
 
-pub use fault::{FaultText, Refusal};
+use fault::Refusal;
 pub use guard::Token;
 
 use super::Studio;
