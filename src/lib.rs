@@ -24,6 +24,8 @@ pub mod protocol;
 pub mod report;
 pub mod sim;
 pub mod student_t;
+#[cfg(feature = "studio")]
+pub mod studio;
 pub mod suggest;
 pub mod tape;
 pub mod train;

@@ -47,9 +47,18 @@ pub struct Traced {
 /// # Errors
 /// [`crate::Error::Shape`] if the row has not one prediction a window, or a window lies outside its flight.
 pub fn stretches(flights: &[Flight], windows: &[Window], row: &Row) -> Result<Option<Stretches>> {
+    stretches_in(flights, windows, row, [true; 6])
+}
+
+/// As [`stretches`], by the error of some channels alone.
+///
+/// # Errors
+/// As [`stretches`].
+pub fn stretches_in(flights: &[Flight], windows: &[Window], row: &Row, channels: [bool; 6]) -> Result<Option<Stretches>> {
     check_row(row, windows)?;
     let measured = measured(flights, windows)?;
-    let scale: [Option<f64>; 6] = std::array::from_fn(|channel| Some(variation(&measured, channel)? / measured.len() as f64));
+    let of = |channel: usize| Some(variation(&measured, channel).filter(|_| channels[channel])? / measured.len() as f64);
+    let scale: [Option<f64>; 6] = std::array::from_fn(of);
     let channels = scale.iter().flatten().count() as f64;
     let blocks = Blocks::new(flights, windows);
     let mut sums = vec![BlockSum::default(); blocks.len()];

@@ -8,11 +8,12 @@ use crate::critique::{Comparison, Row, compare, finite_difference, floor, ridge}
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
-use crate::flight::{DataSet, Flight, Window};
+use crate::flight::{Accelerations, DataSet, Flight, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::linear::LinearConfig;
 use crate::physics::Model;
 use crate::tape::Threads;
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// Time that the networks together may take by default, s.
@@ -166,8 +167,9 @@ impl Contest<'_> {
             let training = crate::flight::windows::windows(&split.training, lags, 1);
             rows.push(ridge(&set.flights, &training, windows, &LinearConfig { lags, ..LinearConfig::default() })?);
         }
+        let judged_flights: BTreeSet<usize> = windows.iter().map(|window| window.flight).collect();
         for ((name, _), model) in self.models.iter().zip(models) {
-            let columns = set.flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
+            let columns = predicted(model, &set.flights, &judged_flights)?;
             let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
             rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
         }
@@ -198,6 +200,21 @@ impl Contest<'_> {
         }
         Ok(())
     }
+}
+
+/// What a model predicts of some flights; nothing of the others.
+fn predicted(model: &Model, flights: &[Flight], wanted: &BTreeSet<usize>) -> Result<Vec<Accelerations>> {
+    let one = |(index, flight): (usize, &Flight)| match wanted.contains(&index) {
+        true => model.predict(flight),
+        false => Ok(Accelerations::default()),
+    };
+    #[cfg(feature = "rayon")]
+    {
+        use rayon::prelude::*;
+        flights.par_iter().enumerate().map(one).collect()
+    }
+    #[cfg(not(feature = "rayon"))]
+    flights.iter().enumerate().map(one).collect()
 }
 
 impl Judged {

@@ -13,7 +13,7 @@ use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::tape::Threads;
 use phyture::{Error, Result};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -151,13 +151,18 @@ impl<'a> Context<'a> {
             self.tell_assumed(&model, path);
             return Ok(Some(model));
         }
-        // Beside a single log, or in the folder itself; a folder above may hold the model of something else.
-        let folder = if data.data.is_dir() { Some(data.data.as_path()) } else { data.data.parent() };
-        let Some(found) = folder.map(|folder| folder.join(MODEL_FILE)).filter(|found| found.is_file()) else { return Ok(None) };
+        let Some(found) = Self::model_file(data) else { return Ok(None) };
         let model = Model::read(&found)?;
         self.say(wrapped("model: ", &format!("{} (`{}`, {})", found.display(), model.name, model.vehicle_text())));
         self.tell_assumed(&model, &found);
         Ok(Some(model))
+    }
+
+    /// The model file that lies with the flights, if one does: beside a single log, or in the folder itself; a folder above may hold the model of
+    /// something else.
+    pub fn model_file(data: &Data) -> Option<PathBuf> {
+        let folder = if data.data.is_dir() { Some(data.data.as_path()) } else { data.data.parent() };
+        folder.map(|folder| folder.join(MODEL_FILE)).filter(|found| found.is_file())
     }
 
     fn tell_assumed(&self, model: &Model, path: &Path) {

@@ -72,11 +72,14 @@ impl Search<'_> {
         let mut gone: Vec<Judged> = Vec::new();
         let mut round = 1;
         let needed = loop {
+            self.options.watch.at(format!("round {round}: fitting {} effects together", optional(&model).len()))?;
             model = Point::fitted(&quick, model, STEPS[0])?;
+            self.options.watch.at(format!("round {round}: fitting them on more flights"))?;
             model = Point::fitted(&road.engine, model, STEPS[1])?;
             let places = optional(&model);
             let mut point = Point::at(&road.engine, model, places)?;
             point.choose_spreads(&road.engine);
+            self.options.watch.at(format!("round {round}: leaving out what no flight misses"))?;
             let Pruned { absent, needed, needless } = road.pruned(&point)?;
             gone.extend(needless);
             model = point.without(&road.engine, &absent).ok_or_else(undetermined)?;
@@ -85,6 +88,7 @@ impl Search<'_> {
             }
             round += 1;
         };
+        self.options.watch.at("numbers and intervals on all that is searched")?;
         Ok(Backward { fitted: self.refitted(&model, &[])?, needed, needless: gone })
     }
 

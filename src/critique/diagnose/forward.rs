@@ -65,6 +65,7 @@ impl Search<'_> {
                 return Ok((found, Vec::new()));
             }
             let open: Vec<&Candidate> = candidates.iter().filter(|candidate| model.effect(&candidate.id).is_none()).collect();
+            self.options.watch.at(format!("{}; trying {} effects beside the model", so_far(&found), open.len()))?;
             let (base, mut scored) = self.score(&model, &open)?;
             let mse = self.engine.mse(&base);
             if let Some(last) = found.last_mut() {
@@ -136,6 +137,7 @@ impl Search<'_> {
             scored.iter_mut().filter(|scored| scored.passes(self.largest_p) && scored.gain >= CONTENDER * largest).collect();
         contenders.sort_by(|left, right| right.gain.total_cmp(&left.gain));
         for contender in contenders.into_iter().take(MOST_CONTENDERS) {
+            self.options.watch.at(format!("finer numbers of {}", contender.candidate.id))?;
             let (refined, profiles) = self.refine(base, contender)?;
             contender.gains = gains(base, &refined);
             contender.gain = contender.gains.iter().sum();
@@ -231,6 +233,15 @@ impl Search<'_> {
             })
             .count();
         wins as f64 / RESAMPLES as f64
+    }
+}
+
+/// What a search has found by now, in words.
+fn so_far(found: &[Found]) -> String {
+    match found {
+        [] => "nothing found yet".into(),
+        [one] => format!("found {}", one.step.effect),
+        several => format!("found {} effects", several.len()),
     }
 }
 

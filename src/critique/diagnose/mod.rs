@@ -44,6 +44,7 @@ mod stepwise_stlsq;
 mod suggest;
 mod text;
 mod verdict;
+mod watch;
 
 pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
@@ -57,3 +58,4 @@ pub use signs::number_remark;
 pub use stepwise_stlsq::{Named, stepwise_and_stlsq};
 pub use text::LoopText;
 pub use verdict::{Outcome, diagnose};
+pub use watch::Watch;

@@ -2,6 +2,7 @@
 
 use super::engine::Engine;
 use super::significance::Flips;
+use super::watch::Watch;
 
 /// How a search is done.
 #[derive(Clone, Debug)]
@@ -13,11 +14,13 @@ pub struct Options {
     pub seed: u64,
     /// Candidates to leave out.
     pub without: Vec<String>,
+    /// Follows the search, and may stop it.
+    pub watch: Watch,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { max_effects: None, seed: 1, without: Vec::new() }
+        Self { max_effects: None, seed: 1, without: Vec::new(), watch: Watch::default() }
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Outcome {
 /// caller's to give, before.
 ///
 /// # Errors
-/// As [`Model::predict`].
+/// As [`Model::predict`]; [`Error::Interrupted`] where [`Options::watch`] stops it.
 pub fn diagnose(
     flights: &[Flight],
     model: &Model,
@@ -90,6 +90,7 @@ pub fn diagnose(
     let notes: Vec<String> = model.effects.iter().filter_map(Effect::caution).collect();
     let mut diagnosis = Diagnosis { method: Some(method), notes, ..Diagnosis::nothing(Verdict::Explained, String::new()) };
     let mut search = Search { engine, flips: Flips::new(count, options.seed), largest_p, options };
+    options.watch.at("fitting the model, and when the controls act")?;
     let (before, held) = search.timing(&base)?;
     if let Some(delay_s) = held {
         diagnosis.notes.push(format!(
@@ -163,6 +164,7 @@ impl Search<'_> {
         }
         let fitted = |found: &[Found]| found.last().map_or(before, |last| &last.model).clone();
         let unknown_of = |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
+        self.options.watch.at("what the rest of the error depends on")?;
         let mut unknown = unknown_of(&fitted(&found))?;
         let stand_ins = self.stand_ins(&found, before, &unknown)?;
         if !stand_ins.is_empty() {
@@ -170,6 +172,7 @@ impl Search<'_> {
             self.without(&mut found, &stand_ins, before)?;
             unknown = unknown_of(&fitted(&found))?;
         }
+        self.options.watch.at("intervals of the numbers")?;
         self.intervals(&mut found)?;
         Ok(Heard { found, left, unknown, roads, at_once: false })
     }
@@ -189,6 +192,7 @@ impl Search<'_> {
         let mut left: Vec<CandidateReport> = needless.iter().map(|judged| self.needless(judged)).collect();
         let refused: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.inapplicable.is_some()).collect();
         left.extend(self.reports(&refused, &[]));
+        self.options.watch.at("what the rest of the error depends on")?;
         let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
         let stand_ins = self.stand_ins(&found, ground.before, &unknown)?;
         if stand_ins.is_empty() {
@@ -209,6 +213,7 @@ impl Search<'_> {
         let begun = Instant::now();
         let Heard { mut found, left, unknown, roads, at_once } = heard;
         let Ground { flights, locked, part, block_s, .. } = *ground;
+        self.options.watch.at("what each effect does to flights that the search has not seen")?;
         let rungs = self.ladder(ground.before, &found, at_once)?;
         diagnosis.both_roads = at_once;
         diagnosis.notes.extend(roads);
@@ -221,6 +226,7 @@ impl Search<'_> {
         diagnosis.steps = found.into_iter().map(|found| found.step).collect();
         diagnosis.candidates = left;
         diagnosis.candidates.splice(0..0, diagnosis.steps.iter().map(accepted).collect::<Vec<_>>());
+        self.options.watch.at("confirming on flights that the search has not seen")?;
         diagnosis.locked = confirm(flights, &rungs, locked, part, block_s, self.engine.correlation)?;
         diagnosis.confirmation = diagnosis.confirmed();
         diagnosis.verdict = match (diagnosis.accepted.is_empty(), unknown.is_empty()) {

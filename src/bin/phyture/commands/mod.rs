@@ -15,6 +15,7 @@ mod parity;
 mod predict;
 mod rollout;
 mod simulate;
+mod studio;
 mod train;
 
 use crate::arguments::Common;
@@ -53,6 +54,7 @@ pub enum Command {
     Compare(compare::Args),
     Diagnose(diagnose::Args),
     Loop(diagnose::LoopArgs),
+    Studio(studio::Args),
     #[command(mut_arg("data", |data| data.required(false).required_unless_present("print_config")))]
     Train(train::Args),
     Predict(predict::Args),
@@ -84,6 +86,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Compare(args) => compare::run(&context, args),
         Command::Diagnose(args) => diagnose::run(&context, args),
         Command::Loop(args) => diagnose::run_loop(&context, args),
+        Command::Studio(args) => studio::run(&context, args),
         Command::Train(args) => train::run(&context, args),
         Command::Predict(args) => predict::run(&context, args),
         Command::Rollout(args) => rollout::run(&context, args),

@@ -1,0 +1,84 @@
+// @ts-check
+// Requests to the studio's server, and what they answer.
+
+import { read } from './place.js';
+
+/**
+ * @typedef {Record<'vx_dot' | 'vy_dot' | 'vz_dot' | 'wx_dot' | 'wy_dot' | 'wz_dot' | 'mean', number | null>} PerChannel
+ * @typedef {Record<string, [number, number] | null>} Intervals
+ * @typedef {{ symbol: string, name: string, unit: string }} Channel
+ * @typedef {{ name: string, manoeuvre: string, duration_s: number, step_s: number, derived: boolean, judges: number }} Flight
+ * @typedef {{ version: string, data: string, duration_s: number, parts_s: [number, number], judging: string, flights: Flight[], channels: Channel[],
+ *   variables: [string, string][], names: string[], signals: [string, string, string][], check: string, fault: boolean }} Overview
+ * @typedef {{ id: number, did: string, rmse: PerChannel | null, ci95: Intervals | null, calibrated: boolean }} Step
+ * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_first_half: boolean, saved: boolean, file: string | null,
+ *   file_changed: boolean }} Steps
+ * @typedef {{ name: string, meaning: string, value: number, unit: string, ci95: [number, number] | null, usual: [number, number] | null,
+ *   bounds: [number | null, number | null], slider: [number, number], fixed: boolean, by_flight: [number, number, number] | null }} Numeral
+ * @typedef {{ name: string, kind: string, meaning: string, formula: string, enabled: boolean, baseline: boolean, added_by: string | null,
+ *   numbers: Numeral[] }} Effect
+ * @typedef {{ name: string, vehicle: string, state: number, effects: Effect[], addable: [string, string][],
+ *   calibration: { condition_number: number, rows: number, last_change: number } | null, doubts: string[], toml: string | null }} Model
+ * @typedef {{ t: number[], measured: number[], predicted: number[], residual: number[], against: number[] | null, against_residual: (number | null)[] | null,
+ *   sticks: number[][], whole_s: [number, number], samples_per_point: number, rmse: number, against_rmse: number | null }} Trace
+ * @typedef {{ effect: string, number: string, value: number }} Moved
+ * @typedef {{ flight: number, channel: number, from_s: number | null, to_s: number | null, pixels: number, against: number | null,
+ *   moved?: Moved | null }} TraceWanted
+ * @typedef {{ rmse: number | null, ci95: [number, number] | null, relative: number | null, paper: string, ink: string }} MapCell
+ * @typedef {{ name: string, rule: string | null, n: number, blocks: number, cells: MapCell[] }} MapRow
+ * @typedef {{ rows: MapRow[], whole: MapRow, deviation: PerChannel, basis: string, caution: string | null }} ErrorMap
+ * @typedef {{ at: number, mean: number, ci95: [number, number] | null, n: number, blocks: number }} Bin
+ * @typedef {{ variables: { name: string, unit: string, share: number, bins: Bin[] }[], basis: string }} Dependence
+ * @typedef {{ surface: { channel: string, variables: [string, string], edges: [number[], number[]], share: number,
+ *   cells: { column: number, row: number, mean: number, ci95: [number, number] | null, n: number, blocks: number, thin: boolean }[] } | null,
+ *   units: [string, string], names: string[] }} Surface
+ * @typedef {{ share: number, ci95: [number, number] | null }} Share
+ * @typedef {{ effect: string, meaning: string, channels: string[], held_out_mse_fall: Record<string, number>, p_value: number, stability: string,
+ *   selection_frequency: number, indistinguishable: string[], coefficients: (Numeral & { expected?: [number, number], sign?: string })[],
+ *   parameters: { name: string, value: number, fixed: boolean, unit: string, profile?: [number, number] }[], would_tell_apart: string,
+ *   fault_of_log?: string, formula: string, rests_on_flight: string | null }} Found
+ * @typedef {{ effect: string, status: string, reason: string, note: string | null, p_value: number | null }} Candidate
+ * @typedef {{ verdict: string, summary: string, accepted: string[], steps: Found[], candidates: Candidate[], confirmation: string | null,
+ *   unknown: { channel: string, r2: number, shape: string, depends_on: { variable: string, share: number }[], suggested_formula: string | null }[] | null,
+ *   locked: { mse_fall: Record<string, [number, number, number]>, duration_s: number } | null,
+ *   worth?: { effect: string, share: Record<string, Share> }[], notes: string[], seconds: number }} Diagnosis
+ * @typedef {{ progress: 'idle' | 'running' | 'stopping' | 'stopped' | 'failed' | 'done', stage: string, seconds: number, error: string | null,
+ *   diagnosis: Diagnosis | null, state: number | null, state_did: string | null }} Job
+ * @typedef {{ message: string | null, at: number | null, caution: string | null }} FormulaCheck
+ * @typedef {{ file: string, kept: string | null, ledger: string | null }} Saved
+ */
+
+/** What the server refuses, or that it is gone. */
+export class Refused extends Error {
+  /**
+   * @param {number} status 0 where nobody answered
+   * @param {{ kind: string, message: string, at?: number | null }} text
+   */
+  constructor(status, text) {
+    super(text.message);
+    this.status = status;
+    this.kind = text.kind;
+    this.at = text.at ?? null;
+  }
+}
+
+/**
+ * @param {string} name
+ * @param {unknown} [body]
+ * @returns {Promise<any>}
+ */
+export async function ask(name, body = {}) {
+  let response;
+  try {
+    response = await fetch(`/api/${name}`, {
+      method: 'POST',
+      headers: { 'content-type': 'application/json', 'x-studio-token': read().token },
+      body: JSON.stringify(body),
+    });
+  } catch {
+    throw new Refused(0, { kind: 'gone', message: 'the studio does not answer: its program has ended' });
+  }
+  const answer = await response.json();
+  if (!response.ok) throw new Refused(response.status, answer.error);
+  return answer;
+}

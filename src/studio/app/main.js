@@ -1,0 +1,228 @@
+// @ts-check
+// The frame of the app: head, scores, banner, keys, and which view is shown.
+
+import { ask, Refused } from './api.js';
+import * as compare from './compare.js';
+import { keysHelp, saveDialog } from './dialog.js';
+import { byId, h } from './dom.js';
+import { number, percent, time } from './format.js';
+import * as learn from './learn.js';
+import * as model from './model.js';
+import { go, read, slide, VIEWS } from './place.js';
+import * as where from './where.js';
+
+/**
+ * What all views share.
+ * @typedef {object} App
+ * @property {import('./api.js').Overview} overview
+ * @property {import('./api.js').Steps} steps
+ * @property {(edit: object) => Promise<boolean>} edit changes the model; whether it was done
+ * @property {(name: string, body?: object) => Promise<boolean>} step undo, redo, go_to
+ * @property {(error: unknown) => void} failed tells a person
+ * @property {(text: string) => void} note says something in passing
+ * @property {() => Promise<void>} refresh asks for the history again and draws anew
+ */
+
+/**
+ * A view: builds itself into an element, and goes when it is told to.
+ * @typedef {{ show: (app: App, into: HTMLElement) => void | Promise<void>, hide?: () => void }} View
+ */
+
+/** @type {Record<string, View>} */
+const views = { compare, where, learn, model };
+const NAMES = { compare: 'Compare', where: 'Where it fails', learn: 'Learn', model: 'Model' };
+const THEME = 'phyture-theme';
+
+/** @type {App} */
+let app;
+let shown = '';
+let busy = 0;
+
+/** @param {unknown} error */
+function failed(error) {
+  const text = error instanceof Error ? error.message : String(error);
+  const status = error instanceof Refused ? error.status : -1;
+  const hint = {
+    0: 'Start it again with the same command and open the address that it prints. Model files that were saved are as they were.',
+    401: 'Open the address that the program printed; it carries a key that this page lacks.',
+    403: 'The studio was perhaps started anew: open the address that it printed last.',
+  }[status];
+  const close = h('button', { type: 'button', class: 'plain', 'aria-label': 'Close', onclick: () => byId('banner').replaceChildren() }, '×');
+  byId('banner').replaceChildren(h('div', { class: 'fault' }, h('p', {}, h('strong', {}, text), hint ? ` ${hint}` : ''), close));
+}
+
+/** @param {string} text */
+function note(text) {
+  byId('note').textContent = text;
+  byId('note').classList.add('on');
+  window.setTimeout(() => byId('note').classList.remove('on'), 4000);
+}
+
+/**
+ * Work that a person waits for.
+ * @template T
+ * @param {() => Promise<T>} work
+ * @returns {Promise<T | null>}
+ */
+async function working(work) {
+  busy += 1;
+  document.body.classList.add('busy');
+  try {
+    return await work();
+  } catch (error) {
+    failed(error);
+    return null;
+  } finally {
+    busy -= 1;
+    if (busy === 0) document.body.classList.remove('busy');
+  }
+}
+
+async function edit(/** @type {object} */ wanted) {
+  return step('edit', wanted);
+}
+
+async function step(/** @type {string} */ name, /** @type {object} */ body = {}) {
+  const steps = await working(() => ask(name, body));
+  if (!steps) {
+    // What was moved or switched on the page goes back to what is.
+    await draw();
+    return false;
+  }
+  byId('banner').replaceChildren();
+  app.steps = steps;
+  await draw();
+  return true;
+}
+
+async function refresh() {
+  app.steps = await ask('steps');
+  await draw();
+}
+
+function head() {
+  const { view } = read();
+  const { steps, overview } = app;
+  const tab = (/** @type {typeof VIEWS[number]} */ name, /** @type {number} */ index) =>
+    h('a', { href: '#', role: 'tab', 'data-view': name, 'aria-selected': String(name === view), title: `key ${index + 1}`,
+      onclick: (/** @type {Event} */ event) => { event.preventDefault(); go({ view: name }); } }, NAMES[name]);
+  const tool = (/** @type {string} */ id, /** @type {string} */ text, /** @type {string} */ title, /** @type {boolean} */ on, /** @type {() => void} */ act) =>
+    h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
+  byId('head').replaceChildren(
+    h('div', { class: 'brand' }, h('h1', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
+    h('nav', { role: 'tablist', 'aria-label': 'Views' }, VIEWS.map(tab)),
+    h('div', { class: 'tools' },
+      h('span', { class: 'state', title: steps.file ?? 'no model file yet' },
+        h('span', { id: 'state-name' }, steps.steps[steps.at].did), h('small', {}, steps.saved ? 'saved' : 'not saved')),
+      tool('undo', '↶ Undo', 'key u', steps.at > 0, () => step('undo')),
+      tool('redo', '↷ Redo', 'key r', steps.at < steps.steps.length - 1, () => step('redo')),
+      tool('save', 'Save …', 'key s', true, () => saveDialog(app)),
+      tool('theme', '◐', 'light or dark', true, theme),
+      tool('help', '?', 'keys', true, keysHelp)));
+}
+
+/** @param {string} path */
+function short(path) {
+  const parts = path.split(/[\\/]/).filter(Boolean);
+  return parts.slice(-2).join('/');
+}
+
+/** The six errors, on top of every view. */
+function score() {
+  const { channel } = read();
+  const { steps, overview } = app;
+  const [first, now] = [steps.steps[0], steps.steps[steps.at]];
+  const cell = (/** @type {import('./api.js').Channel} */ of, /** @type {number} */ index) => {
+    const key = /** @type {keyof import('./api.js').PerChannel} */ (of.symbol);
+    const [before, after] = [first.rmse?.[key] ?? null, now.rmse?.[key] ?? null];
+    const change = before && after !== null ? after / before - 1 : 0;
+    const fell = steps.at > 0 && Math.abs(change) >= 0.0005;
+    return h('button', { type: 'button', class: 'cell', 'data-channel': of.symbol, 'aria-pressed': String(index === channel),
+      title: `${of.name}, root mean square error on ${app.steps.judged_on}`, onclick: () => slide({ channel: index }) },
+      h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}`),
+      h('span', { class: 'rmse' }, number(after), h('small', {}, ` ${of.unit}`)),
+      h('span', { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' }, fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : ''));
+  };
+  byId('score').replaceChildren(h('h2', { class: 'unseen' }, 'Errors'), ...overview.channels.map(cell));
+}
+
+function warnings() {
+  const told = byId('banner').querySelector('.fault:not(.lasting)');
+  const lasting = [];
+  if (app.overview.fault) lasting.push(`The check of the log found a fault: ${app.overview.check}`);
+  if (app.steps.file_changed) lasting.push(`${app.steps.file} was changed by another program since the studio read or wrote it. The model here is as it was; save it under another name, or start the studio again to read the file.`);
+  byId('banner').querySelectorAll('.lasting').forEach((old) => old.remove());
+  lasting.forEach((text) => byId('banner').append(h('div', { class: 'fault lasting' }, h('p', {}, text))));
+  return told;
+}
+
+async function draw() {
+  const { view } = read();
+  head();
+  score();
+  warnings();
+  if (shown && shown !== view) views[shown].hide?.();
+  shown = view;
+  document.title = `${NAMES[view]} · phyture studio`;
+  await working(async () => views[view].show(app, byId('main')));
+}
+
+function theme() {
+  const dark = document.documentElement.dataset.theme
+    ? document.documentElement.dataset.theme === 'dark'
+    : matchMedia('(prefers-color-scheme: dark)').matches;
+  document.documentElement.dataset.theme = dark ? 'light' : 'dark';
+  localStorage.setItem(THEME, document.documentElement.dataset.theme);
+  draw();
+}
+
+/** @param {KeyboardEvent} event */
+function key(event) {
+  const target = /** @type {HTMLElement} */ (event.target);
+  if (target.closest('input, textarea, select, dialog') || event.altKey) return;
+  const control = event.ctrlKey || event.metaKey;
+  const letter = event.key.toLowerCase();
+  if (control && letter !== 'z') return;
+  const { flight } = read();
+  const tab = VIEWS[Number(letter) - 1];
+  const acts = {
+    u: () => step('undo'), r: () => step('redo'), s: () => saveDialog(app), '?': keysHelp,
+    z: () => control && step(event.shiftKey ? 'redo' : 'undo'),
+    '[': () => slide({ flight: Math.max(0, flight - 1), from: null, to: null }),
+    ']': () => slide({ flight: Math.min(app.overview.flights.length - 1, flight + 1), from: null, to: null }),
+  };
+  const act = tab ? () => go({ view: tab }) : /** @type {Record<string, () => void>} */ (acts)[letter];
+  if (act) {
+    event.preventDefault();
+    act();
+  } else if (read().view === 'compare') {
+    compare.key(event);
+  }
+}
+
+async function start() {
+  const chosen = localStorage.getItem(THEME);
+  if (chosen) document.documentElement.dataset.theme = chosen;
+  try {
+    const [overview, steps] = await Promise.all([ask('overview'), ask('steps')]);
+    app = { overview, steps, edit, step, failed, note, refresh };
+  } catch (error) {
+    byId('main').replaceChildren(h('p', { class: 'quiet' }, 'Nothing can be shown.'));
+    failed(error);
+    return;
+  }
+  overviewNote();
+  window.addEventListener('hashchange', () => draw());
+  window.addEventListener('keydown', key);
+  // Another tab may have changed the model, or another program its file.
+  window.addEventListener('focus', () => working(refresh));
+  await draw();
+  document.body.dataset.ready = 'yes';
+}
+
+function overviewNote() {
+  const { overview } = app;
+  byId('score').title = `${overview.flights.length} flights, ${time(overview.duration_s)}; judged on ${overview.judging} (${time(overview.parts_s[1])})`;
+}
+
+start();

@@ -1,0 +1,79 @@
+// @ts-check
+// Where a person is: the view and what it shows, kept in the address, so that a reload or a second tab shows the same.
+
+/**
+ * @typedef {object} Place
+ * @property {string} token secret of the running studio
+ * @property {'compare' | 'where' | 'learn' | 'model'} view
+ * @property {number} flight index
+ * @property {number} channel index
+ * @property {number | null} from s
+ * @property {number | null} to s
+ * @property {number | null} against state that is laid beside
+ * @property {'judged' | 'all'} part
+ * @property {'manoeuvre' | 'regime'} by
+ * @property {string} variable name; empty is the one on which the error depends most
+ * @property {string} second name of a second variable; empty is none
+ */
+
+export const VIEWS = /** @type {const} */ (['compare', 'where', 'learn', 'model']);
+
+/** @returns {Place} */
+export function read() {
+  const given = new URLSearchParams(location.hash.slice(1));
+  const whole = (/** @type {string} */ key) => Math.max(0, Math.trunc(Number(given.get(key) ?? 0)) || 0);
+  const real = (/** @type {string} */ key) => {
+    const text = given.get(key);
+    return text === null || text === '' || !Number.isFinite(Number(text)) ? null : Number(text);
+  };
+  /**
+   * @template {string} T
+   * @param {string} key
+   * @param {readonly T[]} known
+   * @returns {T}
+   */
+  const oneOf = (key, known) => known.find((name) => name === given.get(key)) ?? known[0];
+  return {
+    token: given.get('token') ?? '',
+    view: oneOf('view', VIEWS),
+    flight: whole('flight'),
+    channel: Math.min(5, whole('channel')),
+    from: real('from'),
+    to: real('to'),
+    against: real('against'),
+    part: oneOf('part', /** @type {const} */ (['judged', 'all'])),
+    by: oneOf('by', /** @type {const} */ (['manoeuvre', 'regime'])),
+    variable: given.get('variable') ?? '',
+    second: given.get('second') ?? '',
+  };
+}
+
+/**
+ * The address with some of it changed.
+ * @param {Partial<Place>} change
+ */
+function hash(change) {
+  const next = { ...read(), ...change };
+  const text = new URLSearchParams();
+  for (const [key, value] of Object.entries(next)) {
+    if (value !== null && value !== '') text.set(key, String(value));
+  }
+  return `#${text}`;
+}
+
+/**
+ * Goes somewhere: a step that the browser's back button takes back.
+ * @param {Partial<Place>} change
+ */
+export function go(change) {
+  location.hash = hash(change);
+}
+
+/**
+ * The same without a step for the back button: for moving about in one picture.
+ * @param {Partial<Place>} change
+ */
+export function slide(change) {
+  history.replaceState(null, '', hash(change));
+  window.dispatchEvent(new HashChangeEvent('hashchange'));
+}

@@ -1,0 +1,148 @@
+//! A search for missing effects that runs beside everything else: begun, watched, stopped, heard. One at a time.
+
+use super::history::State;
+use super::{Studio, fault, held};
+use crate::critique::diagnose::{Diagnosis, Options, Outcome, Watch};
+use crate::error::{Error, Result};
+use crate::physics::Model;
+use crate::workflow::{SearchTask, convention_fault};
+use serde::Serialize;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// How far it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Progress {
+    /// Nothing was begun.
+    Idle,
+    /// It runs.
+    Running,
+    /// It was asked to stop, and does so at its next step.
+    Stopping,
+    /// It was stopped.
+    Stopped,
+    /// It could not be done.
+    Failed,
+    /// It is done.
+    Done,
+}
+
+/// A search as it stands.
+#[derive(Clone, Debug, Serialize)]
+pub struct JobText {
+    /// How far it is.
+    pub progress: Progress,
+    /// What it is at.
+    pub stage: String,
+    /// Time since it was begun, s; until it ended, if it has.
+    pub seconds: f64,
+    /// Why it failed.
+    pub error: Option<String>,
+    /// What it found.
+    pub diagnosis: Option<Diagnosis>,
+    /// The state that it searched.
+    pub state: Option<u64>,
+    /// What was done to come to that state.
+    pub state_did: Option<String>,
+}
+
+/// A search that runs or has run.
+pub(super) struct Job {
+    watch: Watch,
+    begun: Instant,
+    state: Arc<State>,
+    /// After how long, s, and with what.
+    ended: Option<(f64, Result<Heard>)>,
+}
+
+/// What a search found, and the model with it.
+type Heard = (Arc<Diagnosis>, Arc<Model>);
+
+impl Studio {
+    /// Begins a search for what the present state lacks.
+    ///
+    /// # Errors
+    /// [`Error::Config`] while another runs; [`Error::Undetermined`] where no thread can be had.
+    pub fn diagnose(self: &Arc<Self>) -> Result<JobText> {
+        {
+            let mut job = held(&self.job);
+            if job.as_ref().is_some_and(|job| job.ended.is_none()) {
+                return Err(fault("diagnose", "a search that runs", "none; stop it first"));
+            }
+            let watch = Watch::default();
+            let state = self.now();
+            let (studio, own) = (Arc::clone(self), (watch.clone(), Arc::clone(&state)));
+            let begun = Instant::now();
+            let run = move || {
+                // A fault in the search is told like any other failure; the studio goes on.
+                let searched = catch_unwind(AssertUnwindSafe(|| studio.search(&own.1.model, own.0)));
+                let broken =
+                    || Err(Error::Undetermined("the search broke off; its message is on the terminal of the studio".into()));
+                let outcome = searched.unwrap_or_else(|_| broken());
+                let outcome = outcome.map(|outcome| (Arc::new(outcome.diagnosis), Arc::new(outcome.model)));
+                if let Some(job) = held(&studio.job).as_mut() {
+                    job.ended = Some((begun.elapsed().as_secs_f64(), outcome));
+                }
+            };
+            let started = std::thread::Builder::new().name("search".into()).spawn(run);
+            started.map_err(|error| Error::Undetermined(format!("the search cannot be started: {error}")))?;
+            *job = Some(Job { watch, begun, state, ended: None });
+        }
+        Ok(self.job())
+    }
+
+    fn search(&self, model: &Model, watch: Watch) -> Result<Outcome> {
+        let data_sha256 = self.set.source.sha256.clone();
+        if self.check.fault {
+            return Ok(Outcome { diagnosis: convention_fault(&self.check, data_sha256), model: model.clone() });
+        }
+        let options = Options { seed: self.seed, watch, ..Options::default() };
+        SearchTask { set: &self.set, split: &self.split, data_sha256, options, explainable: None }.diagnose(model)
+    }
+
+    /// Asks the search to stop.
+    pub fn stop(&self) -> JobText {
+        if let Some(job) = held(&self.job).as_ref() {
+            job.watch.stop();
+        }
+        self.job()
+    }
+
+    /// The search as it stands.
+    pub fn job(&self) -> JobText {
+        let job = held(&self.job);
+        let nothing = JobText {
+            progress: Progress::Idle,
+            stage: String::new(),
+            seconds: 0.0,
+            error: None,
+            diagnosis: None,
+            state: None,
+            state_did: None,
+        };
+        let Some(job) = job.as_ref() else { return nothing };
+        let (progress, error, diagnosis) = match &job.ended {
+            None if job.watch.is_stopped() => (Progress::Stopping, None, None),
+            None => (Progress::Running, None, None),
+            Some((_, Ok((diagnosis, _)))) => (Progress::Done, None, Some(Diagnosis::clone(diagnosis))),
+            Some((_, Err(Error::Interrupted { .. }))) => (Progress::Stopped, None, None),
+            Some((_, Err(error))) => (Progress::Failed, Some(error.to_string()), None),
+        };
+        JobText {
+            progress,
+            stage: job.watch.stage(),
+            seconds: job.ended.as_ref().map_or_else(|| job.begun.elapsed().as_secs_f64(), |ended| ended.0),
+            error,
+            diagnosis,
+            state: Some(job.state.id),
+            state_did: Some(job.state.did.clone()),
+        }
+    }
+
+    /// What the last search found, and the model with it.
+    pub(super) fn outcome(&self) -> Option<Heard> {
+        held(&self.job).as_ref().and_then(|job| Some(job.ended.as_ref()?.1.as_ref().ok()?.clone()))
+    }
+}

@@ -1,0 +1,96 @@
+//! Requests by name: JSON in, a method of the studio, JSON out.
+
+use super::Refusal;
+use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// A state by identifier, or the present one.
+#[derive(Deserialize)]
+struct OfState {
+    #[serde(default)]
+    state: Option<u64>,
+}
+
+/// A state by identifier.
+#[derive(Deserialize)]
+struct ToState {
+    state: u64,
+}
+
+#[derive(Deserialize)]
+struct MapWanted {
+    #[serde(default)]
+    part: PartWanted,
+    #[serde(default)]
+    by: By,
+}
+
+#[derive(Deserialize)]
+struct DependenceWanted {
+    #[serde(default)]
+    part: PartWanted,
+    channel: usize,
+}
+
+#[derive(Deserialize)]
+struct FormulaWanted {
+    owner: Owner,
+    formula: String,
+}
+
+#[derive(Deserialize)]
+struct FileWanted {
+    path: String,
+    #[serde(default)]
+    overwrite: bool,
+}
+
+/// Answers a request.
+pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Vec<u8>, Refusal> {
+    match name {
+        "overview" => json(&studio.overview()),
+        "steps" => json(&studio.steps()?),
+        "undo" => json(&studio.undo()?),
+        "redo" => json(&studio.redo()?),
+        "go_to" => json(&studio.go_to(parsed::<ToState>(body)?.state)?),
+        "model" => json(&studio.model(parsed::<OfState>(body)?.state)?),
+        "edit" => json(&studio.edit(&parsed::<Edit>(body)?)?),
+        "check_formula" => {
+            let FormulaWanted { owner, formula } = parsed(body)?;
+            json(&studio.check_formula(&owner, &formula))
+        }
+        "trace" => json(&studio.trace(&parsed::<TraceWanted>(body)?)?),
+        "map" => {
+            let MapWanted { part, by } = parsed(body)?;
+            json(&studio.map(part, by)?)
+        }
+        "place" => json(&studio.place(&parsed::<PlaceWanted>(body)?)?),
+        "dependence" => {
+            let DependenceWanted { part, channel } = parsed(body)?;
+            json(&studio.dependence(part, channel)?)
+        }
+        "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
+        "diagnose" => json(&studio.diagnose()?),
+        "job" => json(&studio.job()),
+        "stop" => json(&studio.stop()),
+        "save" => {
+            let FileWanted { path, overwrite } = parsed(body)?;
+            json(&studio.save(&path, overwrite)?)
+        }
+        "save_page" => {
+            let FileWanted { path, overwrite } = parsed(body)?;
+            json(&studio.save_page(&path, overwrite)?)
+        }
+        _ => Err(Refusal::new(404, "path", format!("there is no request `{name}`"))),
+    }
+}
+
+fn parsed<T: DeserializeOwned>(body: &[u8]) -> Result<T, Refusal> {
+    serde_json::from_slice(body).map_err(|error| Refusal::new(400, "json", format!("the body is not what was expected: {error}")))
+}
+
+fn json(value: &impl Serialize) -> Result<Vec<u8>, Refusal> {
+    serde_json::to_vec(value).map_err(|error| Refusal::new(500, "json", error.to_string()))
+}

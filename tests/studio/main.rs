@@ -1,0 +1,9 @@
+//! The studio: as a library, over a real socket, and in a real browser where there is one.
+#![cfg(feature = "studio")]
+
+mod browser;
+mod http;
+mod library;
+mod server;
+mod support;
+mod webdriver;
