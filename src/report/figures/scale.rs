@@ -62,7 +62,7 @@ impl Scale {
             // No minus before nothing.
             let value = if value.abs() < 0.5 * step { 0.0 } else { value };
             let size = self.low.abs().max(self.high.abs());
-            if size >= 1e5 || size < 1e-3 { format!("{value:.1e}") } else { format!("{value:.decimals$}").replace('-', "−") }
+            if !(1e-3..1e5).contains(&size) { format!("{value:.1e}") } else { format!("{value:.decimals$}").replace('-', "−") }
         };
         (first..=last).map(|number| number as f64 * step).map(|value| (value, written(value))).collect()
     }
