@@ -100,7 +100,8 @@ fn nothing_is_wider_than_a_narrow_screen() -> Result<()> {
     let title = found.split("<title>").nth(1).and_then(|rest| rest.split('<').next()).unwrap_or_default();
     let numbers: Vec<usize> = title.split(' ').filter_map(|number| number.parse().ok()).collect();
     let [scroll, client, panels, buttons] = numbers[..] else { return Err(Error::Undetermined(format!("no answer: {title}"))) };
-    assert_eq!((client, panels, buttons), (420, 12, 1), "the page and its script ran");
+    // A scroll bar may take some of the width.
+    assert!((400..=420).contains(&client) && (panels, buttons) == (12, 1), "the page and its script ran: {title}");
     assert!(scroll <= client, "the page is {scroll} pixels wide on {client}");
     Ok(())
 }

@@ -336,7 +336,7 @@ mod tests {
         ]));
         assert_eq!(html.matches("<script").count(), 1, "the page's own");
         assert!(html.contains("<title>A &lt;b&gt; &amp; &quot;c&quot;</title>") && html.contains("<h2>&lt;i&gt;s&lt;/i&gt;</h2>"));
-        assert_eq!(html.matches("&lt;/script&gt;&lt;script&gt;alert(1)").count(), 20);
+        assert_eq!(html.matches("&lt;/script&gt;&lt;script&gt;alert(1)").count(), 21);
     }
 
     #[test]

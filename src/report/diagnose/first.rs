@@ -33,18 +33,19 @@ pub(super) fn summary(diagnoses: &[Diagnosis]) -> Vec<String> {
             }
         }
         out.extend(diagnosis.locked.as_ref().and_then(removable));
-        if is_found(diagnosis) {
-            let grown = diagnosis.locked.iter().flat_map(|locked| &locked.mse_fall);
-            let grown: Vec<String> = grown
-                .filter(|(_, fall)| matches!(Told::of(**fall), Told::Grows))
-                .map(|(channel, fall)| change(channel, *fall))
-                .collect();
-            if !grown.is_empty() {
-                out.push(format!("Caution, on the same flights the squared error of {}.", grown.join("; ")));
-            }
-        }
+        out.extend(told_besides(diagnosis));
     }
     out
+}
+
+/// How errors changed on unseen flights where the verdict does not say it: what grew beside what was confirmed; all of it where nothing was.
+fn told_besides(diagnosis: &Diagnosis) -> Option<String> {
+    let locked = diagnosis.locked.as_ref()?;
+    let wanted = |fall: [f64; 3]| !is_found(diagnosis) || Told::of(fall) == Told::Grows;
+    let changes = locked.mse_fall.iter().filter(|(_, fall)| wanted(**fall)).map(|(channel, fall)| change(channel, *fall));
+    let changes = changes.collect::<Vec<_>>().join("; ");
+    let new = !changes.is_empty() && !diagnosis.summary.contains(&changes);
+    new.then(|| format!("Mean squared error on {}: {changes}.", unseen(locked.kept, locked.duration_s)))
 }
 
 fn is_found(diagnosis: &Diagnosis) -> bool {

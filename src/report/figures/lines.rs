@@ -206,26 +206,15 @@ mod tests {
     use super::super::tests::panels;
     use super::*;
 
+    /// Points of a path: numbers are parted by blanks, signs and commands; two make a point.
     fn points_of(path: &str) -> usize {
-        path.split(" d=\"M").nth(1).map_or(0, |d| {
-            let d = d.split('"').next().unwrap_or_default();
-            let numbers = d
-                .split(['M', 'l'])
-                .flat_map(|part| part.split(' '))
-                .flat_map(|part| part.split_inclusive(|c: char| c.is_ascii_digit()));
-            numbers.count();
-            // Numbers are parted by blanks, signs and commands; two make a point.
-            let mut count = 0;
-            let mut inside = false;
-            for character in d.chars() {
-                match character {
-                    '0'..='9' if !inside => (count, inside) = (count + 1, true),
-                    '0'..='9' => {}
-                    _ => inside = false,
-                }
-            }
-            count / 2
-        })
+        let d = path.split(" d=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap_or_default();
+        let (mut count, mut inside) = (0, false);
+        for digit in d.chars().map(|character| character.is_ascii_digit()) {
+            count += usize::from(digit && !inside);
+            inside = digit;
+        }
+        count / 2
     }
 
     #[test]

@@ -32,22 +32,67 @@ export function binned(bins, variable, channel) {
   const x = scale(first, last, left + 14, width - 14);
   const y = scale(low - room, high + room, height - bottom, top);
   const within = (/** @type {number} */ value) => Math.min(height - bottom, Math.max(top, y(value)));
-  const dot = (/** @type {import('./api.js').Bin} */ bin) => s('g', {},
-    bin.ci95 ? s('line', { class: 'whisker', x1: x(bin.at), x2: x(bin.at), y1: within(bin.ci95[0]), y2: within(bin.ci95[1]) }) : null,
-    s('circle', { class: bin.blocks < 5 ? 'thin' : 'dot', cx: x(bin.at), cy: y(bin.mean), r: 4 },
-      s('title', {}, `${variable.name} ${measure(bin.at, variable.unit)}: ${measure(bin.mean, channel.unit)} [${interval(bin.ci95)}], ${bin.n} samples in ${bin.blocks} blocks`)));
+  const dot = (/** @type {import('./api.js').Bin} */ bin) =>
+    s(
+      'g',
+      {},
+      bin.ci95
+        ? s('line', {
+            class: 'whisker',
+            x1: x(bin.at),
+            x2: x(bin.at),
+            y1: within(bin.ci95[0]),
+            y2: within(bin.ci95[1]),
+          })
+        : null,
+      s(
+        'circle',
+        { class: bin.blocks < 5 ? 'thin' : 'dot', cx: x(bin.at), cy: y(bin.mean), r: 4 },
+        s(
+          'title',
+          {},
+          `${variable.name} ${measure(bin.at, variable.unit)}: ${measure(bin.mean, channel.unit)} [${interval(bin.ci95)}], ${bin.n} samples in ${bin.blocks} blocks`,
+        ),
+      ),
+    );
   const [atX, atY] = [ticks(first, last, 7), ticks(low - room, high + room, 5)];
   const [textX, textY] = [tickText(atX), tickText(atY)];
-  const across = atX.map((at) => s('g', {}, s('line', { class: 'grid', x1: x(at), x2: x(at), y1: top, y2: height - bottom }),
-    s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, textX(at))));
-  const up = atY.map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width - 4, y1: y(at), y2: y(at) }),
-    s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, textY(at))));
+  const across = atX.map((at) =>
+    s(
+      'g',
+      {},
+      s('line', { class: 'grid', x1: x(at), x2: x(at), y1: top, y2: height - bottom }),
+      s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, textX(at)),
+    ),
+  );
+  const up = atY.map((at) =>
+    s(
+      'g',
+      {},
+      s('line', { class: 'grid', x1: left, x2: width - 4, y1: y(at), y2: y(at) }),
+      s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, textY(at)),
+    ),
+  );
   const title = `mean of measured − predicted ${channel.symbol} over ${variable.name}`;
-  return s('svg', { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': title },
-    across, up, s('line', { class: 'zero', x1: left, x2: width - 4, y1: y(0), y2: y(0) }),
-    s('polyline', { class: 'mean', points: bins.map((bin) => `${x(bin.at)},${y(bin.mean)}`).join(' ') }), bins.map(dot),
-    s('text', { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' }, variable.unit === '1' ? variable.name : `${variable.name}, ${variable.unit}`),
-    s('text', { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, `residual of ${channel.symbol}, ${channel.unit}`));
+  return s(
+    'svg',
+    { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': title },
+    across,
+    up,
+    s('line', { class: 'zero', x1: left, x2: width - 4, y1: y(0), y2: y(0) }),
+    s('polyline', { class: 'mean', points: bins.map((bin) => `${x(bin.at)},${y(bin.mean)}`).join(' ') }),
+    bins.map(dot),
+    s(
+      'text',
+      { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' },
+      variable.unit === '1' ? variable.name : `${variable.name}, ${variable.unit}`,
+    ),
+    s(
+      'text',
+      { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' },
+      `residual of ${channel.symbol}, ${channel.unit}`,
+    ),
+  );
 }
 
 /**
@@ -66,20 +111,48 @@ export function surface(over, channel) {
   const cell = (/** @type {typeof found.cells[number]} */ one) => {
     const [x0, x1, y0, y1] = [x(xs[one.column]), x(xs[one.column + 1]), y(ys[one.row + 1]), y(ys[one.row])];
     const shrink = one.thin ? 0.25 : 0;
-    const rect = s('rect', { class: one.mean < 0 ? 'below' : 'above', x: x0 + shrink * (x1 - x0) + 0.5, y: y0 + shrink * (y1 - y0) + 0.5, width: (1 - 2 * shrink) * (x1 - x0) - 1, height: (1 - 2 * shrink) * (y1 - y0) - 1,
-      'fill-opacity': Math.max(0.06, Math.min(1, Math.abs(one.mean) / most)).toFixed(3) },
-    s('title', {}, `${number(one.mean)} ${channel.unit} [${interval(one.ci95)}], ${one.n} rows in ${one.blocks} blocks`));
+    const rect = s(
+      'rect',
+      {
+        class: one.mean < 0 ? 'below' : 'above',
+        x: x0 + shrink * (x1 - x0) + 0.5,
+        y: y0 + shrink * (y1 - y0) + 0.5,
+        width: (1 - 2 * shrink) * (x1 - x0) - 1,
+        height: (1 - 2 * shrink) * (y1 - y0) - 1,
+        'fill-opacity': Math.max(0.06, Math.min(1, Math.abs(one.mean) / most)).toFixed(3),
+      },
+      s(
+        'title',
+        {},
+        `${number(one.mean)} ${channel.unit} [${interval(one.ci95)}], ${one.n} rows in ${one.blocks} blocks`,
+      ),
+    );
     return rect;
   };
   const [atX, atY] = [ticks(xs[0], xs[xs.length - 1], 7), ticks(ys[0], ys[ys.length - 1], 5)];
   const [textX, textY] = [tickText(atX), tickText(atY)];
-  const named = (/** @type {number} */ index) => (over.units[index] === '1' || over.units[index] === '' ? found.variables[index] : `${found.variables[index]}, ${over.units[index]}`);
-  return s('svg', { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `mean of measured − predicted ${channel.symbol} over ${found.variables.join(' and ')}` },
+  const named = (/** @type {number} */ index) =>
+    over.units[index] === '1' || over.units[index] === ''
+      ? found.variables[index]
+      : `${found.variables[index]}, ${over.units[index]}`;
+  return s(
+    'svg',
+    {
+      class: 'chart',
+      viewBox: `0 0 ${width} ${height}`,
+      role: 'img',
+      'aria-label': `mean of measured − predicted ${channel.symbol} over ${found.variables.join(' and ')}`,
+    },
     found.cells.map(cell),
     atX.map((at) => s('text', { x: x(at), y: height - bottom + 16, 'text-anchor': 'middle' }, textX(at))),
     atY.map((at) => s('text', { x: left - 6, y: y(at) + 4, 'text-anchor': 'end' }, textY(at))),
     s('text', { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' }, named(0)),
-    s('text', { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' }, named(1)));
+    s(
+      'text',
+      { class: 'name', transform: `translate(14 ${(height - bottom) / 2}) rotate(-90)`, 'text-anchor': 'middle' },
+      named(1),
+    ),
+  );
 }
 
 /**
@@ -92,12 +165,18 @@ export function range(value, ci95, usual) {
   const places = [value, 0, ...(ci95 ?? []), ...(usual ?? [])];
   const x = scale(Math.min(...places), Math.max(...places), 6, 154);
   const says = `${number(value)}${ci95 ? `, interval ${interval(ci95)}` : ''}${usual ? `, usually ${interval(usual)}` : ''}`;
-  return s('svg', { class: 'range', viewBox: '0 0 160 18', role: 'img', 'aria-label': says },
-    s('title', {}, says), s('line', { class: 'grid', x1: 4, x2: 156, y1: 9, y2: 9 }),
-    usual ? s('rect', { class: 'usual', x: x(usual[0]), width: Math.max(2, x(usual[1]) - x(usual[0])), y: 4, height: 10 }) : null,
+  return s(
+    'svg',
+    { class: 'range', viewBox: '0 0 160 18', role: 'img', 'aria-label': says },
+    s('title', {}, says),
+    s('line', { class: 'grid', x1: 4, x2: 156, y1: 9, y2: 9 }),
+    usual
+      ? s('rect', { class: 'usual', x: x(usual[0]), width: Math.max(2, x(usual[1]) - x(usual[0])), y: 4, height: 10 })
+      : null,
     s('line', { class: 'zero', x1: x(0), x2: x(0), y1: 2, y2: 16 }),
     ci95 ? s('line', { class: 'whisker', x1: x(ci95[0]), x2: x(ci95[1]), y1: 9, y2: 9 }) : null,
-    s('circle', { class: 'dot', cx: x(value), cy: 9, r: 3.5 }));
+    s('circle', { class: 'dot', cx: x(value), cy: 9, r: 3.5 }),
+  );
 }
 
 /**
@@ -119,17 +198,66 @@ export function waterfall(channel, steps, chosen, choose) {
   const bar = (/** @type {import('./api.js').Step} */ step, /** @type {number} */ index) => {
     const x = left + index * pitch + 0.15 * pitch;
     const end = ends[index];
-    return s('g', {}, s('title', {}, `${step.did}: ${measure(values[index], channel.unit)} [${interval(end)}]`),
-      s('rect', { class: index === shown.length - 1 ? 'bar now' : 'bar', x, width: 0.7 * pitch, y: y(values[index]), height: height - bottom - y(values[index]) }),
-      end ? s('line', { class: 'whisker', x1: x + 0.35 * pitch, x2: x + 0.35 * pitch, y1: y(end[0]), y2: y(end[1]) }) : null,
-      s('text', { x: x + 0.35 * pitch, y: height - 5, 'text-anchor': 'middle' }, String(steps.indexOf(step) + 1)));
+    return s(
+      'g',
+      {},
+      s('title', {}, `${step.did}: ${measure(values[index], channel.unit)} [${interval(end)}]`),
+      s('rect', {
+        class: index === shown.length - 1 ? 'bar now' : 'bar',
+        x,
+        width: 0.7 * pitch,
+        y: y(values[index]),
+        height: height - bottom - y(values[index]),
+      }),
+      end
+        ? s('line', { class: 'whisker', x1: x + 0.35 * pitch, x2: x + 0.35 * pitch, y1: y(end[0]), y2: y(end[1]) })
+        : null,
+      s('text', { x: x + 0.35 * pitch, y: height - 5, 'text-anchor': 'middle' }, String(steps.indexOf(step) + 1)),
+    );
   };
   const places = ticks(0, high, 3);
   const text = tickText(places);
-  const grid = places.map((at) => s('g', {}, s('line', { class: 'grid', x1: left, x2: width, y1: y(at), y2: y(at) }), s('text', { x: left - 4, y: y(at) + 4, 'text-anchor': 'end' }, text(at))));
+  const grid = places.map((at) =>
+    s(
+      'g',
+      {},
+      s('line', { class: 'grid', x1: left, x2: width, y1: y(at), y2: y(at) }),
+      s('text', { x: left - 4, y: y(at) + 4, 'text-anchor': 'end' }, text(at)),
+    ),
+  );
   const [first, now] = [values[0], values[values.length - 1]];
   const change = first ? now / first - 1 : 0;
-  return h('button', { type: 'button', class: 'fallbox', 'aria-pressed': String(chosen), onclick: choose, 'data-channel': channel.symbol, 'data-rmse': String(now) },
-    h('span', {}, h('b', {}, channel.symbol), ` ${channel.unit}`, h('em', { class: change < -0.0005 ? 'fall' : change > 0.0005 ? 'rise' : 'quiet' }, change === 0 ? '' : `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}`)),
-    s('svg', { class: 'chart', viewBox: `0 0 ${width} ${height}`, role: 'img', 'aria-label': `${channel.name}: root mean square error from ${number(first)} to ${number(now)} ${channel.unit} over ${shown.length} steps` }, grid, shown.map(bar)));
+  return h(
+    'button',
+    {
+      type: 'button',
+      class: 'fallbox',
+      'aria-pressed': String(chosen),
+      onclick: choose,
+      'data-channel': channel.symbol,
+      'data-rmse': String(now),
+    },
+    h(
+      'span',
+      {},
+      h('b', {}, channel.symbol),
+      ` ${channel.unit}`,
+      h(
+        'em',
+        { class: change < -0.0005 ? 'fall' : change > 0.0005 ? 'rise' : 'quiet' },
+        change === 0 ? '' : `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}`,
+      ),
+    ),
+    s(
+      'svg',
+      {
+        class: 'chart',
+        viewBox: `0 0 ${width} ${height}`,
+        role: 'img',
+        'aria-label': `${channel.name}: root mean square error from ${number(first)} to ${number(now)} ${channel.unit} over ${shown.length} steps`,
+      },
+      grid,
+      shown.map(bar),
+    ),
+  );
 }

@@ -28,8 +28,22 @@ export async function show(app, into) {
   const pictures = h('div', { class: 'stack', id: 'compare-plots', 'data-flight': overview.flights[flight].name });
   into.replaceChildren(controls(app, flight, other), line, pictures);
   plots?.destroy();
-  plots = stack(pictures, channel, name(now), other ? name(other) : null, (from, to) => slide({ from, to }), () => slide({ from: null, to: null }));
-  const wanted = { flight, channel: place.channel, from_s: place.from, to_s: place.to, pixels: Math.min(4000, Math.round(plots.width() * devicePixelRatio)), against: other?.id ?? null };
+  plots = stack(
+    pictures,
+    channel,
+    name(now),
+    other ? name(other) : null,
+    (from, to) => slide({ from, to }),
+    () => slide({ from: null, to: null }),
+  );
+  const wanted = {
+    flight,
+    channel: place.channel,
+    from_s: place.from,
+    to_s: place.to,
+    pixels: Math.min(4000, Math.round(plots.width() * devicePixelRatio)),
+    against: other?.id ?? null,
+  };
   const mine = ++asked;
   /** @type {import('./api.js').Trace} */
   const trace = await ask('trace', wanted);
@@ -37,9 +51,18 @@ export async function show(app, into) {
   plots.draw(trace);
   const [first, last] = trace.whole_s;
   drawn = { from: place.from ?? first, to: place.to ?? last, first, last };
-  const fine = trace.samples_per_point > 1 ? `each point the least or the largest of ${number(2 * trace.samples_per_point, 2)} samples` : 'every sample drawn';
-  const beside = trace.against_rmse === null ? '' : `, ${other ? name(other) : ''} ${number(trace.against_rmse)} ${channel.unit} (${percent(trace.rmse / trace.against_rmse - 1)} from there to now)`;
-  line.replaceChildren(h('b', {}, `${channel.name}, ${channel.symbol}`), `: root mean square error ${number(trace.rmse)} ${channel.unit} from ${number(drawn.from, 4)} s to ${number(drawn.to, 4)} s${beside}; ${fine}.`);
+  const fine =
+    trace.samples_per_point > 1
+      ? `each point the least or the largest of ${number(2 * trace.samples_per_point, 2)} samples`
+      : 'every sample drawn';
+  const beside =
+    trace.against_rmse === null
+      ? ''
+      : `, ${other ? name(other) : ''} ${number(trace.against_rmse)} ${channel.unit} (${percent(trace.rmse / trace.against_rmse - 1)} from there to now)`;
+  line.replaceChildren(
+    h('b', {}, `${channel.name}, ${channel.symbol}`),
+    `: root mean square error ${number(trace.rmse)} ${channel.unit} from ${number(drawn.from, 4)} s to ${number(drawn.to, 4)} s${beside}; ${fine}.`,
+  );
   pictures.dataset.points = String(trace.t.length);
 }
 
@@ -61,11 +84,31 @@ function name(step) {
 function controls(app, flight, other) {
   const { overview, steps } = app;
   const shown = overview.flights[flight];
-  const label = (/** @type {import('./api.js').Flight} */ one) => `${one.name} · ${time(one.duration_s)}${one.judges > 0.999 ? ' · unseen' : one.judges > 0 ? ' · partly unseen' : ''}`;
-  const flights = choice('Flight', 'flight', overview.flights.map((one, index) => [String(index), label(one)]), String(flight), (value) => slide({ flight: Number(value), from: null, to: null }));
-  const states = steps.steps.map((step, index) => /** @type {[string, string]} */ ([String(step.id), `${index + 1}. ${step.did}`]));
-  const beside = choice('Beside', 'against', [['', 'nothing'], ...states.filter(([id]) => id !== String(steps.steps[steps.at].id))], other ? String(other.id) : '', (value) => slide({ against: value === '' ? null : Number(value) }));
-  const button = (/** @type {string} */ id, /** @type {string} */ text, /** @type {string} */ title, /** @type {() => void} */ act) => h('button', { type: 'button', id, title, onclick: act }, text);
+  const label = (/** @type {import('./api.js').Flight} */ one) =>
+    `${one.name} · ${time(one.duration_s)}${one.judges > 0.999 ? ' · unseen' : one.judges > 0 ? ' · partly unseen' : ''}`;
+  const flights = choice(
+    'Flight',
+    'flight',
+    overview.flights.map((one, index) => [String(index), label(one)]),
+    String(flight),
+    (value) => slide({ flight: Number(value), from: null, to: null }),
+  );
+  const states = steps.steps.map(
+    (step, index) => /** @type {[string, string]} */ ([String(step.id), `${index + 1}. ${step.did}`]),
+  );
+  const beside = choice(
+    'Beside',
+    'against',
+    [['', 'nothing'], ...states.filter(([id]) => id !== String(steps.steps[steps.at].id))],
+    other ? String(other.id) : '',
+    (value) => slide({ against: value === '' ? null : Number(value) }),
+  );
+  const button = (
+    /** @type {string} */ id,
+    /** @type {string} */ text,
+    /** @type {string} */ title,
+    /** @type {() => void} */ act,
+  ) => h('button', { type: 'button', id, title, onclick: act }, text);
   const jump = async (/** @type {boolean} */ typical) => {
     try {
       const found = await ask('place', { part: read().part, by: read().by, channel: read().channel, typical });
@@ -74,15 +117,23 @@ function controls(app, flight, other) {
       app.failed(error);
     }
   };
-  return h('div', { class: 'bar' }, flights,
-    button('before', '‹', 'the flight before, key [', () => slide({ flight: Math.max(0, flight - 1), from: null, to: null })),
-    button('after', '›', 'the next flight, key ]', () => slide({ flight: Math.min(overview.flights.length - 1, flight + 1), from: null, to: null })),
+  return h(
+    'div',
+    { class: 'bar' },
+    flights,
+    button('before', '‹', 'the flight before, key [', () =>
+      slide({ flight: Math.max(0, flight - 1), from: null, to: null }),
+    ),
+    button('after', '›', 'the next flight, key ]', () =>
+      slide({ flight: Math.min(overview.flights.length - 1, flight + 1), from: null, to: null }),
+    ),
     beside,
     h('span', { class: 'gap' }),
     button('worst', 'Worst 10 s', 'of this channel on flights that no fit sees', () => jump(false)),
     button('typical', 'Typical 10 s', 'the median error of this channel', () => jump(true)),
     button('whole', 'Whole flight', 'key 0', () => slide({ from: null, to: null })),
-    shown.derived ? h('small', { class: 'quiet' }, 'accelerations derived from velocity and rates') : null);
+    shown.derived ? h('small', { class: 'quiet' }, 'accelerations derived from velocity and rates') : null,
+  );
 }
 
 /** @param {KeyboardEvent} event */

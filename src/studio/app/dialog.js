@@ -20,18 +20,42 @@ function dialog(title, ...content) {
 
 export function keysHelp() {
   const keys = [
-    ['1 2 3 4', 'Compare, Where it fails, Learn, Model'], ['u  or  Ctrl Z', 'undo'], ['r  or  Ctrl Shift Z', 'redo'], ['s', 'save'],
-    ['[  ]', 'the flight before, the next'], ['← →', 'earlier, later (Compare)'], ['+ −', 'closer, further (Compare)'],
-    ['0', 'the whole flight (Compare)'], ['drag', 'zoom to what is marked; double click: the whole flight'],
+    ['1 2 3 4', 'Compare, Where it fails, Learn, Model'],
+    ['u  or  Ctrl Z', 'undo'],
+    ['r  or  Ctrl Shift Z', 'redo'],
+    ['s', 'save'],
+    ['[  ]', 'the flight before, the next'],
+    ['← →', 'earlier, later (Compare)'],
+    ['+ −', 'closer, further (Compare)'],
+    ['0', 'the whole flight (Compare)'],
+    ['drag', 'zoom to what is marked; double click: the whole flight'],
   ];
-  dialog('Keys', h('dl', { class: 'keys' }, keys.flatMap(([key, does]) => [h('dt', {}, key), h('dd', {}, does)])));
+  dialog(
+    'Keys',
+    h(
+      'dl',
+      { class: 'keys' },
+      keys.flatMap(([key, does]) => [h('dt', {}, key), h('dd', {}, does)]),
+    ),
+  );
 }
 
 /** @param {import('./main.js').App} app */
 export function saveDialog(app) {
-  const model = row(app, 'save', 'Model file', app.steps.file?.replace(/\.toml$/, '-studio.toml') ?? 'model-studio.toml',
-    'The model with its numbers, for calibrate, diagnose, train. What a search found goes into a ledger beside it.');
-  const page = row(app, 'save_page', 'Page', 'studio.html', 'Measured against predicted, before the changes and now, as one file to give away.');
+  const model = row(
+    app,
+    'save',
+    'Model file',
+    app.steps.file?.replace(/\.toml$/, '-studio.toml') ?? 'model-studio.toml',
+    'The model with its numbers, for calibrate, diagnose, train. What a search found goes into a ledger beside it.',
+  );
+  const page = row(
+    app,
+    'save_page',
+    'Page',
+    'studio.html',
+    'Measured against predicted, before the changes and now, as one file to give away.',
+  );
   dialog('Save', model, page);
 }
 
@@ -43,7 +67,13 @@ export function saveDialog(app) {
  * @param {string} says
  */
 function row(app, request, label, path, says) {
-  const input = h('input', { type: 'text', id: `${request}-path`, value: path, spellcheck: 'false', autocomplete: 'off' });
+  const input = h('input', {
+    type: 'text',
+    id: `${request}-path`,
+    value: path,
+    spellcheck: 'false',
+    autocomplete: 'off',
+  });
   const told = h('p', { class: 'told', role: 'status', id: `${request}-told` });
   const save = async (/** @type {boolean} */ overwrite) => {
     told.replaceChildren('Writing …');
@@ -55,12 +85,23 @@ function row(app, request, label, path, says) {
       await app.refresh();
     } catch (error) {
       const exists = error instanceof Refused && error.kind === 'exists';
-      told.replaceChildren(error instanceof Error ? `${error.message}. ` : '',
-        exists ? h('button', { type: 'button', id: `${request}-overwrite`, onclick: () => save(true) }, 'Overwrite it') : '');
+      told.replaceChildren(
+        error instanceof Error ? `${error.message}. ` : '',
+        exists
+          ? h('button', { type: 'button', id: `${request}-overwrite`, onclick: () => save(true) }, 'Overwrite it')
+          : '',
+      );
     }
   };
-  const submit = (/** @type {Event} */ event) => { event.preventDefault(); save(false); };
-  return h('form', { class: 'saving', onsubmit: submit },
+  const submit = (/** @type {Event} */ event) => {
+    event.preventDefault();
+    save(false);
+  };
+  return h(
+    'form',
+    { class: 'saving', onsubmit: submit },
     h('label', { for: input.id }, h('b', {}, label), h('small', {}, says)),
-    h('div', { class: 'line' }, input, h('button', { type: 'submit', id: `${request}-do`, class: 'main' }, 'Save')), told);
+    h('div', { class: 'line' }, input, h('button', { type: 'submit', id: `${request}-do`, class: 'main' }, 'Save')),
+    told,
+  );
 }

@@ -80,7 +80,11 @@ export function byId(id) {
  * @param {(value: string) => void} chosen
  */
 export function choice(label, id, options, value, chosen) {
-  const select = h('select', { id, onchange: () => chosen(select.value) }, options.map(([key, text]) => h('option', { value: key }, text)));
+  const select = h(
+    'select',
+    { id, onchange: () => chosen(select.value) },
+    options.map(([key, text]) => h('option', { value: key }, text)),
+  );
   select.value = value;
   return h('label', { class: 'field', for: id }, h('span', {}, label), select);
 }
@@ -94,6 +98,10 @@ export function choice(label, id, options, value, chosen) {
  */
 export function toggle(label, options, value, chosen) {
   const button = (/** @type {[string, string]} */ [key, text]) =>
-    h('button', { type: 'button', 'aria-pressed': String(key === value), 'data-key': key, onclick: () => chosen(key) }, text);
+    h(
+      'button',
+      { type: 'button', 'aria-pressed': String(key === value), 'data-key': key, onclick: () => chosen(key) },
+      text,
+    );
   return h('div', { class: 'toggle', role: 'group', 'aria-label': label }, options.map(button));
 }

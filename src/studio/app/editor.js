@@ -27,9 +27,30 @@ export function editor(app) {
   let asked = 0;
   const told = h('p', { class: 'told', id: 'formula-told', role: 'status' });
   const caret = h('pre', { class: 'caret', 'aria-hidden': 'true' });
-  const formula = h('input', { type: 'text', id: 'formula', value: draft.formula, placeholder: 'airspeed * vx', spellcheck: 'false', autocomplete: 'off', 'aria-describedby': 'formula-told',
-    oninput: () => { draft.formula = formula.value; window.clearTimeout(timer); timer = window.setTimeout(check, PAUSE_MS); } });
-  const name = h('input', { type: 'text', id: 'formula-name', value: draft.name, spellcheck: 'false', autocomplete: 'off', oninput: () => { draft.name = name.value; } });
+  const formula = h('input', {
+    type: 'text',
+    id: 'formula',
+    value: draft.formula,
+    placeholder: 'airspeed * vx',
+    spellcheck: 'false',
+    autocomplete: 'off',
+    'aria-describedby': 'formula-told',
+    oninput: () => {
+      draft.formula = formula.value;
+      window.clearTimeout(timer);
+      timer = window.setTimeout(check, PAUSE_MS);
+    },
+  });
+  const name = h('input', {
+    type: 'text',
+    id: 'formula-name',
+    value: draft.name,
+    spellcheck: 'false',
+    autocomplete: 'off',
+    oninput: () => {
+      draft.name = name.value;
+    },
+  });
   const add = h('button', { type: 'submit', id: 'formula-add', disabled: true }, 'Add and calibrate');
   async function check() {
     const mine = ++asked;
@@ -55,9 +76,16 @@ export function editor(app) {
     add.disabled = found === null || wrong;
     caret.replaceChildren(wrong && found?.at !== null ? `${draft.formula}\n${' '.repeat(found?.at ?? 0)}^` : '');
     told.dataset.state = found === null ? 'empty' : wrong ? 'wrong' : 'right';
-    told.replaceChildren(wrong ? `${found?.message}${found?.at === null ? '' : ` (character ${(found?.at ?? 0) + 1})`}` : found?.caution ?? 'the formula is right');
+    told.replaceChildren(
+      wrong
+        ? `${found?.message}${found?.at === null ? '' : ` (character ${(found?.at ?? 0) + 1})`}`
+        : (found?.caution ?? 'the formula is right'),
+    );
   }
-  const owners = /** @type {[string, string][]} */ ([...channels.map((of, index) => [String(index), `${of.symbol}, ${of.name}`]), ...signals.map(([signal, unit]) => [signal, `signal ${signal}, ${unit}`])]);
+  const owners = /** @type {[string, string][]} */ ([
+    ...channels.map((of, index) => [String(index), `${of.symbol}, ${of.name}`]),
+    ...signals.map(([signal, unit]) => [signal, `signal ${signal}, ${unit}`]),
+  ]);
   const submit = async (/** @type {Event} */ event) => {
     event.preventDefault();
     if (await app.edit({ do: 'formula', name: draft.name, owner: ownerOf(draft.owner), formula: draft.formula })) {
@@ -66,8 +94,28 @@ export function editor(app) {
     }
   };
   if (draft.formula) check();
-  return h('form', { class: 'card', onsubmit: submit }, h('h2', {}, 'A formula of your own'),
-    h('div', { class: 'bar' }, h('label', { class: 'field', for: 'formula-name' }, h('span', {}, 'Name'), name), choice('Adds to', 'formula-owner', owners, draft.owner, (value) => { draft.owner = value; check(); })),
-    h('label', { class: 'field wide', for: 'formula' }, h('span', {}, 'coefficient ×'), formula), caret, told, add,
-    h('details', {}, h('summary', {}, 'names it may read'), h('p', { class: 'names' }, [...names, ...signals.map(([signal]) => signal)].join('  '))));
+  return h(
+    'form',
+    { class: 'card', onsubmit: submit },
+    h('h2', {}, 'A formula of your own'),
+    h(
+      'div',
+      { class: 'bar' },
+      h('label', { class: 'field', for: 'formula-name' }, h('span', {}, 'Name'), name),
+      choice('Adds to', 'formula-owner', owners, draft.owner, (value) => {
+        draft.owner = value;
+        check();
+      }),
+    ),
+    h('label', { class: 'field wide', for: 'formula' }, h('span', {}, 'coefficient ×'), formula),
+    caret,
+    told,
+    add,
+    h(
+      'details',
+      {},
+      h('summary', {}, 'names it may read'),
+      h('p', { class: 'names' }, [...names, ...signals.map(([signal]) => signal)].join('  ')),
+    ),
+  );
 }

@@ -47,8 +47,14 @@ function failed(error) {
     401: 'Open the address that the program printed; it carries a key that this page lacks.',
     403: 'The studio was perhaps started anew: open the address that it printed last.',
   }[status];
-  const close = h('button', { type: 'button', class: 'plain', 'aria-label': 'Close', onclick: () => byId('banner').replaceChildren() }, '×');
-  byId('banner').replaceChildren(h('div', { class: 'fault' }, h('p', {}, h('strong', {}, text), hint ? ` ${hint}` : ''), close));
+  const close = h(
+    'button',
+    { type: 'button', class: 'plain', 'aria-label': 'Close', onclick: () => byId('banner').replaceChildren() },
+    '×',
+  );
+  byId('banner').replaceChildren(
+    h('div', { class: 'fault' }, h('p', {}, h('strong', {}, text), hint ? ` ${hint}` : ''), close),
+  );
 }
 
 /** @param {string} text */
@@ -104,21 +110,47 @@ function head() {
   const { view } = read();
   const { steps, overview } = app;
   const tab = (/** @type {typeof VIEWS[number]} */ name, /** @type {number} */ index) =>
-    h('a', { href: '#', role: 'tab', 'data-view': name, 'aria-selected': String(name === view), title: `key ${index + 1}`,
-      onclick: (/** @type {Event} */ event) => { event.preventDefault(); go({ view: name }); } }, NAMES[name]);
-  const tool = (/** @type {string} */ id, /** @type {string} */ text, /** @type {string} */ title, /** @type {boolean} */ on, /** @type {() => void} */ act) =>
-    h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
+    h(
+      'a',
+      {
+        href: '#',
+        role: 'tab',
+        'data-view': name,
+        'aria-selected': String(name === view),
+        title: `key ${index + 1}`,
+        onclick: (/** @type {Event} */ event) => {
+          event.preventDefault();
+          go({ view: name });
+        },
+      },
+      NAMES[name],
+    );
+  const tool = (
+    /** @type {string} */ id,
+    /** @type {string} */ text,
+    /** @type {string} */ title,
+    /** @type {boolean} */ on,
+    /** @type {() => void} */ act,
+  ) => h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
   byId('head').replaceChildren(
     h('div', { class: 'brand' }, h('h1', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
     h('nav', { role: 'tablist', 'aria-label': 'Views' }, VIEWS.map(tab)),
-    h('div', { class: 'tools' },
-      h('span', { class: 'state', title: steps.file ?? 'no model file yet' },
-        h('span', { id: 'state-name' }, steps.steps[steps.at].did), h('small', {}, steps.saved ? 'saved' : 'not saved')),
+    h(
+      'div',
+      { class: 'tools' },
+      h(
+        'span',
+        { class: 'state', title: steps.file ?? 'no model file yet' },
+        h('span', { id: 'state-name' }, steps.steps[steps.at].did),
+        h('small', {}, steps.saved ? 'saved' : 'not saved'),
+      ),
       tool('undo', '↶ Undo', 'key u', steps.at > 0, () => step('undo')),
       tool('redo', '↷ Redo', 'key r', steps.at < steps.steps.length - 1, () => step('redo')),
       tool('save', 'Save …', 'key s', true, () => saveDialog(app)),
       tool('theme', '◐', 'light or dark', true, theme),
-      tool('help', '?', 'keys', true, keysHelp)));
+      tool('help', '?', 'keys', true, keysHelp),
+    ),
+  );
 }
 
 /** @param {string} path */
@@ -137,11 +169,24 @@ function score() {
     const [before, after] = [first.rmse?.[key] ?? null, now.rmse?.[key] ?? null];
     const change = before && after !== null ? after / before - 1 : 0;
     const fell = steps.at > 0 && Math.abs(change) >= 0.0005;
-    return h('button', { type: 'button', class: 'cell', 'data-channel': of.symbol, 'aria-pressed': String(index === channel),
-      title: `${of.name}, root mean square error on ${app.steps.judged_on}`, onclick: () => slide({ channel: index }) },
+    return h(
+      'button',
+      {
+        type: 'button',
+        class: 'cell',
+        'data-channel': of.symbol,
+        'aria-pressed': String(index === channel),
+        title: `${of.name}, root mean square error on ${app.steps.judged_on}`,
+        onclick: () => slide({ channel: index }),
+      },
       h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}`),
       h('span', { class: 'rmse' }, number(after), h('small', {}, ` ${of.unit}`)),
-      h('span', { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' }, fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : ''));
+      h(
+        'span',
+        { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' },
+        fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : '',
+      ),
+    );
   };
   byId('score').replaceChildren(h('h2', { class: 'unseen' }, 'Errors'), ...overview.channels.map(cell));
 }
@@ -150,8 +195,13 @@ function warnings() {
   const told = byId('banner').querySelector('.fault:not(.lasting)');
   const lasting = [];
   if (app.overview.fault) lasting.push(`The check of the log found a fault: ${app.overview.check}`);
-  if (app.steps.file_changed) lasting.push(`${app.steps.file} was changed by another program since the studio read or wrote it. The model here is as it was; save it under another name, or start the studio again to read the file.`);
-  byId('banner').querySelectorAll('.lasting').forEach((old) => old.remove());
+  if (app.steps.file_changed)
+    lasting.push(
+      `${app.steps.file} was changed by another program since the studio read or wrote it. The model here is as it was; save it under another name, or start the studio again to read the file.`,
+    );
+  byId('banner')
+    .querySelectorAll('.lasting')
+    .forEach((old) => old.remove());
   lasting.forEach((text) => byId('banner').append(h('div', { class: 'fault lasting' }, h('p', {}, text))));
   return told;
 }
@@ -186,7 +236,10 @@ function key(event) {
   const { flight } = read();
   const tab = VIEWS[Number(letter) - 1];
   const acts = {
-    u: () => step('undo'), r: () => step('redo'), s: () => saveDialog(app), '?': keysHelp,
+    u: () => step('undo'),
+    r: () => step('redo'),
+    s: () => saveDialog(app),
+    '?': keysHelp,
     z: () => control && step(event.shiftKey ? 'redo' : 'undo'),
     '[': () => slide({ flight: Math.max(0, flight - 1), from: null, to: null }),
     ']': () => slide({ flight: Math.min(app.overview.flights.length - 1, flight + 1), from: null, to: null }),
@@ -222,7 +275,8 @@ async function start() {
 
 function overviewNote() {
   const { overview } = app;
-  byId('score').title = `${overview.flights.length} flights, ${time(overview.duration_s)}; judged on ${overview.judging} (${time(overview.parts_s[1])})`;
+  byId('score').title =
+    `${overview.flights.length} flights, ${time(overview.duration_s)}; judged on ${overview.judging} (${time(overview.parts_s[1])})`;
 }
 
 start();

@@ -28,10 +28,23 @@ export async function show(app, into) {
   const preview = previewer(app, pictures, channel);
   const [baseline, own] = [true, false].map((is) => model.effects.filter((effect) => effect.baseline === is));
   const scroll = into.querySelector('.effects')?.scrollTop ?? 0;
-  into.replaceChildren(h('div', { class: 'columns model' },
-    h('div', { class: 'effects' }, calibration(app, model), own.map((effect) => effectCard(app, effect, preview)), adder(app, model), editor(app),
-      h('h2', {}, 'Baseline'), baseline.map((effect) => effectCard(app, effect, preview))),
-    h('div', { class: 'watch' }, falls(app), residual(app, pictures, channel), steps(app))));
+  into.replaceChildren(
+    h(
+      'div',
+      { class: 'columns model' },
+      h(
+        'div',
+        { class: 'effects' },
+        calibration(app, model),
+        own.map((effect) => effectCard(app, effect, preview)),
+        adder(app, model),
+        editor(app),
+        h('h2', {}, 'Baseline'),
+        baseline.map((effect) => effectCard(app, effect, preview)),
+      ),
+      h('div', { class: 'watch' }, falls(app), residual(app, pictures, channel), steps(app)),
+    ),
+  );
   const effects = into.querySelector('.effects');
   if (effects) effects.scrollTop = scroll;
   await preview.start();
@@ -48,11 +61,32 @@ export function hide() {
  */
 function calibration(app, model) {
   const found = model.calibration;
-  const text = found ? `calibrated on ${found.rows} rows, condition number ${number(found.condition_number)}` : 'not calibrated since a number was moved, or as it was opened';
-  return h('div', { class: 'card' }, h('header', {}, h('h2', {}, model.name), h('span', { class: 'gap' }),
-    h('button', { type: 'button', id: 'calibrate', class: found ? '' : 'main', onclick: () => app.edit({ do: 'calibrate' }) }, 'Calibrate')),
+  const text = found
+    ? `calibrated on ${found.rows} rows, condition number ${number(found.condition_number)}`
+    : 'not calibrated since a number was moved, or as it was opened';
+  return h(
+    'div',
+    { class: 'card' },
+    h(
+      'header',
+      {},
+      h('h2', {}, model.name),
+      h('span', { class: 'gap' }),
+      h(
+        'button',
+        { type: 'button', id: 'calibrate', class: found ? '' : 'main', onclick: () => app.edit({ do: 'calibrate' }) },
+        'Calibrate',
+      ),
+    ),
     h('p', { class: 'quiet' }, `${model.vehicle}; ${text}`),
-    model.doubts.length ? h('ul', { class: 'doubts' }, model.doubts.map((doubt) => h('li', {}, doubt))) : null);
+    model.doubts.length
+      ? h(
+          'ul',
+          { class: 'doubts' },
+          model.doubts.map((doubt) => h('li', {}, doubt)),
+        )
+      : null,
+  );
 }
 
 /**
@@ -65,16 +99,57 @@ function calibration(app, model) {
  * @param {Preview} preview
  */
 function effectCard(app, effect, preview) {
-  const box = h('input', { type: 'checkbox', role: 'switch', checked: effect.enabled, 'data-switch': effect.name, 'aria-label': `${effect.name} takes part`,
-    onchange: async () => { if (!(await app.edit({ do: 'switch', effect: effect.name, on: box.checked }))) box.checked = effect.enabled; } });
-  const details = h('details', { open: open.has(effect.name), ontoggle: () => (details.open ? open.add(effect.name) : open.delete(effect.name)) },
+  const box = h('input', {
+    type: 'checkbox',
+    role: 'switch',
+    checked: effect.enabled,
+    'data-switch': effect.name,
+    'aria-label': `${effect.name} takes part`,
+    onchange: async () => {
+      if (!(await app.edit({ do: 'switch', effect: effect.name, on: box.checked }))) box.checked = effect.enabled;
+    },
+  });
+  const details = h(
+    'details',
+    { open: open.has(effect.name), ontoggle: () => (details.open ? open.add(effect.name) : open.delete(effect.name)) },
     h('summary', {}, 'numbers and formula'),
     effect.numbers.filter((one) => !one.fixed).map((one) => slider(app, effect, one, preview)),
     h('pre', {}, shorter(effect.formula)),
-    effect.baseline ? null : h('button', { type: 'button', 'data-remove': effect.name, onclick: () => app.edit({ do: 'remove', effect: effect.name }) }, 'Take it out'));
-  return h('article', { class: effect.enabled ? 'card effect' : 'card effect off', 'data-effect': effect.name },
-    h('header', {}, h('label', { class: 'switch' }, box, h('b', {}, effect.name)), h('span', { class: 'gap' }), h('span', { class: 'tag' }, effect.baseline ? 'baseline' : effect.added_by === 'diagnose' ? 'found' : effect.kind === 'formula' ? 'own formula' : 'added')),
-    h('p', {}, effect.meaning), details);
+    effect.baseline
+      ? null
+      : h(
+          'button',
+          {
+            type: 'button',
+            'data-remove': effect.name,
+            onclick: () => app.edit({ do: 'remove', effect: effect.name }),
+          },
+          'Take it out',
+        ),
+  );
+  return h(
+    'article',
+    { class: effect.enabled ? 'card effect' : 'card effect off', 'data-effect': effect.name },
+    h(
+      'header',
+      {},
+      h('label', { class: 'switch' }, box, h('b', {}, effect.name)),
+      h('span', { class: 'gap' }),
+      h(
+        'span',
+        { class: 'tag' },
+        effect.baseline
+          ? 'baseline'
+          : effect.added_by === 'diagnose'
+            ? 'found'
+            : effect.kind === 'formula'
+              ? 'own formula'
+              : 'added',
+      ),
+    ),
+    h('p', {}, effect.meaning),
+    details,
+  );
 }
 
 /**
@@ -88,12 +163,36 @@ function slider(app, effect, one, preview) {
   const id = `n-${effect.name}-${one.name}`;
   const shown = h('output', { for: id }, measure(one.value, one.unit));
   const moved = () => ({ effect: effect.name, number: one.name, value: Number(input.value) });
-  const input = h('input', { type: 'range', id, min: String(low), max: String(high), step: String((high - low) / 1000), disabled: !effect.enabled, 'data-number': `${effect.name}.${one.name}`,
-    oninput: () => { shown.replaceChildren(measure(Number(input.value), one.unit)); preview.move(moved()); },
-    onchange: () => app.edit({ do: 'move', ...moved() }) });
+  const input = h('input', {
+    type: 'range',
+    id,
+    min: String(low),
+    max: String(high),
+    step: String((high - low) / 1000),
+    disabled: !effect.enabled,
+    'data-number': `${effect.name}.${one.name}`,
+    oninput: () => {
+      shown.replaceChildren(measure(Number(input.value), one.unit));
+      preview.move(moved());
+    },
+    onchange: () => app.edit({ do: 'move', ...moved() }),
+  });
   input.value = String(one.value);
-  const says = [one.ci95 ? `95 % interval ${interval(one.ci95)}` : 'no interval', one.usual ? `usually ${interval(one.usual)}` : '', one.by_flight ? `${one.by_flight[0]} flights with values of their own, ${number(one.by_flight[1])} … ${number(one.by_flight[2])}` : ''];
-  return h('div', { class: 'number' }, h('label', { for: id, title: one.meaning }, h('b', {}, one.name), ` ${one.meaning}`), shown, input, h('small', { class: 'quiet' }, says.filter(Boolean).join('; ')));
+  const says = [
+    one.ci95 ? `95 % interval ${interval(one.ci95)}` : 'no interval',
+    one.usual ? `usually ${interval(one.usual)}` : '',
+    one.by_flight
+      ? `${one.by_flight[0]} flights with values of their own, ${number(one.by_flight[1])} … ${number(one.by_flight[2])}`
+      : '',
+  ];
+  return h(
+    'div',
+    { class: 'number' },
+    h('label', { for: id, title: one.meaning }, h('b', {}, one.name), ` ${one.meaning}`),
+    shown,
+    input,
+    h('small', { class: 'quiet' }, says.filter(Boolean).join('; ')),
+  );
 }
 
 /**
@@ -109,12 +208,22 @@ function previewer(app, pictures, channel) {
   const place = read();
   const flight = Math.min(place.flight, app.overview.flights.length - 1);
   const fetchTrace = async (/** @type {import('./api.js').Moved | null} */ moved) => {
-    const wanted = { flight, channel: place.channel, from_s: place.from, to_s: place.to, against: moved ? app.steps.steps[app.steps.at].id : null, moved, pixels: Math.round(plots?.width() ?? 600) };
+    const wanted = {
+      flight,
+      channel: place.channel,
+      from_s: place.from,
+      to_s: place.to,
+      against: moved ? app.steps.steps[app.steps.at].id : null,
+      moved,
+      pixels: Math.round(plots?.width() ?? 600),
+    };
     /** @type {import('./api.js').Trace} */
     const trace = await ask('trace', wanted);
     plots?.draw(trace.against ? trace : { ...trace, against: [], against_residual: trace.t.map(() => null) });
     const told = pictures.parentElement?.querySelector('[data-told]');
-    told?.replaceChildren(`root mean square ${number(trace.rmse)} ${channel.unit}${trace.against_rmse === null ? '' : `, before ${number(trace.against_rmse)}`}`);
+    told?.replaceChildren(
+      `root mean square ${number(trace.rmse)} ${channel.unit}${trace.against_rmse === null ? '' : `, before ${number(trace.against_rmse)}`}`,
+    );
     pictures.dataset.rmse = String(trace.rmse);
   };
   const run = async () => {
@@ -133,7 +242,15 @@ function previewer(app, pictures, channel) {
   return {
     async start() {
       plots?.destroy();
-      plots = stack(pictures, channel, 'now', 'before', (from, to) => slide({ from, to }), () => slide({ from: null, to: null }), 'residual');
+      plots = stack(
+        pictures,
+        channel,
+        'now',
+        'before',
+        (from, to) => slide({ from, to }),
+        () => slide({ from: null, to: null }),
+        'residual',
+      );
       await fetchTrace(null);
     },
     move(moved) {
@@ -152,7 +269,13 @@ function residual(app, pictures, channel) {
   const place = read();
   const flight = app.overview.flights[Math.min(place.flight, app.overview.flights.length - 1)];
   const stretch = place.from === null ? 'the whole flight' : `${number(place.from, 4)} s to ${number(place.to, 4)} s`;
-  return h('section', { class: 'card' }, h('h2', {}, `Residual of ${channel.symbol} in ${flight.name}, ${stretch}`), h('p', { class: 'quiet', 'data-told': true }), pictures);
+  return h(
+    'section',
+    { class: 'card' },
+    h('h2', {}, `Residual of ${channel.symbol} in ${flight.name}, ${stretch}`),
+    h('p', { class: 'quiet', 'data-told': true }),
+    pictures,
+  );
 }
 
 /** @param {import('./main.js').App} app */
@@ -160,18 +283,61 @@ function falls(app) {
   const { steps, overview } = app;
   const path = steps.steps.slice(0, steps.at + 1);
   const chosen = read().channel;
-  return h('section', { class: 'card', id: 'waterfall', 'aria-label': 'Errors over the steps taken' }, h('h2', {}, 'Error after each step, on flights no fit sees'),
-    h('div', { class: 'falls-grid' }, overview.channels.map((channel, index) => waterfall(channel, path, index === chosen, () => slide({ channel: index })))),
-    h('p', { class: 'quiet' }, `${steps.judged_on}, with 95 % intervals${steps.own_from_first_half ? '; flights are judged on their second halves, as some state has numbers of each flight' : ''}.`));
+  return h(
+    'section',
+    { class: 'card', id: 'waterfall', 'aria-label': 'Errors over the steps taken' },
+    h('h2', {}, 'Error after each step, on flights no fit sees'),
+    h(
+      'div',
+      { class: 'falls-grid' },
+      overview.channels.map((channel, index) =>
+        waterfall(channel, path, index === chosen, () => slide({ channel: index })),
+      ),
+    ),
+    h(
+      'p',
+      { class: 'quiet' },
+      `${steps.judged_on}, with 95 % intervals${steps.own_from_first_half ? '; flights are judged on their second halves, as some state has numbers of each flight' : ''}.`,
+    ),
+  );
 }
 
 /** @param {import('./main.js').App} app */
 function steps(app) {
   const { steps: all, at } = app.steps;
-  const item = (/** @type {import('./api.js').Step} */ step, /** @type {number} */ index) => h('li', { class: index > at ? 'undone' : '' },
-    h('button', { type: 'button', 'aria-current': index === at ? 'step' : null, 'data-step': String(step.id), onclick: () => app.step('go_to', { state: step.id }) }, `${index + 1}. ${step.did}`),
-    index === at ? null : h('button', { type: 'button', class: 'plain', title: 'lay it beside the present state in Compare', onclick: () => slide({ view: 'compare', against: step.id }) }, 'compare'));
-  return h('section', { class: 'card', id: 'history' }, h('h2', {}, 'Steps'), h('ol', { class: 'steps' }, all.map(item)));
+  const item = (/** @type {import('./api.js').Step} */ step, /** @type {number} */ index) =>
+    h(
+      'li',
+      { class: index > at ? 'undone' : '' },
+      h(
+        'button',
+        {
+          type: 'button',
+          'aria-current': index === at ? 'step' : null,
+          'data-step': String(step.id),
+          onclick: () => app.step('go_to', { state: step.id }),
+        },
+        `${index + 1}. ${step.did}`,
+      ),
+      index === at
+        ? null
+        : h(
+            'button',
+            {
+              type: 'button',
+              class: 'plain',
+              title: 'lay it beside the present state in Compare',
+              onclick: () => slide({ view: 'compare', against: step.id }),
+            },
+            'compare',
+          ),
+    );
+  return h(
+    'section',
+    { class: 'card', id: 'history' },
+    h('h2', {}, 'Steps'),
+    h('ol', { class: 'steps' }, all.map(item)),
+  );
 }
 
 /**
@@ -182,9 +348,30 @@ function adder(app, model) {
   if (model.addable.length === 0) return null;
   let chosen = model.addable[0][0];
   const says = h('p', { class: 'quiet' }, model.addable[0][1]);
-  const pick = choice('Effect of the catalogue', 'addable', model.addable.map(([name]) => [name, name]), chosen, (value) => {
-    chosen = value;
-    says.replaceChildren(model.addable.find(([name]) => name === value)?.[1] ?? '');
-  });
-  return h('div', { class: 'card' }, h('h2', {}, 'Add an effect'), h('div', { class: 'bar' }, pick, h('button', { type: 'button', id: 'add-effect', onclick: () => app.edit({ do: 'add', effect: chosen }) }, 'Add and calibrate')), says);
+  const pick = choice(
+    'Effect of the catalogue',
+    'addable',
+    model.addable.map(([name]) => [name, name]),
+    chosen,
+    (value) => {
+      chosen = value;
+      says.replaceChildren(model.addable.find(([name]) => name === value)?.[1] ?? '');
+    },
+  );
+  return h(
+    'div',
+    { class: 'card' },
+    h('h2', {}, 'Add an effect'),
+    h(
+      'div',
+      { class: 'bar' },
+      pick,
+      h(
+        'button',
+        { type: 'button', id: 'add-effect', onclick: () => app.edit({ do: 'add', effect: chosen }) },
+        'Add and calibrate',
+      ),
+    ),
+    says,
+  );
 }

@@ -9,7 +9,12 @@ import { number } from './format.js';
 export function colours() {
   const style = getComputedStyle(document.documentElement);
   const of = (/** @type {string} */ name) => style.getPropertyValue(name).trim();
-  return { ink: of('--ink'), quiet: of('--quiet'), grid: of('--grid'), lines: [1, 2, 3, 4, 5, 6].map((index) => of(`--line-${index}`)) };
+  return {
+    ink: of('--ink'),
+    quiet: of('--quiet'),
+    grid: of('--grid'),
+    lines: [1, 2, 3, 4, 5, 6].map((index) => of(`--line-${index}`)),
+  };
 }
 
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
@@ -37,31 +42,72 @@ const STICKS = ['u1 lateral', 'u2 longitudinal', 'u3 tail', 'u4 collective'];
  */
 function plot(title, height, lines, unit, last, zoom, whole) {
   const { ink, quiet, grid } = colours();
-  const axis = { stroke: quiet, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, width: 1 }, font: '12px system-ui, sans-serif' };
+  const axis = {
+    stroke: quiet,
+    grid: { stroke: grid, width: 1 },
+    ticks: { stroke: grid, width: 1 },
+    font: '12px system-ui, sans-serif',
+  };
   const holder = h('figure', { class: 'plot', 'aria-label': title });
-  const text = (/** @type {any} */ _plot, /** @type {number | null} */ value) => (value === null || value === undefined ? '–' : number(value, 4));
-  const time = { label: 't', value: (/** @type {any} */ _plot, /** @type {number | null} */ value) => (value === null || value === undefined ? '–' : `${value.toFixed(2)} s`) };
-  const made = new uPlot({
-    width: 600,
-    height,
-    scales: { x: { time: false } },
-    cursor: { sync: { key: 'time' }, drag: { x: true, y: false, setScale: false }, points: { size: 5 }, bind: {
-      dblclick: () => () => { whole(); return null; },
-    } },
-    legend: { live: true },
-    axes: [
-      { ...axis, size: last ? 44 : 12, label: last ? 'time, s' : undefined, labelSize: 18, labelFont: '12px system-ui, sans-serif', values: last ? undefined : () => [] },
-      { ...axis, size: 58, label: `${title}, ${unit}`, labelSize: 18, labelFont: '12px system-ui, sans-serif' },
-    ],
-    series: [time, ...lines.map((line) => ({ label: line.label, stroke: line.stroke || ink, width: line.width ?? 1.25, dash: line.dash, value: text, points: { show: false } }))],
-    hooks: {
-      setSelect: [(/** @type {any} */ self) => {
-        const { left, width } = self.select;
-        if (width > 4) zoom(self.posToVal(left, 'x'), self.posToVal(left + width, 'x'));
-        self.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
-      }],
+  const text = (/** @type {any} */ _plot, /** @type {number | null} */ value) =>
+    value === null || value === undefined ? '–' : number(value, 4);
+  const time = {
+    label: 't',
+    value: (/** @type {any} */ _plot, /** @type {number | null} */ value) =>
+      value === null || value === undefined ? '–' : `${value.toFixed(2)} s`,
+  };
+  const made = new uPlot(
+    {
+      width: 600,
+      height,
+      scales: { x: { time: false } },
+      cursor: {
+        sync: { key: 'time' },
+        drag: { x: true, y: false, setScale: false },
+        points: { size: 5 },
+        bind: {
+          dblclick: () => () => {
+            whole();
+            return null;
+          },
+        },
+      },
+      legend: { live: true },
+      axes: [
+        {
+          ...axis,
+          size: last ? 44 : 12,
+          label: last ? 'time, s' : undefined,
+          labelSize: 18,
+          labelFont: '12px system-ui, sans-serif',
+          values: last ? undefined : () => [],
+        },
+        { ...axis, size: 58, label: `${title}, ${unit}`, labelSize: 18, labelFont: '12px system-ui, sans-serif' },
+      ],
+      series: [
+        time,
+        ...lines.map((line) => ({
+          label: line.label,
+          stroke: line.stroke || ink,
+          width: line.width ?? 1.25,
+          dash: line.dash,
+          value: text,
+          points: { show: false },
+        })),
+      ],
+      hooks: {
+        setSelect: [
+          (/** @type {any} */ self) => {
+            const { left, width } = self.select;
+            if (width > 4) zoom(self.posToVal(left, 'x'), self.posToVal(left + width, 'x'));
+            self.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+          },
+        ],
+      },
     },
-  }, [[], ...lines.map(() => [])], holder);
+    [[], ...lines.map(() => [])],
+    holder,
+  );
   return { holder, made };
 }
 
@@ -83,9 +129,44 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
   // All three on one screen: what is left of the window below head and controls, less a legend each.
   const left = Math.max(360, Math.min(820, window.innerHeight - 330));
   const [tall, middle, low] = [0.46, 0.26, 0.28].map((share) => Math.round(share * left));
-  const top = all ? [plot(channel.symbol, tall, [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other], channel.unit, false, zoom, whole)] : [];
-  const residual = plot('residual', all ? middle : 170, [{ label: `measured − ${now}`, stroke: lines[0] }, ...other.map((line) => ({ ...line, label: `measured − ${against}` }))], channel.unit, !all, zoom, whole);
-  const sticks = all ? [plot('sticks', low, STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })), '1', true, zoom, whole)] : [];
+  const top = all
+    ? [
+        plot(
+          channel.symbol,
+          tall,
+          [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other],
+          channel.unit,
+          false,
+          zoom,
+          whole,
+        ),
+      ]
+    : [];
+  const residual = plot(
+    'residual',
+    all ? middle : 170,
+    [
+      { label: `measured − ${now}`, stroke: lines[0] },
+      ...other.map((line) => ({ ...line, label: `measured − ${against}` })),
+    ],
+    channel.unit,
+    !all,
+    zoom,
+    whole,
+  );
+  const sticks = all
+    ? [
+        plot(
+          'sticks',
+          low,
+          STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })),
+          '1',
+          true,
+          zoom,
+          whole,
+        ),
+      ]
+    : [];
   const plots = [...top, residual, ...sticks];
   into.replaceChildren(...plots.map((one) => one.holder));
   const width = () => Math.max(200, Math.floor(into.clientWidth));
@@ -101,7 +182,9 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
         [t, trace.residual, ...(trace.against_residual ? [trace.against_residual] : [])],
         ...sticks.map(() => [t, ...trace.sticks]),
       ];
-      plots.forEach((one, index) => one.made.setData(/** @type {uPlot.AlignedData} */ (/** @type {unknown} */ (sets[index]))));
+      plots.forEach((one, index) =>
+        one.made.setData(/** @type {uPlot.AlignedData} */ (/** @type {unknown} */ (sets[index]))),
+      );
       resize();
     },
     destroy() {
