@@ -7,7 +7,7 @@ use super::config::PhyTureConfig;
 use super::configuration::Configuration;
 use super::layers::Recorder;
 use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, InformerConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
-use crate::error::Result;
+use crate::nn::error::Result;
 use crate::tape::Var;
 use phyture_kernels::Real;
 use serde::de::Error as _;
@@ -107,7 +107,7 @@ impl Architecture {
     /// Checks each size and how they fit together.
     ///
     /// # Errors
-    /// [`Error::Config`](crate::Error::Config) with the field, its value and its range.
+    /// [`Error::Size`](super::Error::Size) with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
         of_each!(self, config => Configuration::check(config))
     }

@@ -2,7 +2,7 @@
 //! knows.
 
 use super::layers::Recorder;
-use crate::error::{Error, Result};
+use crate::nn::error::{Error, Result};
 use crate::tape::Var;
 use phyture_kernels::Real;
 
@@ -77,5 +77,5 @@ pub(crate) fn check_ranges(sizes: &[(&str, usize, usize)], reals: &[(&str, f64, 
 
 /// The error for a size that cannot be.
 pub(crate) fn refused(field: &str, found: impl std::fmt::Display, expected: impl Into<String>) -> Error {
-    Error::Config { place: "network".into(), field: field.into(), found: found.to_string(), expected: expected.into() }
+    Error::Size { field: field.into(), found: found.to_string(), expected: expected.into() }
 }

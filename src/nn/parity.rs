@@ -81,9 +81,10 @@ enum Problem {
     Other(Error),
 }
 
-impl From<Error> for Problem {
-    fn from(error: Error) -> Self {
-        Self::Other(error)
+/// Whatever becomes an error of the crate.
+impl<E: Into<Error>> From<E> for Problem {
+    fn from(error: E) -> Self {
+        Self::Other(error.into())
     }
 }
 

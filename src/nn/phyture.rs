@@ -6,7 +6,7 @@
 use super::config::{PhyTureConfig, Variant};
 use super::configuration::Configuration;
 use super::layers::Recorder;
-use crate::error::Result;
+use crate::nn::error::Result;
 use crate::tape::Var;
 use crate::tape::ops::{
     Add, Attention, Concatenate, Epilogue, Half, Interleave, LastRows, MovingAverage, PositionalEncoding, ScaleExp, Subtract,

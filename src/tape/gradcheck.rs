@@ -10,7 +10,7 @@ use super::op::{Backward, Differentiable, Forward, Gradient, MAX_OPERANDS, Op};
 use super::slab::Slabs;
 use super::threads::Parallelism;
 use super::{DropoutKey, Fill, Graph, Parts, Session, Shape, Threads, Var};
-use crate::error::Error;
+use crate::tape::error::Error;
 use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Tolerance, Write};
@@ -409,7 +409,7 @@ mod tests {
     use super::super::op::Reads;
     use super::super::ops::{Add, Linear};
     use super::*;
-    use crate::error::Result;
+    use crate::tape::error::Result;
 
     /// A backward pass with one planted fault.
     #[derive(Clone, Copy, Debug)]

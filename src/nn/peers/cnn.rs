@@ -9,10 +9,10 @@
 //! layer's columns.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{
     ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
 };
+use crate::nn::error::Result;
 use crate::nn::layers::Recorder;
 use crate::tape::Var;
 use crate::tape::ops::{Activation, Dropout, Ends, Flatten, GeneralConv1d, Place};

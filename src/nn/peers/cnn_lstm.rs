@@ -6,10 +6,10 @@
 //! 250 rows left, and a linear map of its last hidden state.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{
     ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
 };
+use crate::nn::error::Result;
 use crate::nn::layers::Recorder;
 use crate::tape::Var;
 use crate::tape::ops::{Dropout, Ends, GeneralConv1d, LastRows, Place, Pool};

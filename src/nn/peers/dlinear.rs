@@ -4,8 +4,8 @@
 //! linear map of the 16 channels gives the six accelerations (the last step is ours: the reference predicts its own inputs). Without
 //! any nonlinearity this is a linear filter. The maps over time are shared by all channels ("DLinear") or one a channel.
 
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::error::Result;
 use crate::nn::layers::Recorder;
 use crate::tape::Var;
 use crate::tape::ops::{Add, MovingAverage, Subtract};

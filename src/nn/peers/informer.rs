@@ -13,8 +13,8 @@
 //!
 //! Heads keep their columns throughout; the reference's transposed reshape in the decoder is not repeated.
 
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::error::Result;
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{

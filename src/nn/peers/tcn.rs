@@ -12,8 +12,8 @@
 //! leaves PyTorch's default; 1×1 convolutions and the output weight do start normal with deviation 0.01.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges};
+use crate::nn::error::Result;
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{Activation, Add, GeneralConv1d, LastRows, Place, SpacedRows};
@@ -177,7 +177,11 @@ mod tests {
         let of =
             |name: &str| network.parameters().iter().find(|parameter| parameter.name == name).map(|found| &initial[found.range()]);
         let (Some(v), Some(g)) = (of("block.1.convolution1.direction"), of("block.1.convolution1.length")) else {
-            return Err(crate::Error::Undetermined("no such parameter".into()));
+            return Err(crate::nn::Error::Size {
+                field: "parameter".into(),
+                found: "none".into(),
+                expected: "that of the convolution".into(),
+            });
         };
         for (v, g) in v.chunks(210).zip(g) {
             assert!((v.iter().map(|v| v * v).sum::<f64>().sqrt() - g).abs() < Tolerance::Close.relative_f64());

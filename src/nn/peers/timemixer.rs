@@ -13,8 +13,8 @@
 //! 7 255 826 parameters at the default sizes); they are left out.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::error::Result;
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{Activation, Add, Dropout, GeneralConv1d, MovingAverage, Pool, Subtract};

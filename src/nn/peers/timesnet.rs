@@ -13,8 +13,8 @@
 //! neighbours; here each sample has its own, in training and in prediction.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
+use crate::nn::error::Result;
 use crate::nn::layers::{Init, Recorder};
 use crate::tape::Var;
 use crate::tape::ops::{
