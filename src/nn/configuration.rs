@@ -3,7 +3,7 @@
 
 use super::layers::Recorder;
 use crate::nn::error::{Error, Result};
-use crate::tape::Var;
+use crate::tape::{self, Var};
 use phyture_kernels::Real;
 
 /// Channels of P and of the prediction: three linear and three angular accelerations (eqs. 11 and 16).
@@ -57,7 +57,9 @@ pub(crate) trait Configuration {
     fn check(&self) -> Result<()>;
 
     /// Records the network: S `[H, state_channels]` and P `[H, physics_channels]` to `[horizon, outputs]` at unit scale.
-    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> Result<Var>;
+    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> tape::Result<Var>
+    where
+        Self: Sized;
 }
 
 /// Checks that sizes lie in 1 to their largest value, and numbers in their range.

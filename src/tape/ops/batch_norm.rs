@@ -183,8 +183,12 @@ mod tests {
         let parameters = parameters(graph.parameter_count());
         // The second batch norm takes off what the first one's bias adds to every row.
         let zero = |name: &str| name.contains("running") || name == "0.beta";
-        gradcheck::graph(&graph, loss, &parameters, 5, KEY, &fill, &zero, 1)
-            .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
+        gradcheck::graph(
+            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 5, dropout: KEY, fill: &fill },
+            &zero,
+            1,
+        )
+        .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
     }
 
     #[test]
