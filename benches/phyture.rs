@@ -25,7 +25,7 @@ fn fill(_: usize, inputs: &mut [&mut [f32]]) {
     }
 }
 
-fn network(history: usize) -> Result<Network<f32>> {
+fn network(history: usize) -> phyture::nn::Result<Network<f32>> {
     Network::new(&PhyTureConfig { history, ..PhyTureConfig::default() }, &OutputScale::unit(6), false)
 }
 

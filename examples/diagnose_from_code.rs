@@ -1,8 +1,8 @@
 //! Asks which physical effect a model lacks, from code: flights, a check of their conventions, a search, its verdict.
 //!
 //! ```text
-//! cargo run --release --features files --example diagnose_from_code                 # simulated flights with one hidden effect
-//! cargo run --release --features files --example diagnose_from_code -- FLIGHTS MODEL  # your flights and your model file
+//! cargo run --release --features files,sim --example diagnose_from_code                 # simulated flights with one hidden effect
+//! cargo run --release --features files,sim --example diagnose_from_code -- FLIGHTS MODEL  # your flights and your model file
 //! ```
 
 use phyture::Result;

@@ -4,7 +4,7 @@
 //! phyture simulate flights --minutes 5 --seed 7
 //! phyture calibrate flights -o model.toml
 //! phyture train flights -m model.toml -o run
-//! cargo run --release --example stream_a_hybrid -- run/network.safetensors
+//! cargo run --release --features sim --example stream_a_hybrid -- run/network.safetensors
 //! ```
 //!
 //! It needs none of the features: what runs on board reads no logs. Here the built-in helicopter stands in for the aircraft.

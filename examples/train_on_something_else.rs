@@ -4,10 +4,9 @@
 //! cargo run --release --example train_on_something_else
 //! ```
 
-use phyture::Result;
 use phyture::nn::Recorder;
 use phyture::tape::ops::{Activation, SquaredError};
-use phyture::tape::{Session, Threads};
+use phyture::tape::{Result, Session, Threads};
 use phyture_kernels::activation::Activation as Kind;
 use phyture_kernels::adam::Adam;
 use phyture_kernels::random::Stream;

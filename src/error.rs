@@ -113,7 +113,7 @@ pub enum Error {
 
 impl Error {
     /// An instruction set was asked for that is not there.
-    pub(crate) fn level(error: InstructionSetError) -> Self {
+    pub(crate) fn instruction_set(error: InstructionSetError) -> Self {
         Self::Config {
             place: "environment".into(),
             field: ENVIRONMENT_VARIABLE.into(),

@@ -22,6 +22,7 @@ pub mod physics;
 pub mod protocol;
 #[cfg(feature = "report")]
 pub mod report;
+#[cfg(feature = "sim")]
 pub mod sim;
 pub mod student_t;
 #[cfg(feature = "studio")]

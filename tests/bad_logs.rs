@@ -1,5 +1,5 @@
 //! Flights of the simulator with one thing wrong each: what `check` says, and the `dataset.toml` that it suggests, with which nothing is at fault.
-#![cfg(feature = "files")]
+#![cfg(all(feature = "files", feature = "sim"))]
 
 use phyture::Error;
 use phyture::critique::check::{Severity, check};

@@ -143,6 +143,7 @@ proptest! {
     }
 }
 
+#[cfg(feature = "sim")]
 #[test]
 fn missing_physics_is_no_convention_fault() -> phyture::Result<()> {
     use phyture::sim::{Mechanism, Simulation, simulate};

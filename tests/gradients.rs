@@ -51,8 +51,12 @@ fn check(config: &PhyTureConfig, samples: usize, dropout: Option<DropoutKey>) ->
         let unread: &[&str] = if config.horizon == 1 { &["root.eta", "o.eta", "e."] } else { &["e.eta"] };
         unread.iter().any(|prefix| node.starts_with(prefix))
     };
-    gradcheck::graph(network.graph(), network.loss(), &parameters, samples, dropout, &fill, &zero, 1)
-        .map_err(|disagreement| Error::Undetermined(format!("{:?}, {dropout:?}: {disagreement}", config.variant)))
+    gradcheck::graph(
+        &gradcheck::LossOf { graph: network.graph(), loss: network.loss(), parameters: &parameters, samples, dropout, fill: &fill },
+        &zero,
+        1,
+    )
+    .map_err(|disagreement| Error::Undetermined(format!("{:?}, {dropout:?}: {disagreement}", config.variant)))
 }
 
 #[test]
@@ -111,7 +115,8 @@ fn pieces_of_one_window_give_the_bits_of_the_whole() -> Result<()> {
         let run = |threads| -> Result<_> {
             let mut infer = Session::infer(network.graph(), &[network.output()], Threads(threads))?;
             infer.step(&parameters, samples, None, &fill)?;
-            let outputs = (0..samples).map(|sample| infer.output(0, sample).map(bits)).collect::<Result<Vec<_>>>()?;
+            let outputs =
+                (0..samples).map(|sample| infer.output(0, sample).map(bits)).collect::<phyture::tape::Result<Vec<_>>>()?;
             let mut train = Session::train(network.graph(), network.loss(), &[], Threads(threads))?;
             let loss = train.step(&parameters, samples, Some(KEY), &fill)?;
             Ok((outputs, loss.to_bits(), bits(train.gradients())))

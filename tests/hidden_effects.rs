@@ -4,6 +4,7 @@
 //! Seeds 31 to 39 and from 1100 on; the search is deterministic, so a count that holds here holds on every run. What chance has a part
 //! in is counted all the same, so that a harmless change of the simulator or of the search does not hang on one data set: the
 //! reasoning stands at each count.
+#![cfg(feature = "sim")]
 
 #[allow(dead_code, reason = "the benchmark uses the rest")]
 #[path = "../benches/hidden_effect/cases.rs"]

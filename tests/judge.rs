@@ -1,5 +1,6 @@
 //! The network as judge: stages of a hybrid, what it learned as flights to search, and how its predictions move with the
 //! coefficients of its model. The networks are small and untrained: what is tested holds for any weights.
+#![cfg(feature = "sim")]
 
 use phyture::critique::PerChannel;
 use phyture::critique::uncertainty::{Effort, Uncertainty, uncertainty};

@@ -36,7 +36,7 @@ fn run(op: impl Op<f64> + 'static, operands: &[(&[usize], &Values)], dy: Option<
         inputs.iter_mut().zip(values).for_each(|(input, values)| input.copy_from_slice(values));
     })?;
     let gradients = (0..operands.len()).map(|index| train.input_gradient(index, 0).map(<[f64]>::to_vec));
-    Ok((result, gradients.collect::<Result<_>>()?))
+    Ok((result, gradients.collect::<phyture::tape::Result<_>>()?))
 }
 
 fn close(a: f64, b: f64) -> bool {

@@ -55,8 +55,19 @@ fn every_peer_has_the_gradients_of_its_loss() -> Result<()> {
                 let settled = settles && ["distilling.bias", "encoder.0.norm2.bias"].iter().any(|end| name.ends_with(end));
                 name.ends_with(".key.bias") || name.contains(".running_") || settled
             };
-            gradcheck::graph(network.graph(), network.loss(), &parameters, 3, dropout, &fill, &zero, 1)
-                .map_err(|disagreement| Error::Undetermined(format!("{}, {dropout:?}: {disagreement}", architecture.name())))?;
+            gradcheck::graph(
+                &gradcheck::LossOf {
+                    graph: network.graph(),
+                    loss: network.loss(),
+                    parameters: &parameters,
+                    samples: 3,
+                    dropout,
+                    fill: &fill,
+                },
+                &zero,
+                1,
+            )
+            .map_err(|disagreement| Error::Undetermined(format!("{}, {dropout:?}: {disagreement}", architecture.name())))?;
         }
     }
     Ok(())

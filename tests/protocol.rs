@@ -1,5 +1,5 @@
 //! What a run of the comparison may see: nothing of the part it is judged on.
-#![cfg(feature = "protocol")]
+#![cfg(all(feature = "protocol", feature = "sim"))]
 
 use phyture::flight::split::{Split, class_folds};
 use phyture::flight::{Column, Flight};

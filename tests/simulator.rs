@@ -1,5 +1,6 @@
 //! The truth helicopter as a whole: it repeats, it stays in the air, it is the paper's baseline when nothing is switched on, and
 //! each mechanism leaves its mark.
+#![cfg(feature = "sim")]
 
 use nalgebra::{DMatrix, DVector};
 use phyture::Result;

@@ -1,6 +1,6 @@
 //! Training as a user meets it: a resumed run is the run that was not interrupted, a killed one loses little and breaks
 //! nothing, the hybrid's file and its stream say what its batch prediction says.
-#![cfg(feature = "files")]
+#![cfg(all(feature = "files", feature = "sim"))]
 
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::windows::windows;

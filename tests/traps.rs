@@ -1,5 +1,6 @@
 //! Ways in which a search for a missing effect is known to go wrong, each laid out as a trap: simulated flights in which a naive search
 //! names what is not there, misses what is, or bends a number. Each test says its trap by its name.
+#![cfg(feature = "sim")]
 
 use phyture::critique::diagnose::{CandidateReport, Options, Outcome, Status, Verdict, diagnose};
 use phyture::flight::attitude::{rotate, rotation_body_to_inertial};

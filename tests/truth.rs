@@ -1,5 +1,6 @@
 //! The truth helicopter and the calibration, together: with every mechanism off, least squares finds the truth as often as its
 //! intervals promise.
+#![cfg(feature = "sim")]
 
 use phyture::Result;
 use phyture::flight::Span;

@@ -1,11 +1,11 @@
 //! Hidden effects: data whose cause is known, and what `diagnose` says of them. A program, not a timed test.
 //!
-//!     cargo bench --features files --bench hidden_effect                                  a few cases of each kind, some two minutes
-//!     cargo bench --features files --bench hidden_effect -- run OUT.jsonl [PART…]         everything, resumable; PART is singles, pairs, nulls, aliens,
+//!     cargo bench --features files,sim --bench hidden_effect                                  a few cases of each kind, some two minutes
+//!     cargo bench --features files,sim --bench hidden_effect -- run OUT.jsonl [PART…]         everything, resumable; PART is singles, pairs, nulls, aliens,
 //!                                                                        confusables or textbook; names of effects choose among singles
-//!     cargo bench --features files --bench hidden_effect -- development OUT.jsonl [PART…] the same on development seeds
-//!     cargo bench --features files --bench hidden_effect -- table OUT.jsonl               the tables
-//!     cargo bench --features files --bench hidden_effect -- implants DATA FIXTURES        known effects in recorded flights, described by the files in FIXTURES
+//!     cargo bench --features files,sim --bench hidden_effect -- development OUT.jsonl [PART…] the same on development seeds
+//!     cargo bench --features files,sim --bench hidden_effect -- table OUT.jsonl               the tables
+//!     cargo bench --features files,sim --bench hidden_effect -- implants DATA FIXTURES        known effects in recorded flights, described by the files in FIXTURES
 //!
 //! Each run is a line of JSON, appended; a run that is there already is not repeated. Truth comes from `sim/`, which shares no code
 //! with the catalogue.

@@ -40,6 +40,11 @@ fn peak_gflops(isa: InstructionSet, threads: usize) -> f64 {
     })
 }
 
+/// An error in words.
+fn text(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}
+
 fn run() -> Result<String, String> {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let usage = "usage: dropout|nodropout|forward|peer-KIND THREADS BATCH HISTORY REPEATS";
@@ -49,7 +54,7 @@ fn run() -> Result<String, String> {
     if !["dropout", "nodropout", "forward"].contains(&case.as_str()) && !case.starts_with("peer-") {
         return Err(usage.into());
     }
-    let text = |error: phyture::Error| error.to_string();
+
     let isa = InstructionSet::detect().map_err(|error| error.to_string())?;
     let (alone, before) = (peak_gflops(isa, 1), peak_gflops(isa, threads));
     let config: Architecture = match case.strip_prefix("peer-") {

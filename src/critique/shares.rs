@@ -139,7 +139,7 @@ pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, j
     let row = |predicted: &[[f64; 6]]| Row { name: judged.name.to_owned(), predicted: predicted.to_vec() };
     let sums = |row: Row| {
         check_row(&row, windows)?;
-        Ok(block_sums(&measured, &row.predicted, &blocks))
+        Ok::<_, crate::Error>(block_sums(&measured, &row.predicted, &blocks))
     };
     let of_reference = match reference {
         Some(reference) => sums(reference.clone())?,

@@ -321,7 +321,11 @@ impl DataSet {
     ///
     /// # Examples
     /// ```
+    /// # #[cfg(feature = "sim")]
     /// # use phyture::sim::{Simulation, simulate};
+    /// # #[cfg(not(feature = "sim"))]
+    /// # fn main() {}
+    /// # #[cfg(feature = "sim")]
     /// # fn main() -> phyture::Result<()> {
     /// let mut set = simulate(&Simulation { minutes: 2.0, ..Simulation::baseline() })?;
     /// let name = set.flights[0].name.clone();

@@ -67,7 +67,7 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
             None => read_log(log, &schema, cuts)?,
         };
         let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
-        Ok((sparing(done, &held), prints))
+        Ok::<_, Error>((sparing(done, &held), prints))
     });
     let mut data = DataSet { notes, ..DataSet::default() };
     let (mut read, mut quaternions) = (Vec::new(), 0);

@@ -121,7 +121,7 @@ impl Machine {
             roots: Vec::new(),
             inputs: Vec::new(),
             block: 0,
-            isa: InstructionSet::detect().map_err(Error::level)?,
+            isa: InstructionSet::detect().map_err(Error::instruction_set)?,
             step_s,
         };
         let mut slots = Slots { count: 0, free: Vec::new(), of: vec![None; graph.nodes.len()] };

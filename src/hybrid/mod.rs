@@ -73,7 +73,7 @@ impl Description {
     /// # Errors
     /// [`Error::Config`] if the configuration is impossible.
     pub fn network(&self, standardise_loss: bool) -> Result<Network<f32>> {
-        Network::new(&self.config, &self.output_scale(), standardise_loss)
+        Ok(Network::new(&self.config, &self.output_scale(), standardise_loss)?)
     }
 
     /// From the network's unit scale to physical units.

@@ -147,7 +147,8 @@ impl Addition for Added<'_> {
             for (held, learned) in held.iter_mut().zip(hybrid.learned(output)) {
                 held[lane] = if replaces { learned } else { held[lane] + learned };
             }
-        })
+        })?;
+        Ok(())
     }
 
     fn replaces(&self) -> bool {

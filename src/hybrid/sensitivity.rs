@@ -269,5 +269,6 @@ fn step(
             sequence.history(last(sample), state, physics);
         }
     };
-    session.step(parameters, samples, None, &fill).map(|_| ())
+    session.step(parameters, samples, None, &fill)?;
+    Ok(())
 }

@@ -7,8 +7,8 @@ use super::config::PhyTureConfig;
 use super::configuration::Configuration;
 use super::layers::Recorder;
 use super::peers::{CnnConfig, CnnLstmConfig, DLinearConfig, InformerConfig, TcnConfig, TimeMixerConfig, TimesNetConfig};
-use crate::error::Result;
-use crate::tape::Var;
+use crate::nn::error::Result;
+use crate::tape::{self, Var};
 use phyture_kernels::Real;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
@@ -17,108 +17,145 @@ use serde_json::{Map, Value};
 /// Key in a file that tells the networks apart.
 const KIND: &str = "kind";
 
-/// A network and its sizes.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
-pub enum Architecture {
-    /// CNN hybrid.
-    Cnn(CnnConfig),
-    /// CNN–LSTM hybrid.
-    #[serde(rename = "cnn_lstm")]
-    CnnLstm(CnnLstmConfig),
-    /// TCN.
-    Tcn(TcnConfig),
-    /// DLinear.
-    DLinear(DLinearConfig),
-    /// TimeMixer.
-    TimeMixer(TimeMixerConfig),
-    /// TimesNet.
-    TimesNet(TimesNetConfig),
-    /// Conv–Informer.
-    Informer(InformerConfig),
-    /// Phy-Ture, its ablations and fusion variants. Written without a `kind`, so that earlier programs read it, too.
-    #[serde(untagged)]
-    PhyTure(PhyTureConfig),
-}
+/// Kind of a network that a file gives none.
+const PHYTURE: &str = "phyture";
 
-/// An expression of the configuration, whichever it is.
-macro_rules! of_each {
-    ($architecture:expr, $config:ident => $value:expr) => {
-        match $architecture {
-            Architecture::PhyTure($config) => $value,
-            Architecture::Cnn($config) => $value,
-            Architecture::CnnLstm($config) => $value,
-            Architecture::Tcn($config) => $value,
-            Architecture::DLinear($config) => $value,
-            Architecture::TimeMixer($config) => $value,
-            Architecture::TimesNet($config) => $value,
-            Architecture::Informer($config) => $value,
+/// The one list of the networks: what each is, its kind in files, its variant and its sizes.
+macro_rules! architectures {
+    ($($(#[$doc:meta])* $kind:literal $variant:ident($config:ty)),* $(,)?) => {
+        /// A network and its sizes.
+        #[derive(Clone, Debug, PartialEq, Serialize)]
+        #[serde(tag = "kind")]
+        pub enum Architecture {
+            $($(#[$doc])* #[serde(rename = $kind)] $variant($config),)*
+            /// Phy-Ture, its ablations and fusion variants. Written without a `kind`, so that earlier programs read it, too.
+            #[serde(untagged)]
+            PhyTure(PhyTureConfig),
         }
+
+        impl Architecture {
+            /// Kinds as they stand in files.
+            pub const KINDS: &[&str] = &[PHYTURE, $($kind),*];
+
+            fn configuration(&self) -> &dyn Configuration {
+                match self {
+                    $(Self::$variant(config) => config,)*
+                    Self::PhyTure(config) => config,
+                }
+            }
+
+            /// Records the network on the inputs S `[H, state_channels]` and P `[H, physics_channels]`; gives `[horizon, outputs]` at
+            /// unit scale.
+            ///
+            /// # Errors
+            /// As [`Graph::apply`](crate::tape::Graph::apply).
+            pub fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> tape::Result<Var> {
+                match self {
+                    $(Self::$variant(config) => config.record(recorder, state, physics),)*
+                    Self::PhyTure(config) => config.record(recorder, state, physics),
+                }
+            }
+
+            /// The network of a kind from the table of its sizes; `None` if there is no such kind.
+            fn of_kind(kind: &str, sizes: Value) -> Option<serde_json::Result<Self>> {
+                match kind {
+                    PHYTURE => Some(serde_json::from_value(sizes).map(Self::PhyTure)),
+                    $($kind => Some(serde_json::from_value(sizes).map(Self::$variant)),)*
+                    _ => None,
+                }
+            }
+        }
+
+        from_configuration!(PhyTure(PhyTureConfig), $($variant($config)),*);
     };
 }
+
+/// From a network's own configuration, owned or borrowed.
+macro_rules! from_configuration {
+    ($($variant:ident($config:ty)),*) => {$(
+        impl From<$config> for Architecture {
+            fn from(config: $config) -> Self {
+                Self::$variant(config)
+            }
+        }
+        impl From<&$config> for Architecture {
+            fn from(config: &$config) -> Self {
+                Self::$variant(config.clone())
+            }
+        }
+    )*};
+}
+
+architectures!(
+    /// CNN hybrid.
+    "cnn" Cnn(CnnConfig),
+    /// CNN–LSTM hybrid.
+    "cnn_lstm" CnnLstm(CnnLstmConfig),
+    /// TCN.
+    "tcn" Tcn(TcnConfig),
+    /// DLinear.
+    "dlinear" DLinear(DLinearConfig),
+    /// TimeMixer.
+    "timemixer" TimeMixer(TimeMixerConfig),
+    /// TimesNet.
+    "timesnet" TimesNet(TimesNetConfig),
+    /// Conv–Informer.
+    "informer" Informer(InformerConfig),
+);
 
 impl Architecture {
     /// As it stands in tables, for example `Phy-Ture`.
     pub fn name(&self) -> &'static str {
-        of_each!(self, config => config.name())
+        self.configuration().name()
     }
 
     /// H, samples of the history.
     pub fn history(&self) -> usize {
-        of_each!(self, config => Configuration::history(config))
+        self.configuration().history()
     }
 
     /// Channels of S.
     pub fn state_channels(&self) -> usize {
-        of_each!(self, config => Configuration::state_channels(config))
+        self.configuration().state_channels()
     }
 
     /// Channels of P: 6.
     pub fn physics_channels(&self) -> usize {
-        of_each!(self, config => Configuration::physics_channels(config))
+        self.configuration().physics_channels()
     }
 
     /// Channels predicted: 6.
     pub fn outputs(&self) -> usize {
-        of_each!(self, config => Configuration::outputs(config))
+        self.configuration().outputs()
     }
 
     /// P, rows predicted: 1, the last of the history, but for some settings of Phy-Ture.
     pub fn horizon(&self) -> usize {
-        of_each!(self, config => Configuration::horizon(config))
+        self.configuration().horizon()
     }
 
     /// Whether the output is the residual r̂ of eq. 11 (true), to which the physical baseline is added (eq. 12), or the
     /// acceleration itself (false).
     pub fn predicts_residual(&self) -> bool {
-        of_each!(self, config => Configuration::predicts_residual(config))
+        self.configuration().predicts_residual()
     }
 
     /// Whether the history of the physical baseline is an input that reaches the output.
     pub fn reads_physics(&self) -> bool {
-        of_each!(self, config => Configuration::reads_physics(config))
+        self.configuration().reads_physics()
     }
 
     /// Whether training draws random numbers (dropout, sampled keys).
     pub fn is_random(&self) -> bool {
-        of_each!(self, config => Configuration::is_random(config))
+        self.configuration().is_random()
     }
 
     /// Checks each size and how they fit together.
     ///
     /// # Errors
-    /// [`Error::Config`](crate::Error::Config) with the field, its value and its range.
+    /// [`Error::Size`](super::Error::Size) with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
-        of_each!(self, config => Configuration::check(config))
-    }
-
-    /// Records the network on the inputs S `[H, state_channels]` and P `[H, physics_channels]`; gives `[horizon, outputs]` at
-    /// unit scale.
-    ///
-    /// # Errors
-    /// As [`Graph::apply`](crate::tape::Graph::apply).
-    pub fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> Result<Var> {
-        of_each!(self, config => config.record(recorder, state, physics))
+        self.configuration().check()
     }
 }
 
@@ -135,59 +172,14 @@ impl From<&Self> for Architecture {
     }
 }
 
-/// From a network's own configuration, owned or borrowed.
-macro_rules! from_configuration {
-    ($($variant:ident($config:ty)),* $(,)?) => {$(
-        impl From<$config> for Architecture {
-            fn from(config: $config) -> Self {
-                Self::$variant(config)
-            }
-        }
-        impl From<&$config> for Architecture {
-            fn from(config: &$config) -> Self {
-                Self::$variant(config.clone())
-            }
-        }
-    )*};
-}
-
-from_configuration!(
-    PhyTure(PhyTureConfig),
-    Cnn(CnnConfig),
-    CnnLstm(CnnLstmConfig),
-    Tcn(TcnConfig),
-    DLinear(DLinearConfig),
-    TimeMixer(TimeMixerConfig),
-    TimesNet(TimesNetConfig),
-    Informer(InformerConfig),
-);
-
 impl<'de> Deserialize<'de> for Architecture {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let mut fields = Map::<String, Value>::deserialize(deserializer)?;
-        let kind = fields.remove(KIND);
-        let fields = Value::Object(fields);
-        let read = match kind.as_ref().map(|kind| kind.as_str().unwrap_or_default()) {
-            None | Some("phyture") => serde_json::from_value(fields).map(Self::PhyTure),
-            Some("cnn") => serde_json::from_value(fields).map(Self::Cnn),
-            Some("cnn_lstm") => serde_json::from_value(fields).map(Self::CnnLstm),
-            Some("tcn") => serde_json::from_value(fields).map(Self::Tcn),
-            Some("dlinear") => serde_json::from_value(fields).map(Self::DLinear),
-            Some("timemixer") => serde_json::from_value(fields).map(Self::TimeMixer),
-            Some("timesnet") => serde_json::from_value(fields).map(Self::TimesNet),
-            Some("informer") => serde_json::from_value(fields).map(Self::Informer),
-            Some(_) => {
-                let found = kind.unwrap_or_default();
-                return Err(D::Error::custom(format!("network kind {found}; expected one of: {}", Self::KINDS.join(", "))));
-            }
-        };
-        read.map_err(|error| D::Error::custom(format!("network: {error}")))
+        let mut sizes = Map::<String, Value>::deserialize(deserializer)?;
+        let kind = sizes.remove(KIND).unwrap_or_else(|| PHYTURE.into());
+        let read = kind.as_str().and_then(|kind| Self::of_kind(kind, Value::Object(sizes)));
+        let expected = || D::Error::custom(format!("network kind {kind}; expected one of: {}", Self::KINDS.join(", ")));
+        read.ok_or_else(expected)?.map_err(|error| D::Error::custom(format!("network: {error}")))
     }
-}
-
-impl Architecture {
-    /// Kinds as they stand in files.
-    pub const KINDS: [&'static str; 8] = ["phyture", "cnn", "cnn_lstm", "tcn", "dlinear", "timemixer", "timesnet", "informer"];
 }
 
 #[cfg(test)]
@@ -200,11 +192,11 @@ mod tests {
             serde_json::from_str::<Architecture>(r#"{"heads": 2}"#)?,
             PhyTureConfig { heads: 2, ..PhyTureConfig::default() }.into()
         );
-        for kind in Architecture::KINDS {
+        for &kind in Architecture::KINDS {
             let network: Architecture = serde_json::from_str(&format!(r#"{{"kind": "{kind}", "history": 64}}"#))?;
             assert_eq!(network.history(), 64);
             let text = serde_json::to_string(&network)?;
-            assert_eq!(text.contains(KIND), kind != "phyture", "{text}");
+            assert_eq!(text.contains(KIND), kind != PHYTURE, "{text}");
             assert_eq!(serde_json::from_str::<Architecture>(&text)?, network);
         }
         Ok(())

@@ -3,7 +3,7 @@
 //! What the sizes mean is in `phyture`; how the network is trained is not here.
 
 use super::configuration::{LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused};
-use crate::error::Result;
+use crate::nn::error::Result;
 use serde::{Deserialize, Serialize};
 
 /// Phy-Ture, its ablations (paper table 4) and its fusion variants (paper table 6).
@@ -142,7 +142,7 @@ impl PhyTureConfig {
     /// Checks each field and how they fit together.
     ///
     /// # Errors
-    /// [`Error::Config`](crate::Error::Config) with the field, its value and its range.
+    /// [`Error::Size`](super::Error::Size) with the field, its value and its range.
     pub fn check(&self) -> Result<()> {
         let refuse = |field: &str, found: String, expected: String| Err(refused(field, found, expected));
         let sizes = [
@@ -201,7 +201,7 @@ impl PhyTureConfig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Error;
+    use crate::nn::error::Error;
 
     #[test]
     fn each_rule_names_its_field() {
@@ -222,7 +222,7 @@ mod tests {
             ("horizon", PhyTureConfig { horizon: 1001, ..base() }),
         ];
         for (name, config) in wrong {
-            assert!(matches!(config.check(), Err(Error::Config { field, .. }) if field == name), "{name}: {config:?}");
+            assert!(matches!(config.check(), Err(Error::Size { field, .. }) if field == name), "{name}: {config:?}");
         }
     }
 

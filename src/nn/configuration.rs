@@ -2,8 +2,8 @@
 //! knows.
 
 use super::layers::Recorder;
-use crate::error::{Error, Result};
-use crate::tape::Var;
+use crate::nn::error::{Error, Result};
+use crate::tape::{self, Var};
 use phyture_kernels::Real;
 
 /// Channels of P and of the prediction: three linear and three angular accelerations (eqs. 11 and 16).
@@ -57,7 +57,9 @@ pub(crate) trait Configuration {
     fn check(&self) -> Result<()>;
 
     /// Records the network: S `[H, state_channels]` and P `[H, physics_channels]` to `[horizon, outputs]` at unit scale.
-    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> Result<Var>;
+    fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, physics: Var) -> tape::Result<Var>
+    where
+        Self: Sized;
 }
 
 /// Checks that sizes lie in 1 to their largest value, and numbers in their range.
@@ -77,5 +79,5 @@ pub(crate) fn check_ranges(sizes: &[(&str, usize, usize)], reals: &[(&str, f64, 
 
 /// The error for a size that cannot be.
 pub(crate) fn refused(field: &str, found: impl std::fmt::Display, expected: impl Into<String>) -> Error {
-    Error::Config { place: "network".into(), field: field.into(), found: found.to_string(), expected: expected.into() }
+    Error::Size { field: field.into(), found: found.to_string(), expected: expected.into() }
 }

@@ -5,9 +5,8 @@
 //! at weight 1 and bias 0. The attention's query, key, value and output maps are four separate linear layers and follow the
 //! linear rule (not the packed Xavier rule of `MultiheadAttention`).
 
-use crate::error::Result;
 use crate::tape::ops::{BatchNorm, Conv1d, Epilogue, GeneralConv1d, LayerNorm, Linear, Lstm, Temporal, TemporalEach, WeightNorm};
-use crate::tape::{Graph, Var};
+use crate::tape::{Graph, Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::random::Stream;
 

@@ -6,6 +6,7 @@
 mod architecture;
 mod config;
 mod configuration;
+mod error;
 mod layers;
 mod network;
 pub mod parity;
@@ -15,6 +16,7 @@ pub mod safetensors;
 
 pub use architecture::Architecture;
 pub use config::{PhyTureConfig, Variant};
+pub use error::{Error, Result};
 pub use layers::{Init, Recorder};
 pub(crate) use network::LossRule;
 pub use network::{Network, OutputScale};

@@ -6,7 +6,7 @@
 
 use super::architecture::Architecture;
 use super::layers::{Init, Recorder};
-use crate::error::{Error, Result};
+use crate::nn::error::{Error, Result};
 use crate::tape::ops::{Affine, SquaredError};
 use crate::tape::{Graph, Parameter, Var};
 use phyture_kernels::Real;
@@ -59,7 +59,7 @@ impl<T: Real> Network<T> {
     /// rows predicted; a session's mean over samples is then eq. 13.
     ///
     /// # Errors
-    /// [`Error::Config`] if the configuration or the length of the output scale is wrong.
+    /// [`Error::Size`] if the configuration or the length of the output scale is wrong.
     ///
     /// With `standardise`, the errors of each channel are divided by its output scale first, so that channels of small and of
     /// large magnitude count alike.
@@ -75,8 +75,7 @@ impl<T: Real> Network<T> {
         architecture.check()?;
         let (history, outputs) = (architecture.history(), architecture.outputs());
         if scale.scale.len() != outputs || scale.offset.len() != outputs {
-            return Err(Error::Config {
-                place: "network".into(),
+            return Err(Error::Size {
                 field: "output scale".into(),
                 found: format!("{} scales and {} offsets", scale.scale.len(), scale.offset.len()),
                 expected: format!("{outputs} of each, one an output channel"),
@@ -93,8 +92,7 @@ impl<T: Real> Network<T> {
         let predicted = architecture.record(&mut recorder, state, physics)?;
         let Recorder { mut graph, inits } = recorder;
         if graph.parameter_count() > MOST_PARAMETERS {
-            return Err(Error::Config {
-                place: "network".into(),
+            return Err(Error::Size {
                 field: "sizes".into(),
                 found: format!("{} parameters", graph.parameter_count()),
                 expected: format!("at most {MOST_PARAMETERS}; make the network smaller"),

@@ -81,9 +81,10 @@ enum Problem {
     Other(Error),
 }
 
-impl From<Error> for Problem {
-    fn from(error: Error) -> Self {
-        Self::Other(error)
+/// Whatever becomes an error of the crate.
+impl<E: Into<Error>> From<E> for Problem {
+    fn from(error: E) -> Self {
+        Self::Other(error.into())
     }
 }
 
@@ -161,11 +162,11 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
 
     let mut compared = Compared::<T>::new();
     let all = |of: &dyn Fn(usize) -> Result<Vec<T>>| (0..samples).map(of).collect::<Result<Vec<_>>>().map(|each| each.concat());
-    let output = all(&|sample| session.output(0, sample).map(<[T]>::to_vec))?;
+    let output = all(&|sample| Ok(session.output(0, sample)?.to_vec()))?;
     compared.insert("output".into(), (output, tensor(file, "output", &[samples, horizon, outputs])?));
     compared.insert("loss".into(), (vec![T::of(loss)], tensor(file, "loss", &[1])?));
     for (index, (name, shape)) in inputs.into_iter().take(2).enumerate() {
-        let mut gradient = all(&|sample| session.input_gradient(index, sample).map(<[T]>::to_vec))?;
+        let mut gradient = all(&|sample| Ok(session.input_gradient(index, sample)?.to_vec()))?;
         // Physics does not reach the loss of a network without physics.
         if gradient.is_empty() {
             gradient.resize(shape.iter().product(), T::ZERO);
@@ -244,12 +245,13 @@ mod tests {
                 input.copy_from_slice(&given[sample * len..][..len]);
             }
         })?;
-        let collect =
-            |part: &dyn Fn(usize) -> Result<Vec<f64>>| (0..samples).map(part).collect::<Result<Vec<_>>>().map(|each| each.concat());
+        let collect = |part: &dyn Fn(usize) -> crate::tape::Result<Vec<f64>>| {
+            (0..samples).map(part).collect::<crate::tape::Result<Vec<_>>>().map(|each| each.concat())
+        };
         put("loss", &[1], vec![loss]);
-        put("output", &[samples, 1, 6], collect(&|sample| session.output(0, sample).map(<[f64]>::to_vec))?);
+        put("output", &[samples, 1, 6], collect(&|sample| Ok(session.output(0, sample)?.to_vec()))?);
         for (index, (name, shape)) in shapes.into_iter().take(2).enumerate() {
-            let mut gradient = collect(&|sample| session.input_gradient(index, sample).map(<[f64]>::to_vec))?;
+            let mut gradient = collect(&|sample| Ok(session.input_gradient(index, sample)?.to_vec()))?;
             gradient.resize(shape.iter().product(), 0.0);
             put(&format!("grad.{name}"), &shape, gradient);
         }

@@ -6,11 +6,10 @@
 use super::config::{PhyTureConfig, Variant};
 use super::configuration::Configuration;
 use super::layers::Recorder;
-use crate::error::Result;
-use crate::tape::Var;
 use crate::tape::ops::{
     Add, Attention, Concatenate, Epilogue, Half, Interleave, LastRows, MovingAverage, PositionalEncoding, ScaleExp, Subtract,
 };
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 
 impl Configuration for PhyTureConfig {
@@ -50,7 +49,7 @@ impl Configuration for PhyTureConfig {
         self.dropout > 0.0
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         self.check()
     }
 
@@ -169,12 +168,12 @@ mod tests {
     use super::*;
     use crate::nn::{Network, OutputScale};
 
-    fn count(config: PhyTureConfig) -> Result<usize> {
+    fn count(config: PhyTureConfig) -> crate::nn::Result<usize> {
         Ok(Network::<f32>::new(&config, &OutputScale::unit(6), false)?.graph().parameter_count())
     }
 
     #[test]
-    fn parameter_counts_are_those_of_the_architecture() -> Result<()> {
+    fn parameter_counts_are_those_of_the_architecture() -> crate::nn::Result<()> {
         let base = PhyTureConfig::default;
         // Fusion 18 304, two trees of seven blocks of four modules 1 842 176, decomposition 2392.
         assert_eq!(count(base())?, 1_862_872);
@@ -189,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn initial_parameters_follow_their_bounds_and_their_seed() -> Result<()> {
+    fn initial_parameters_follow_their_bounds_and_their_seed() -> crate::nn::Result<()> {
         let config = PhyTureConfig { history: 16, moving_average: 5, ..PhyTureConfig::default() };
         let network = Network::<f64>::new(&config, &OutputScale::unit(6), false)?;
         let (first, again, other) = (network.initial(1), network.initial(1), network.initial(2));

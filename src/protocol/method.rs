@@ -75,7 +75,7 @@ const fn network(
 }
 
 /// Every method.
-pub const METHODS: [Method; 25] = [
+pub const METHODS: &[Method] = &[
     row("physical_baseline", "Physical baseline", None, Predictor::Physics { amended: false }),
     row(
         "amended_physics",

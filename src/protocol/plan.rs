@@ -90,7 +90,7 @@ impl FromStr for TableId {
 }
 
 /// Rows of Tables 1 and 3: the paper's, then ours.
-pub(super) const COMPARISON: [&str; 14] = [
+pub(super) const COMPARISON: &[&str] = &[
     "physical_baseline",
     "cnn",
     "cnn_lstm",
@@ -108,22 +108,22 @@ pub(super) const COMPARISON: [&str; 14] = [
 ];
 
 /// Rows of Table 4.
-pub(super) const ABLATION: [&str; 5] = ["without_paf", "without_mstfe", "without_tsdp_linear", "without_tsdp_last", "phyture"];
+pub(super) const ABLATION: &[&str] = &["without_paf", "without_mstfe", "without_tsdp_linear", "without_tsdp_last", "phyture"];
 
 /// Rows of Table 5.
-pub(super) const SWEEP: [&str; 5] = ["average_5", "average_15", "average_25", "average_35", "average_45"];
+pub(super) const SWEEP: &[&str] = &["average_5", "average_15", "average_25", "average_35", "average_45"];
 
 /// Rows of Table 6; the third is the paper's Residual Correction.
-pub(super) const FUSION: [&str; 4] = ["state_control_only", "direct_concatenation", "without_paf", "phyture"];
+pub(super) const FUSION: &[&str] = &["state_control_only", "direct_concatenation", "without_paf", "phyture"];
 
 /// Methods of the robustness table.
-pub(super) const ROBUST: [&str; 3] = ["physical_baseline", "cnn_lstm", "phyture"];
+pub(super) const ROBUST: &[&str] = &["physical_baseline", "cnn_lstm", "phyture"];
 
 /// Yardsticks that stand in it under noise only: nothing else that it does reaches them.
-pub(super) const ROBUST_YARDSTICKS: [&str; 2] = ["backward_difference", "ridge"];
+pub(super) const ROBUST_YARDSTICKS: &[&str] = &["backward_difference", "ridge"];
 
 /// Treatments of the robustness table; noise is a condition of every outcome.
-pub(super) const TREATMENTS: [Treatment; 5] = [
+pub(super) const TREATMENTS: &[Treatment] = &[
     Treatment::Plain,
     Treatment::CoefficientsOff(10),
     Treatment::CoefficientsOff(30),
@@ -262,16 +262,16 @@ impl Plan {
                 self.wanted(ids).flat_map(|id| self.runs_of(id, division, Treatment::Plain)).collect()
             };
             all.extend(match table {
-                TableId::Paper(1 | 2) => plain(&COMPARISON, Division::Benchmark),
-                TableId::Paper(3) => (0..self.folds.len()).flat_map(|fold| plain(&COMPARISON, Division::Fold(fold))).collect(),
-                TableId::Paper(4) => plain(&ABLATION, Division::Benchmark),
-                TableId::Paper(5) => plain(&SWEEP, Division::Benchmark),
-                TableId::Paper(_) => plain(&FUSION, Division::Benchmark),
+                TableId::Paper(1 | 2) => plain(COMPARISON, Division::Benchmark),
+                TableId::Paper(3) => (0..self.folds.len()).flat_map(|fold| plain(COMPARISON, Division::Fold(fold))).collect(),
+                TableId::Paper(4) => plain(ABLATION, Division::Benchmark),
+                TableId::Paper(5) => plain(SWEEP, Division::Benchmark),
+                TableId::Paper(_) => plain(FUSION, Division::Benchmark),
                 TableId::Robustness => {
-                    let treated = TREATMENTS.into_iter().flat_map(|treatment| {
-                        self.wanted(&ROBUST).flat_map(move |id| self.runs_of(id, Division::Benchmark, treatment))
+                    let treated = TREATMENTS.iter().flat_map(|&treatment| {
+                        self.wanted(ROBUST).flat_map(move |id| self.runs_of(id, Division::Benchmark, treatment))
                     });
-                    treated.chain(plain(&ROBUST_YARDSTICKS, Division::Benchmark)).collect()
+                    treated.chain(plain(ROBUST_YARDSTICKS, Division::Benchmark)).collect()
                 }
             });
         }

@@ -150,11 +150,11 @@ impl Finished {
         let mut tables = Vec::new();
         for table in &self.plan.tables {
             match table {
-                TableId::Paper(1) => tables.push(self.plain(1, "RMSE of every method, benchmark division", &COMPARISON)),
+                TableId::Paper(1) => tables.push(self.plain(1, "RMSE of every method, benchmark division", COMPARISON)),
                 TableId::Paper(2) => tables.extend(self.worst_case()),
                 TableId::Paper(3) => tables.extend(self.folds()),
-                TableId::Paper(4) => tables.push(self.plain(4, "RMSE without one module each", &ABLATION)),
-                TableId::Paper(5) => tables.push(self.plain(5, "RMSE by width w of the moving average", &SWEEP)),
+                TableId::Paper(4) => tables.push(self.plain(4, "RMSE without one module each", ABLATION)),
+                TableId::Paper(5) => tables.push(self.plain(5, "RMSE by width w of the moving average", SWEEP)),
                 TableId::Paper(number) => tables.push(self.fusion(*number)),
                 TableId::Robustness => tables.push(self.robustness()),
             }
@@ -183,7 +183,7 @@ impl Finished {
 
     /// Table 6: its third row is a row of Table 4 under another name.
     fn fusion(&self, number: u8) -> Table {
-        let mut table = self.plain(number, "RMSE by the way physics enters", &FUSION);
+        let mut table = self.plain(number, "RMSE by the way physics enters", FUSION);
         for row in table.rows.iter_mut().filter(|row| row.method == "without_paf") {
             "Residual Correction".clone_into(&mut row.name);
             row.note = Some("the same run as Without PAF".into());
@@ -193,7 +193,7 @@ impl Finished {
 
     /// Table 2: Phy-Ture and the best of the paper's other methods in Table 1. `None` until both have a run.
     fn worst_case(&self) -> Option<Table> {
-        let rivals = self.plan.wanted(&COMPARISON).filter(|id| *id != "phyture" && paper::printed(1, id).is_some());
+        let rivals = self.plan.wanted(COMPARISON).filter(|id| *id != "phyture" && paper::printed(1, id).is_some());
         let mean = |id: &'static str| {
             let row = self.row(method(id)?, Treatment::Plain, Condition::Clean, RMSE);
             Some((id, row.cells[6]?.mean))
@@ -223,7 +223,7 @@ impl Finished {
             PerChannel::new(std::array::from_fn(mean))
         };
         let table = |id: &str, title: &str, combine: &dyn Fn(&[Vec<Segment>]) -> PerChannel, printed: bool| {
-            let rows = self.plan.wanted(&COMPARISON).filter_map(method).map(|method| {
+            let rows = self.plan.wanted(COMPARISON).filter_map(method).map(|method| {
                 let (found, planned) = self.over_folds(method, combine);
                 let mut row = row(method, "RMSE", &found, planned, None);
                 row.paper = paper::printed(3, method.id).filter(|_| printed);
@@ -258,11 +258,11 @@ impl Finished {
             row.name = format!("{}, {words}", method.name);
             rows.push(row);
         };
-        for method in self.plan.wanted(&ROBUST).chain(self.plan.wanted(&ROBUST_YARDSTICKS)).filter_map(method) {
+        for method in self.plan.wanted(ROBUST).chain(self.plan.wanted(ROBUST_YARDSTICKS)).filter_map(method) {
             add(method, Treatment::Plain, Condition::Clean, "as recorded".into());
             add(method, Treatment::Plain, Condition::StateNoise, "noise on the states".into());
             add(method, Treatment::Plain, Condition::ControlNoise, "noise on the controls".into());
-            let treatments: &[Treatment] = if ROBUST.contains(&method.id) { &TREATMENTS } else { &[] };
+            let treatments: &[Treatment] = if ROBUST.contains(&method.id) { TREATMENTS } else { &[] };
             for treatment in treatments {
                 let words = match treatment {
                     Treatment::Plain => continue,
@@ -283,7 +283,7 @@ impl Finished {
     /// manoeuvre). Parts are in the order of their names, methods in the order of the table.
     pub fn by_part(&self, part: impl Fn(&Segment) -> String) -> BTreeMap<String, Vec<(&'static Method, PerChannel)>> {
         let mut parts: BTreeMap<String, Vec<(&'static Method, PerChannel)>> = BTreeMap::new();
-        for method in self.plan.wanted(&COMPARISON).filter_map(method) {
+        for method in self.plan.wanted(COMPARISON).filter_map(method) {
             let mut errors: BTreeMap<String, Vec<PerChannel>> = BTreeMap::new();
             for outcome in self.seeds(method.id, Treatment::Plain) {
                 let mut groups: BTreeMap<String, Vec<&Segment>> = BTreeMap::new();

@@ -68,6 +68,19 @@ struct Wanted {
     thrust: f64,
 }
 
+/// What the outer loop is to fly at a moment.
+struct Course {
+    /// Above the ground, m, unless `climb` says more.
+    height: f64,
+    /// Ahead and to the right of the path's heading, m/s.
+    velocity: [f64; 2],
+    /// m/s; `None` holds the height.
+    climb: Option<f64>,
+    /// Of the nose and of the path, rad/s.
+    turns: [f64; 2],
+    inverted: bool,
+}
+
 impl Pilot {
     pub(super) fn new(home: f64, segments: Vec<Segment>, heading: f64, sticks: [f64; 4], step_s: f64, mut random: Random) -> Self {
         let dither = DITHER.map(|rms| GaussMarkov::new(rms, DITHER_TIME_S, step_s, &mut random));
@@ -116,15 +129,21 @@ impl Pilot {
             }
             Goal::Lean { bank, pitch, period } => self.lean(state, &rotation, height, [bank, pitch, period]),
             Goal::Path { ahead, right, climb, nose_turn, path_turn, inverted } => {
-                self.path(state, &rotation, height, [ahead, right], climb, [nose_turn, path_turn], inverted)
+                let course = Course { height, velocity: [ahead, right], climb, turns: [nose_turn, path_turn], inverted };
+                self.path(state, &rotation, &course)
             }
-            Goal::Stick { ahead, .. } => self.path(state, &rotation, height, [ahead, 0.0], None, [0.0; 2], false),
+            Goal::Stick { ahead, .. } => {
+                let course = Course { height, velocity: [ahead, 0.0], climb: None, turns: [0.0; 2], inverted: false };
+                self.path(state, &rotation, &course)
+            }
             Goal::Sweep { ahead, right, climb, turn, periods: [first, last], inverted } => {
                 // Phase of a sine whose frequency goes linearly from 1/first to 1/last.
                 let phase = TAU * self.elapsed * (1.0 / first + 0.5 * self.elapsed / seconds * (1.0 / last - 1.0 / first));
                 let (sine, cosine) = phase.sin_cos();
                 let climb = climb * sine + 0.3 * (height + state.position[2]);
-                self.path(state, &rotation, height, [ahead * sine, right * cosine], Some(climb), [turn * cosine; 2], inverted)
+                let velocity = [ahead * sine, right * cosine];
+                let course = Course { height, velocity, climb: Some(climb), turns: [turn * cosine; 2], inverted };
+                self.path(state, &rotation, &course)
             }
         };
         let mut sticks = self.sticks_for(state, &wanted);
@@ -147,17 +166,8 @@ impl Pilot {
     }
 
     /// Outer loop: velocity to thrust direction to rates.
-    #[expect(clippy::too_many_arguments, reason = "the fields of one goal")]
-    fn path(
-        &mut self,
-        state: &State,
-        rotation: &[[f64; 3]; 3],
-        height: f64,
-        [ahead, right]: [f64; 2],
-        climb: Option<f64>,
-        [nose_turn, path_turn]: [f64; 2],
-        inverted: bool,
-    ) -> Wanted {
+    fn path(&mut self, state: &State, rotation: &[[f64; 3]; 3], course: &Course) -> Wanted {
+        let Course { height, velocity: [ahead, right], climb, turns: [nose_turn, path_turn], inverted } = *course;
         self.heading += path_turn * self.step_s;
         self.nose += nose_turn * self.step_s;
         let (sine, cosine) = self.heading.sin_cos();

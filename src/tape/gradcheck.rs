@@ -10,7 +10,7 @@ use super::op::{Backward, Differentiable, Forward, Gradient, MAX_OPERANDS, Op};
 use super::slab::Slabs;
 use super::threads::Parallelism;
 use super::{DropoutKey, Fill, Graph, Parts, Session, Shape, Threads, Var};
-use crate::error::Error;
+use crate::tape::error::Error;
 use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Tolerance, Write};
@@ -308,22 +308,30 @@ fn pieces<T: Real>(trial: &Trial<'_, T>) -> Checked {
     Ok(())
 }
 
+/// What the mean loss of a step depends on, as a session is given it.
+#[derive(Clone, Copy)]
+pub struct LossOf<'a> {
+    /// The graph.
+    pub graph: &'a Graph<f64>,
+    /// Its loss.
+    pub loss: Var,
+    /// The flat slab.
+    pub parameters: &'a [f64],
+    /// Samples of the step.
+    pub samples: usize,
+    /// Of the random parts; `None` switches them off.
+    pub dropout: Option<DropoutKey>,
+    /// Fills the inputs of a sample.
+    pub fill: Fill<'a, f64>,
+}
+
 /// Gradients of a whole graph's mean loss: directional derivatives along each parameter tensor, and along all at once.
 ///
 /// # Errors
 /// The first [`Disagreement`], naming the parameter; also if a parameter's gradient is not finite, or is zero where `zero` of
 /// its name is false, or the reverse (a bias of keys, for example, has none: softmax does not see it).
-#[expect(clippy::too_many_arguments, reason = "a check is a function of all that a step is")]
-pub fn graph(
-    graph: &Graph<f64>,
-    loss: Var,
-    parameters: &[f64],
-    samples: usize,
-    dropout: Option<DropoutKey>,
-    fill: Fill<'_, f64>,
-    zero: &dyn Fn(&str) -> bool,
-    seed: u64,
-) -> Checked {
+pub fn graph(of: &LossOf<'_>, zero: &dyn Fn(&str) -> bool, seed: u64) -> Checked {
+    let LossOf { graph, loss, parameters, samples, dropout, fill } = *of;
     let mut session = Session::train(graph, loss, &[], Threads(1))?;
     session.set_poison(true);
     session.step(parameters, samples, dropout, fill)?;
@@ -358,7 +366,7 @@ pub fn graph(
                 for ((to, from), direction) in moved[range.clone()].iter_mut().zip(&parameters[range.clone()]).zip(&direction) {
                     *to = from + step * direction;
                 }
-                let mut run = || -> crate::Result<f64> {
+                let mut run = || -> Result<f64, Error> {
                     values.step(&moved, samples, dropout, fill)?;
                     let each = (0..samples).map(|sample| values.output(0, sample).map(|loss| loss.iter().sum::<f64>()));
                     each.sum()
@@ -409,7 +417,7 @@ mod tests {
     use super::super::op::Reads;
     use super::super::ops::{Add, Linear};
     use super::*;
-    use crate::error::Result;
+    use crate::tape::error::Result;
 
     /// A backward pass with one planted fault.
     #[derive(Clone, Copy, Debug)]
@@ -528,7 +536,8 @@ mod tests {
                 }
             };
             let parameters = numbers::<f64>(Stream::new(3, 0, 0, 0), recorded.parameter_count());
-            let checked = graph(&recorded, loss, &parameters, 3, None, &fill, &|_| false, 1);
+            let of = LossOf { graph: &recorded, loss, parameters: &parameters, samples: 3, dropout: None, fill: &fill };
+            let checked = graph(&of, &|_| false, 1);
             assert_eq!(checked.is_ok(), fine, "{fault:?}: {checked:?}");
         }
         Ok(())

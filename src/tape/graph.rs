@@ -7,7 +7,7 @@ use super::op::{MAX_OPERANDS, Op};
 use super::ops::Copy;
 use super::parameter::{Parameter, Storage};
 use super::shape::Shape;
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use phyture_kernels::Real;
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -239,7 +239,7 @@ mod tests {
         let x = graph.input("x", &[7, 3])?;
         let weight = graph.parameter("weight", &[5, 4])?;
         let Err(error) = graph.apply(Linear, &[x, weight]) else {
-            return Err(Error::Undetermined("a [7, 3] input passed a [5, 4] weight".into()));
+            return Err(Error::Shape { operation: "linear", message: "a [7, 3] input passed a [5, 4] weight".into() });
         };
         let text = error.to_string();
         assert!(text.contains("linear") && text.contains("[7, 3]") && text.contains("[5, 4]"), "{text}");

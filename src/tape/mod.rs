@@ -8,6 +8,7 @@ pub mod gradcheck;
 pub mod op;
 pub mod ops;
 
+pub mod error;
 mod graph;
 mod parameter;
 mod parts;
@@ -17,6 +18,7 @@ mod shape;
 mod slab;
 mod threads;
 
+pub use error::{Error, Result};
 pub use graph::{Graph, MAX_INPUTS, Var};
 pub use parameter::{Parameter, Storage};
 pub use parts::Parts;

@@ -3,7 +3,7 @@
 
 use super::parts::Parts;
 use super::shape::Shape;
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Rows, Write};

@@ -75,7 +75,7 @@ impl Parameter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Result;
+    use crate::tape::error::Result;
     use proptest::prelude::*;
 
     proptest! {

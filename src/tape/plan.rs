@@ -11,7 +11,7 @@
 use super::graph::{Graph, Var};
 use super::op::MICRO_BATCH;
 use super::slab::alignment;
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use large_weights::{MicroBatches, complement};
 use layout::Layout;
 use orders::Orders;

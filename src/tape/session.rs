@@ -13,7 +13,7 @@ use super::op::Pass;
 use super::plan::Plan;
 use super::slab::{Slab, Slabs};
 use super::threads::{Threads, Workers};
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use large_weights::LargeWeights;
 use lockstep::Lockstep;
 use packing::pack;
@@ -51,9 +51,9 @@ pub type Fill<'a, T> = &'a (dyn Fn(usize, &mut [&mut [T]]) + Sync);
 /// different ones differ in the last digits.
 ///
 /// # Errors
-/// [`Error::Config`] if the environment asks for one that this processor does not have.
+/// [`Error::InstructionSet`] if the environment asks for one that this processor does not have.
 pub fn instruction_set() -> Result<InstructionSet> {
-    InstructionSet::detect().map_err(Error::level)
+    Ok(InstructionSet::detect()?)
 }
 
 /// A plan with its memory, ready to be replayed.
@@ -84,7 +84,7 @@ impl<T: Real> Session<T> {
     ///
     /// # Errors
     /// [`Error::Shape`] if the loss is not one number, depends on nothing trainable, or an operation on the way has no backward
-    /// pass; [`Error::Config`] if the instruction-set level asked for is not available, or threads cannot be started.
+    /// pass; [`Error::InstructionSet`] if the one asked for is not available, [`Error::Threads`] if threads cannot be started.
     pub fn train(graph: &Graph<T>, loss: Var, outputs: &[Var], threads: Threads) -> Result<Self> {
         Self::new(Plan::train(graph, loss, outputs)?, threads)
     }
@@ -459,8 +459,12 @@ mod tests {
         assert!((whole - sum / 5.0).abs() < Tolerance::Close.relative_f64());
         assert!(gradients.iter().zip(&sums).all(|(whole, sum)| (whole - sum / 5.0).abs() < Tolerance::Close.relative_f64()));
         assert_eq!(gradients[..3], [0.0; 3], "a parameter that nothing reads has gradient zero");
-        gradcheck::graph(&graph, loss, &parameters, 3, KEY, &fill, &|name| name == "unused", 3)
-            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+        gradcheck::graph(
+            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 3, dropout: KEY, fill: &fill },
+            &|name| name == "unused",
+            3,
+        )
+        .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
     }
 
     /// Two large maps over time and a large map of one row, the first shared, with small operations between.
@@ -503,8 +507,12 @@ mod tests {
         let largest = sums.iter().fold(0.0_f64, |largest, sum| largest.max(sum.abs()));
         let allowed = Tolerance::Close.relative_f64() * largest;
         assert!(session.gradients().iter().zip(&sums).all(|(found, sum)| (found - sum).abs() <= allowed));
-        gradcheck::graph(&graph, loss, &parameters, 11, KEY, &fill, &|_| false, 3)
-            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+        gradcheck::graph(
+            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 11, dropout: KEY, fill: &fill },
+            &|_| false,
+            3,
+        )
+        .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
     }
 
     #[test]
@@ -605,7 +613,7 @@ mod tests {
             let still = |parameter: &crate::tape::Parameter| plain.gradients()[parameter.range()].iter().all(tiny);
             let zero = |name: &str| graph.parameters().iter().any(|parameter| parameter.name == name && still(parameter));
             if !graph.parameters().iter().all(still) {
-                let checked = gradcheck::graph(&graph, loss, &parameters, 2, None, &fill, &zero, 5);
+                let checked = gradcheck::graph(&gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 2, dropout: None, fill: &fill }, &zero, 5);
                 prop_assert!(checked.is_ok(), "{:?}", checked);
             }
         }

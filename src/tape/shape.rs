@@ -1,7 +1,7 @@
 //! Shapes of the values on the tape: one to three axes, of one sample. There is no batch axis: a plan is replayed once a
 //! sample.
 
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use std::fmt;
 
 /// Largest number of axes: a convolution's weight `[out, in, k]`.

@@ -3,8 +3,8 @@
 //! Without the feature `rayon` everything runs on the calling thread.
 
 #[cfg(feature = "rayon")]
-use crate::error::Error;
-use crate::error::Result;
+use crate::tape::error::Error;
+use crate::tape::error::Result;
 
 /// How many threads a session works on, at most [`Threads::MOST`]; 0 means all cores. Without the feature `rayon`, always the calling
 /// one.
@@ -61,17 +61,12 @@ impl Workers {
     /// This many threads.
     ///
     /// # Errors
-    /// [`Error::Config`] if they are more than [`Threads::MOST`](super::Threads::MOST), or cannot be started.
+    /// [`Error::Threads`] if they are more than [`Threads::MOST`](super::Threads::MOST), or cannot be started.
     #[cfg(feature = "rayon")]
     pub(super) fn new(count: usize) -> Result<Self> {
         if count > Threads::MOST {
-            let (place, field) = ("session".into(), "threads".into());
-            return Err(Error::Config {
-                place,
-                field,
-                found: count.to_string(),
-                expected: format!("0 (all cores) to {}", Threads::MOST),
-            });
+            let expected = format!("0 (all cores) to {}", Threads::MOST);
+            return Err(Error::Threads { found: count.to_string(), expected });
         }
         Ok(Self { pool: if count > 1 { Some(pool(count)?) } else { None } })
     }
@@ -95,9 +90,7 @@ impl Workers {
 #[cfg(feature = "rayon")]
 fn pool(threads: usize) -> Result<rayon::ThreadPool> {
     let named = rayon::ThreadPoolBuilder::new().num_threads(threads).thread_name(|index| format!("phyture-{index}"));
-    named.build().map_err(|error| Error::Config {
-        place: "session".into(),
-        field: "threads".into(),
+    named.build().map_err(|error| Error::Threads {
         found: format!("{threads} ({error})"),
         expected: "a number of threads that the system can start".into(),
     })

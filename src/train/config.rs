@@ -116,7 +116,7 @@ impl TrainConfig {
             return Err(fault("gate_every", 1, "0 (no gate), or 2 and more: 1 would leave nothing to train on"));
         }
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
-        self.network.check()
+        Ok(self.network.check()?)
     }
 }
 

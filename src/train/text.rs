@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn a_template_is_read_back_as_it_was_whatever_the_defaults() -> Result<()> {
-        let kinds = Architecture::KINDS.map(|kind| serde_json::from_str(&format!(r#"{{"kind": "{kind}", "history": 64}}"#)));
+        let kinds = Architecture::KINDS.iter().map(|kind| serde_json::from_str(&format!(r#"{{"kind": "{kind}", "history": 64}}"#)));
         let networks = kinds.into_iter().collect::<Result<Vec<Architecture>, _>>();
         let networks = networks.map_err(|error| Error::Undetermined(error.to_string()))?;
         let variants = Variant::ALL.map(|variant| PhyTureConfig { variant, norm_eps: 1e-7, ..PhyTureConfig::default() }.into());

@@ -9,13 +9,12 @@
 //! layer's columns.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{
     ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
 };
 use crate::nn::layers::Recorder;
-use crate::tape::Var;
 use crate::tape::ops::{Activation, Dropout, Ends, Flatten, GeneralConv1d, Place};
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use serde::{Deserialize, Serialize};
@@ -56,7 +55,7 @@ impl Configuration for CnnConfig {
         true
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -92,7 +91,7 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_count() -> Result<()> {
+    fn parameter_count() -> crate::nn::Result<()> {
         let network = Network::<f32>::new(CnnConfig::default(), &OutputScale::unit(6), false)?;
         // Convolutions 50 976, hidden layer 1 032 320, output 774.
         assert_eq!(network.graph().parameter_count(), 1_084_070);

@@ -6,13 +6,12 @@
 //! 250 rows left, and a linear map of its last hidden state.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{
     ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
 };
 use crate::nn::layers::Recorder;
-use crate::tape::Var;
 use crate::tape::ops::{Dropout, Ends, GeneralConv1d, LastRows, Place, Pool};
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use phyture_kernels::pool;
@@ -55,7 +54,7 @@ impl Configuration for CnnLstmConfig {
         true
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -96,7 +95,7 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_count() -> Result<()> {
+    fn parameter_count() -> crate::nn::Result<()> {
         let network = Network::<f32>::new(CnnLstmConfig::default(), &OutputScale::unit(6), false)?;
         // Convolutions 5184 and 12 352, LSTM 33 280, output 390.
         assert_eq!(network.graph().parameter_count(), 51_206);

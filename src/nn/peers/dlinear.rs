@@ -4,11 +4,10 @@
 //! linear map of the 16 channels gives the six accelerations (the last step is ours: the reference predicts its own inputs). Without
 //! any nonlinearity this is a linear filter. The maps over time are shared by all channels ("DLinear") or one a channel.
 
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::Recorder;
-use crate::tape::Var;
 use crate::tape::ops::{Add, MovingAverage, Subtract};
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +48,7 @@ impl Configuration for DLinearConfig {
         false
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -81,8 +80,8 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_counts() -> Result<()> {
-        let count = |config: DLinearConfig| -> Result<usize> {
+    fn parameter_counts() -> crate::nn::Result<()> {
+        let count = |config: DLinearConfig| -> crate::nn::Result<usize> {
             Ok(Network::<f32>::new(config, &OutputScale::unit(6), false)?.graph().parameter_count())
         };
         assert_eq!(count(DLinearConfig::default())?, 2_104);

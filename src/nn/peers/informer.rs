@@ -13,13 +13,12 @@
 //!
 //! Heads keep their columns throughout; the reference's transposed reshape in the decoder is not repeated.
 
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::{Init, Recorder};
-use crate::tape::Var;
 use crate::tape::ops::{
     Activation, Add, Attention, BatchNorm, Dropout, Ends, GeneralConv1d, LastRows, Place, Pool, PositionalEncoding, ProbSparse,
 };
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use phyture_kernels::pool::{self, Geometry};
@@ -97,7 +96,7 @@ impl Configuration for InformerConfig {
         true
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -239,7 +238,7 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_count() -> Result<()> {
+    fn parameter_count() -> crate::nn::Result<()> {
         let network = Network::<f32>::new(InformerConfig::default(), &OutputScale::unit(6), false)?;
         let running: usize =
             network.parameters().iter().filter(|parameter| parameter.name.contains("running")).map(|p| p.shape.len()).sum();
@@ -251,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn distilling_halves_the_sequence() -> Result<()> {
+    fn distilling_halves_the_sequence() -> crate::nn::Result<()> {
         let config = InformerConfig { encoder_layers: 3, ..InformerConfig::default() };
         let mut recorder = Recorder::<f32>::default();
         let state = recorder.graph.input("state", &[1000, 16])?;

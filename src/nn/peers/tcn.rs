@@ -12,11 +12,10 @@
 //! leaves PyTorch's default; 1×1 convolutions and the output weight do start normal with deviation 0.01.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges};
 use crate::nn::layers::{Init, Recorder};
-use crate::tape::Var;
 use crate::tape::ops::{Activation, Add, GeneralConv1d, LastRows, Place, SpacedRows};
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use serde::{Deserialize, Serialize};
@@ -102,7 +101,7 @@ impl Configuration for TcnConfig {
         "TCN"
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -126,12 +125,12 @@ mod tests {
     use phyture_kernels::Tolerance;
     use phyture_kernels::random::Stream;
 
-    fn count(config: TcnConfig) -> Result<usize> {
+    fn count(config: TcnConfig) -> crate::nn::Result<usize> {
         Ok(Network::<f32>::new(config, &OutputScale::unit(6), false)?.graph().parameter_count())
     }
 
     #[test]
-    fn parameter_counts() -> Result<()> {
+    fn parameter_counts() -> crate::nn::Result<()> {
         // The output map among them.
         assert_eq!(count(TcnConfig::default())?, 99_516);
         assert_eq!(count(TcnConfig { channels: 25, ..TcnConfig::default() })?, 69_806);
@@ -141,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pruned_network_gives_the_last_row_of_the_whole_one() -> Result<()> {
+    fn the_pruned_network_gives_the_last_row_of_the_whole_one() -> crate::nn::Result<()> {
         for (history, kernel, levels, state_channels) in [(50, 3, 4, 5), (37, 7, 3, 4), (8, 2, 5, 3), (1, 3, 2, 4), (33, 1, 3, 4)] {
             let config = TcnConfig { history, state_channels, channels: 4, kernel, levels, dropout: 0.0 };
             let mut found = Vec::new();
@@ -171,13 +170,17 @@ mod tests {
     }
 
     #[test]
-    fn lengths_start_as_those_of_the_directions() -> Result<()> {
+    fn lengths_start_as_those_of_the_directions() -> crate::nn::Result<()> {
         let network = Network::<f64>::new(TcnConfig::default(), &OutputScale::unit(6), false)?;
         let initial = network.initial(3);
         let of =
             |name: &str| network.parameters().iter().find(|parameter| parameter.name == name).map(|found| &initial[found.range()]);
         let (Some(v), Some(g)) = (of("block.1.convolution1.direction"), of("block.1.convolution1.length")) else {
-            return Err(crate::Error::Undetermined("no such parameter".into()));
+            return Err(crate::nn::Error::Size {
+                field: "parameter".into(),
+                found: "none".into(),
+                expected: "that of the convolution".into(),
+            });
         };
         for (v, g) in v.chunks(210).zip(g) {
             assert!((v.iter().map(|v| v * v).sum::<f64>().sqrt() - g).abs() < Tolerance::Close.relative_f64());

@@ -13,11 +13,10 @@
 //! 7 255 826 parameters at the default sizes); they are left out.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::{Init, Recorder};
-use crate::tape::Var;
 use crate::tape::ops::{Activation, Add, Dropout, GeneralConv1d, MovingAverage, Pool, Subtract};
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use phyture_kernels::pool;
@@ -64,7 +63,7 @@ impl Configuration for TimeMixerConfig {
         "TimeMixer"
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -186,7 +185,7 @@ impl<T: Real> Builder<'_, T> {
                 None => predicted,
             });
         }
-        sum.ok_or_else(|| refused("scales", 0, "at least 1"))
+        sum.ok_or_else(|| crate::tape::Error::Shape { operation: "timemixer", message: "no scale to predict from".into() })
     }
 }
 
@@ -196,7 +195,7 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_count() -> Result<()> {
+    fn parameter_count() -> crate::nn::Result<()> {
         let network = Network::<f32>::new(TimeMixerConfig::default(), &OutputScale::unit(6), false)?;
         // The reference's 7 255 826 without the layer norms (64) and output maps (2144) that never receive a gradient.
         assert_eq!(network.graph().parameter_count(), 7_255_826 - 64 - 2_144);

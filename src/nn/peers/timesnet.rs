@@ -13,14 +13,13 @@
 //! neighbours; here each sample has its own, in training and in prediction.
 
 use super::common_fields;
-use crate::error::Result;
 use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_WIDTH, check_ranges, refused};
 use crate::nn::layers::{Init, Recorder};
-use crate::tape::Var;
 use crate::tape::ops::{
     Activation, AddWeighted, Dropout, FftPeriods, FoldConvolution, GeneralConv1d, LastRows, LayerNorm, Mean, MergeKernels,
     PositionalEncoding,
 };
+use crate::tape::{Result, Var};
 use phyture_kernels::Real;
 use phyture_kernels::activation::Activation as Kind;
 use phyture_kernels::fold::Fold;
@@ -67,7 +66,7 @@ impl Configuration for TimesNetConfig {
         "TimesNet"
     }
 
-    fn check(&self) -> Result<()> {
+    fn check(&self) -> crate::nn::Result<()> {
         let sizes = [
             ("history", self.history, LARGEST_HISTORY),
             ("state_channels", self.state_channels, LARGEST_WIDTH),
@@ -141,8 +140,8 @@ mod tests {
     use crate::nn::{Network, OutputScale};
 
     #[test]
-    fn parameter_counts() -> Result<()> {
-        let count = |config: TimesNetConfig| -> Result<usize> {
+    fn parameter_counts() -> crate::nn::Result<()> {
+        let count = |config: TimesNetConfig| -> crate::nn::Result<usize> {
             Ok(Network::<f32>::new(config, &OutputScale::unit(6), false)?.graph().parameter_count())
         };
         let base = TimesNetConfig::default;

@@ -3,8 +3,8 @@
 //! The backward pass reads x or y, whichever the function's derivative is written in.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
 use phyture_kernels::Real;
 use phyture_kernels::activation::{self, Saves};

@@ -3,8 +3,8 @@
 //! a, b, y [n, C]; periods [k, 2], of which element (index, 1) is w. The backward pass reads b and the periods.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Write, strided};
 

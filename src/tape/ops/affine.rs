@@ -2,8 +2,8 @@
 //!
 //! Not trainable. The networks end with it: their last layer works at unit scale, the loss in physical units (eq. 13).
 
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Write};
 

@@ -3,8 +3,8 @@
 //! q, o [queries, d]; k, v [keys, d]; head h is columns h·d_k … (h+1)·d_k. No score map is stored. Kept: `[queries, heads]`.
 
 use super::{or_scratch, rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::attention::{self, Gradients};
 use phyture_kernels::dropout::Mask;

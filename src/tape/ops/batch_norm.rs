@@ -6,8 +6,8 @@
 //! and r. The backward pass reads x and γ.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Coupled, Coupling, Differentiable, Forward, Memory, Op, Pass, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, batch_norm, strided};
 
@@ -136,7 +136,7 @@ impl<T: Real> Differentiable<T> for BatchNorm {
 mod tests {
     use super::super::SquaredError;
     use super::*;
-    use crate::error::Error;
+    use crate::tape::error::Error;
     use crate::tape::{DropoutKey, Fill, Graph, Session, Threads, Var, gradcheck};
     use phyture_kernels::Tolerance;
     use phyture_kernels::random::Stream;
@@ -183,8 +183,12 @@ mod tests {
         let parameters = parameters(graph.parameter_count());
         // The second batch norm takes off what the first one's bias adds to every row.
         let zero = |name: &str| name.contains("running") || name == "0.beta";
-        gradcheck::graph(&graph, loss, &parameters, 5, KEY, &fill, &zero, 1)
-            .map_err(|disagreement| Error::Undetermined(disagreement.to_string()))
+        gradcheck::graph(
+            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 5, dropout: KEY, fill: &fill },
+            &zero,
+            1,
+        )
+        .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Channels of two sequences side by side: y[t] = [a[t], b[t]]; da and db are the column ranges of dy.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, Write, strided};
 

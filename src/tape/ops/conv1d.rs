@@ -4,8 +4,8 @@
 //! x, W, and y instead of z; a dropout mask is drawn again.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Pack, Pass, Reads, misfit};
 use phyture_kernels::activation::Activation;
 use phyture_kernels::conv1d::{self, Geometry, Weight};

@@ -5,8 +5,8 @@
 //! a dropout mask is drawn again.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, misfit};
 use phyture_kernels::activation::Activation;
 use phyture_kernels::conv1d::{self, Epilogue};

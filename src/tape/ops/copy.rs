@@ -1,8 +1,8 @@
 //! Copy: y = x, dx = dy. The graph inserts it where one operation takes the same value twice.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
 use phyture_kernels::{Real, Write, strided};
 

@@ -3,8 +3,8 @@
 //! The mask is drawn again in the backward pass from the same counter-based stream; nothing is stored.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
 use phyture_kernels::dropout::{self, Mask};
 use phyture_kernels::{Real, Write, strided};

@@ -2,8 +2,8 @@
 //!   PE(p, 2i) = sin(p/10000^(2i/d)),  PE(p, 2i+1) = cos(p/10000^(2i/d))
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, RowsMut, encoding, strided};
 use std::sync::OnceLock;

@@ -8,8 +8,8 @@
 //! each sample has its own, in training and in prediction.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::elementary::or_zero;
 use phyture_kernels::spectrum::{self, Transform};

@@ -3,8 +3,8 @@
 //! x of any shape, y [1, its number of elements]. Nothing is read in the backward pass.
 
 use super::rows_mut;
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly};
 use phyture_kernels::{Real, Rows, strided};
 

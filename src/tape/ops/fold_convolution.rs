@@ -4,8 +4,8 @@
 //! full rows: x counts as zero beyond its end, y is zero beyond the image. The backward pass reads x, periods and W.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::fold::{self, Fold};
 use phyture_kernels::{Real, Rows, RowsMut};

@@ -1,8 +1,8 @@
 //! The last rows of a sequence: y = x[n−count..n]; dx is dy there and 0 before.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, Write, strided};
 

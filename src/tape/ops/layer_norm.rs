@@ -4,8 +4,8 @@
 //! x, y [n, C]; γ, β [C]. Kept: μ and r [n].
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, Write, layer_norm, strided};
 

@@ -6,8 +6,8 @@
 //! [n, h]. The backward pass reads x, both weights and y.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::lstm::{self, Weights};
 use phyture_kernels::{Real, Rows, RowsMut, linear};
@@ -103,7 +103,7 @@ impl<T: Real> Differentiable<T> for Lstm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::Result;
+    use crate::tape::error::Result;
     use crate::tape::{Graph, Session, Threads};
     use phyture_kernels::Tolerance;
     use phyture_kernels::random::Stream;

@@ -1,8 +1,8 @@
 //! Mean of up to eight values of one shape: y = 1/m·Σ x_j, dx_j = dy/m.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, misfit};
 use phyture_kernels::{Real, Write, strided};
 

@@ -2,8 +2,8 @@
 //!   W = 1/m·Σ_j w_j between zeros;  dw_j = 1/m·(what of dW lies under w_j)
 //! w_j [out, in, (2j + 1)²] for j = 0 … m − 1, W [(2m − 1)², in, out]. The backward pass reads nothing.
 
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, MAX_OPERANDS, Op, Reads, misfit};
 use phyture_kernels::{Real, inception};
 

@@ -4,8 +4,8 @@
 //! x [n, C], y [rows, C]. The backward pass of a maximum reads x and y; of several equal values the first has the gradient.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::pool::{self, Geometry};
 use phyture_kernels::{Real, Rows, RowsMut};

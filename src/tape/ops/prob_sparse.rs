@@ -8,8 +8,8 @@
 //! off: a prediction is reproducible, and does not depend on the batch.
 
 use super::{or_scratch, rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::Real;
 use phyture_kernels::prob_sparse::{self, Gradients, Sparse};

@@ -3,8 +3,8 @@
 //! x, s, y of one shape. The backward pass reads x and s.
 
 use super::{or_scratch, rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, sci};
 

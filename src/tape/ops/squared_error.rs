@@ -3,8 +3,8 @@
 //! One number a sample; a session takes the mean over samples (paper eq. 13 with scale 1). The target is a constant.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, loss};
 

@@ -4,8 +4,8 @@
 
 use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, MicroBatched, Op, Reads, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, temporal};
 

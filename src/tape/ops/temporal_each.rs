@@ -3,8 +3,8 @@
 //! x [n, C], W [C, n], b [C], y [1, C]. The backward pass reads x and W.
 
 use super::{rows, rows_mut};
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, strided, temporal_each};
 

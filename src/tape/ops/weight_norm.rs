@@ -3,8 +3,8 @@
 //!   dg(o) = <dw(o), v(o)>/‖v(o)‖,  dv(o) = g(o)/‖v(o)‖·(dw(o) − v(o)·<dw(o), v(o)>/‖v(o)‖²)
 //! v, w [out, in, k], g [out, 1, 1] as PyTorch stores it. The backward pass reads v and g.
 
-use crate::error::Result;
 use crate::tape::Shape;
+use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Op, Reads, exactly, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, weight_norm};
 

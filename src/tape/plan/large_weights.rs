@@ -97,7 +97,7 @@ pub(super) fn complement(ranges: impl Iterator<Item = Range<usize>>, len: usize)
 mod tests {
     use super::super::Plan;
     use super::*;
-    use crate::error::Result;
+    use crate::tape::error::Result;
     use crate::tape::ops::{Add, Linear, SquaredError, Temporal};
 
     #[test]

@@ -6,7 +6,7 @@ use super::super::op::Memory;
 use super::super::slab::alignment;
 use super::orders::{Orders, operation, shapes_of};
 use super::step::{Piece, Role};
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use phyture_kernels::Real;
 use std::ops::Range;
 

@@ -3,7 +3,7 @@
 use super::super::graph::{Graph, Source, Var};
 use super::super::op::Op;
 use super::super::shape::Shape;
-use crate::error::{Error, Result};
+use crate::tape::error::{Error, Result};
 use phyture_kernels::Real;
 use std::sync::Arc;
 
