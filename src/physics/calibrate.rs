@@ -13,7 +13,7 @@ use super::evaluate::{composed_for, standard_names};
 use super::layout::Layout;
 use super::least_squares::{Cluster, Failure, Hold, residual, solve, step};
 use super::model::Model;
-use super::sign::{SignDoubt, SignFinding};
+use super::sign_doubt::{SignDoubt, SignFinding};
 use super::signal::{Stage, signal_named};
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, Span};

@@ -212,7 +212,7 @@ pub(super) fn composed_for(model: &Model, flight: &Flight) -> Result<(Composer, 
 }
 
 /// Predicted accelerations of a whole flight.
-pub(super) fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
+fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
     let (composer, composed) = composed_for(model, flight)?;
     let nodes: Vec<Node> = composed.channels.iter().copied().chain(composed.summands.iter().map(|summand| summand.node)).collect();
     let mut predicted: Accelerations = std::array::from_fn(|_| vec![0.0; flight.len()]);
@@ -228,6 +228,54 @@ pub(super) fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
         Ok(())
     })?;
     Ok(predicted)
+}
+
+impl Model {
+    /// Baseline accelerations a^p, one vector a channel in the order of [`Column::TARGETS`] (m/s², then rad/s²).
+    ///
+    /// # Errors
+    /// [`Error::Formula`] at a name the flight does not carry, [`Error::Log`] if an effect reads a column that is absent from
+    /// the flight, [`Error::Undetermined`] where a formula gives no finite number, [`Error::Config`] if the model is not whole.
+    pub fn predict(&self, flight: &Flight) -> Result<Accelerations> {
+        predict(self, flight)
+    }
+
+    /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.
+    ///
+    /// # Errors
+    /// As [`Model::predict`], where it does not depend on a flight.
+    pub fn stream(&self, step_s: f64) -> Result<StreamingModel> {
+        StreamingModel::new(self, step_s)
+    }
+
+    /// Root mean square of measured minus predicted acceleration over the given spans, by channel (m/s², rad/s²); rows of
+    /// overlapping spans count once each time they are listed.
+    ///
+    /// # Errors
+    /// As [`Model::predict`]; [`Error::Undetermined`] if the spans hold no row.
+    pub fn rmse(&self, flights: &[Flight], spans: &[crate::flight::Span]) -> Result<[f64; 6]> {
+        let mut squares = [0.0; 6];
+        let mut rows = 0;
+        for (index, flight) in flights.iter().enumerate() {
+            let mut spans = spans.iter().filter(|span| span.flight == index).peekable();
+            if spans.peek().is_none() {
+                continue;
+            }
+            let predicted = self.predict(flight)?;
+            for span in spans {
+                let range = span.start.min(flight.len())..span.end.min(flight.len());
+                rows += range.len();
+                for ((sum, predicted), target) in squares.iter_mut().zip(&predicted).zip(Column::TARGETS) {
+                    let pairs = predicted.iter().zip(flight.column(target)).take(range.end).skip(range.start);
+                    *sum += pairs.map(|(predicted, measured)| (measured - predicted).powi(2)).sum::<f64>();
+                }
+            }
+        }
+        if rows == 0 {
+            return Err(Error::Undetermined("no rows to compare: the spans are empty; give at least one flight".into()));
+        }
+        Ok(squares.map(|sum| (sum / rows as f64).sqrt()))
+    }
 }
 
 /// A model that takes one sample at a time, for real-time use. Samples come in order, one step apart.

@@ -4,6 +4,7 @@
 //! read. Baseline, later additions and a user's own formulas are therefore one type: they evaluate on whole flights or one sample at a time,
 //! and print as formulas.
 
+mod assumptions;
 mod baseline;
 mod by_flight;
 mod calibrate;
@@ -13,6 +14,7 @@ mod compose;
 mod correlation;
 mod definition;
 mod effect;
+mod effect_check;
 mod evaluate;
 mod implant;
 mod layout;
@@ -23,6 +25,7 @@ mod model_file;
 mod output_error;
 pub mod rollout;
 mod sign;
+mod sign_doubt;
 mod signal;
 #[cfg(feature = "files")]
 mod toml_section;
@@ -43,6 +46,7 @@ pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
 pub use output_error::{OutputError, output_error};
 pub use rollout::Rollout;
-pub use sign::{Sign, SignDoubt, SignFinding, doubt, physical_sign};
+pub use sign::Sign;
+pub use sign_doubt::{SignDoubt, SignFinding, doubt, physical_sign};
 pub use signal::{Plain, SIGNALS, Signal, Stage, signal_named};
 pub use vehicle::{Assumed, MASS_KG, ROTOR_RADIUS_M};

@@ -5,11 +5,10 @@ use super::baseline;
 use super::correlation::Correlation;
 use super::definition::Vehicle;
 use super::effect::Effect;
-use super::evaluate::{self, StreamingModel};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
-use crate::flight::{Accelerations, Column, Flight, Source, names};
+use crate::flight::{Flight, Source, names};
 use std::collections::BTreeMap;
 
 /// A value of the free table `[provenance]`.
@@ -102,15 +101,6 @@ impl Model {
         self.effects.iter_mut().find(|effect| effect.name == name)
     }
 
-    /// Baseline accelerations a^p, one vector a channel in the order of [`Column::TARGETS`] (m/s², then rad/s²).
-    ///
-    /// # Errors
-    /// [`Error::Formula`] at a name the flight does not carry, [`Error::Log`] if an effect reads a column that is absent from
-    /// the flight, [`Error::Undetermined`] where a formula gives no finite number, [`Error::Config`] if the model is not whole.
-    pub fn predict(&self, flight: &Flight) -> Result<Accelerations> {
-        evaluate::predict(self, flight)
-    }
-
     /// Notes under `[provenance]` what its numbers come from: the data, the flights of these that were left out, the seed of the split, the version.
     pub fn note_source(&mut self, source: &Source, seed: u64) {
         let mut note = |key: &str, entry: Entry| self.provenance.insert(key.into(), entry);
@@ -156,43 +146,6 @@ impl Model {
             }
         }
         Ok(())
-    }
-
-    /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.
-    ///
-    /// # Errors
-    /// As [`Model::predict`], where it does not depend on a flight.
-    pub fn stream(&self, step_s: f64) -> Result<StreamingModel> {
-        StreamingModel::new(self, step_s)
-    }
-
-    /// Root mean square of measured minus predicted acceleration over the given spans, by channel (m/s², rad/s²); rows of
-    /// overlapping spans count once each time they are listed.
-    ///
-    /// # Errors
-    /// As [`Model::predict`]; [`Error::Undetermined`] if the spans hold no row.
-    pub fn rmse(&self, flights: &[Flight], spans: &[crate::flight::Span]) -> Result<[f64; 6]> {
-        let mut squares = [0.0; 6];
-        let mut rows = 0;
-        for (index, flight) in flights.iter().enumerate() {
-            let mut spans = spans.iter().filter(|span| span.flight == index).peekable();
-            if spans.peek().is_none() {
-                continue;
-            }
-            let predicted = self.predict(flight)?;
-            for span in spans {
-                let range = span.start.min(flight.len())..span.end.min(flight.len());
-                rows += range.len();
-                for ((sum, predicted), target) in squares.iter_mut().zip(&predicted).zip(Column::TARGETS) {
-                    let pairs = predicted.iter().zip(flight.column(target)).take(range.end).skip(range.start);
-                    *sum += pairs.map(|(predicted, measured)| (measured - predicted).powi(2)).sum::<f64>();
-                }
-            }
-        }
-        if rows == 0 {
-            return Err(Error::Undetermined("no rows to compare: the spans are empty; give at least one flight".into()));
-        }
-        Ok(squares.map(|sum| (sum / rows as f64).sqrt()))
     }
 
     /// Checks that the model is whole: mass, inertia and rotor that an unmanned aircraft can have, a delay that is not negative, effects with names of their own.

@@ -7,6 +7,7 @@ pub mod benchmark;
 pub mod colour;
 pub mod compare;
 pub mod diagnose;
+mod escape;
 pub mod figures;
 mod names;
 pub mod page;

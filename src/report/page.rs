@@ -5,6 +5,7 @@
 //! the [`Page`]; what a figure shows, in `figures/`.
 
 use super::colour::{self, Theme};
+use super::escape::escape;
 use super::figures::{self, Figure};
 use std::fmt::Write;
 
@@ -124,22 +125,6 @@ pub struct Map {
     pub columns: Vec<(String, String)>,
     /// Row headings, each with a second, smaller line, and the cells.
     pub rows: Vec<(String, String, Vec<MapCell>)>,
-}
-
-/// Writes text so that HTML shows it as it is, in elements and in quoted attributes.
-pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            other => out.push(other),
-        }
-    }
-    out
 }
 
 /// What a line of provenance is called that is a note of the reader on the data; pages fold these into one part.

@@ -16,7 +16,7 @@ pub use ranges::{RangeRow, ranges};
 pub use residuals::{BinnedPanel, binned, surfaces};
 
 use super::colour::{self, Theme};
-use super::page::escape;
+use super::escape::escape;
 use std::fmt::Write;
 
 /// Panels of one figure at most.

@@ -69,8 +69,8 @@ fn panel(effect: &str, rows: &[RangeRow]) -> Panel {
             "<circle class=\"{}\" cx=\"{:.1}\" cy=\"{middle:.1}\" r=\"4\"><title>{}: {}{usual}</title></circle>\n",
             if outside { "f2" } else { "f1" },
             area.at_x(row.value),
-            crate::report::page::escape(&row.name),
-            crate::report::page::escape(&said(row))
+            crate::report::escape::escape(&row.name),
+            crate::report::escape::escape(&said(row))
         );
         body += &words("va", "start", WIDTH - numbers - RIGHT + 8.0, middle + 4.0, &said(row));
         data.push(Datum { series: "found".into(), x: row.name.clone(), y: row.value, interval: row.ci95 });

@@ -4,7 +4,7 @@
 //! What is drawn over an axis lies in an inner `<svg class="d">` in tenths of a pixel: it cuts off what lies beyond the axes, and the script
 //! zooms by its `viewBox` alone.
 
-use super::super::page::escape;
+use super::super::escape::escape;
 use super::scale::Scale;
 use std::fmt::Write;
 
