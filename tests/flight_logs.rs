@@ -451,6 +451,10 @@ fn a_stream_that_comes_late_in_one_log_is_moved_there_alone() -> Outcome {
     assert_eq!(moved.flights[1].column(Column::U2)[..], plain.flights[1].column(Column::U2)[1..60]);
     put(root, "dataset.toml", &rule("c"))?;
     assert_says(&refusal(data_set(root, &ReadOptions::default())), &["`late_in.flights` is `c`, which is no log of this data set"]);
+    // A description from elsewhere may be of several sets.
+    std::fs::rename(root.join("dataset.toml"), root.join("elsewhere.toml"))?;
+    let shared = data_set(root, &ReadOptions { dataset: Some(root.join("elsewhere.toml")), ..ReadOptions::default() })?;
+    assert_says(&shared.notes.join("\n"), &["but not among these flights: c"]);
     // A log read alone is a part of the set that the description is of.
     put(root, "dataset.toml", &rule("b"))?;
     let alone = data_set(&root.join("a.csv"), &ReadOptions::default())?;

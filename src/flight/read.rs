@@ -58,7 +58,9 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
 
     // A description that was found above the folder, or beside a single log, is that of a larger set.
     let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
-    let own = late_in(&schema, &logs, is_whole, &mut notes)
+    // One that lies elsewhere may be that of several sets.
+    let is_of_these = is_whole && options.dataset.is_none();
+    let own = late_in(&schema, &logs, is_of_these, &mut notes)
         .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     let held = AtomicUsize::new(0);
     let results = in_parallel(&logs, |log| {
@@ -146,11 +148,12 @@ fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], unread: &[&str],
     data.leave_out(&asked, "as dataset.toml says")
 }
 
-/// What the description says of single logs, by their names. One that is not among the logs may be that of another part of a larger set.
+/// What the description says of single logs, by their names. One that is not among the logs may be that of another part of a larger set, or of another
+/// set, unless the description is of these.
 fn late_in<'s, 'l>(
     schema: &'s Schema,
     logs: &'l [Log],
-    is_whole: bool,
+    is_of_these: bool,
     notes: &mut Vec<String>,
 ) -> Result<BTreeMap<&'l str, Vec<&'s LateIn>>> {
     let known = || logs.iter().map(|log| log.name.as_str());
@@ -165,7 +168,7 @@ fn late_in<'s, 'l>(
                 expected,
             };
             match names::matching(name, known()).as_slice() {
-                [] if is_whole => {
+                [] if is_of_these => {
                     let hint = did_you_mean(name, known().chain(known().map(names::own_name)));
                     let listed = names::listed(known().collect::<Vec<_>>().into_iter());
                     return Err(fault("is no log of this data set", format!("one of {listed}{hint}")));

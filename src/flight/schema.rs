@@ -222,11 +222,11 @@ impl Schema {
         for mut rule in keys.sections("late_in")? {
             let flights = rule.texts("flights")?.unwrap_or_default();
             let late = rule.times()?;
+            rule.finish()?;
             if flights.is_empty() || late.is_empty() {
                 let expected = "`flights` and at least one stream, as `controls = 0.01`";
                 return Err(keys.fault("late_in", "an incomplete rule".into(), expected.into()));
             }
-            rule.finish()?;
             schema.late_in.push(LateIn { flights, late });
         }
         for mut rule in keys.sections("repair")? {
