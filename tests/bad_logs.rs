@@ -382,18 +382,19 @@ fn agile(late: impl Fn(usize) -> bool) -> Result<Vec<Flight>, Error> {
         ((bits ^ (bits >> 31)) % 10_007) as f64 / 10_007.0 - 0.5
     };
     let flight = |index: usize| {
-        let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; 6000]);
+        let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| Vec::new());
         let (mut rates, mut sticks) = ([0.0; 3], [0.0; 3]);
         for sample in 0..6000 {
             for axis in 0..3 {
                 sticks[axis] = 0.7 * sticks[axis] + noise(10 * index + axis, sample);
                 let acts = 40.0 * sticks[axis] - 4.0 * rates[axis] + 4.0 * noise(10 * index + axis + 5, sample);
-                columns[Column::U1 as usize + axis][sample] = sticks[axis];
-                columns[Column::Wx as usize + axis][sample] = rates[axis];
-                columns[Column::WxDot as usize + axis][sample] = acts;
+                columns[Column::U1 as usize + axis].push(sticks[axis]);
+                columns[Column::Wx as usize + axis].push(rates[axis]);
+                columns[Column::WxDot as usize + axis].push(acts);
                 rates[axis] += STEP_S * acts;
             }
         }
+        columns.iter_mut().for_each(|column| column.resize(6000, 0.0));
         if late(index) {
             for stick in [Column::U1, Column::U2, Column::U3] {
                 columns[stick as usize].rotate_right(1);

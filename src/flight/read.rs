@@ -63,14 +63,7 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let own = late_in(&schema, &logs, is_of_these, &mut notes)
         .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
     let held = AtomicUsize::new(0);
-    let results = in_parallel(&logs, |log| {
-        let done = match own.get(log.name.as_str()) {
-            Some(rules) => read_log(log, &schema.for_log(rules), cuts)?,
-            None => read_log(log, &schema, cuts)?,
-        };
-        let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
-        Ok::<_, Error>((sparing(done, &held), prints))
-    });
+    let results = read_each(&logs, &schema, &own, cuts, &held);
     let mut data = DataSet { notes, ..DataSet::default() };
     let (mut read, mut quaternions) = (Vec::new(), 0);
     let mut common: BTreeMap<String, Vec<String>> = BTreeMap::new();
@@ -127,6 +120,24 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     }
     data.flights.sort_by(|a, b| (&a.manoeuvre, a.name.len(), &a.name).cmp(&(&b.manoeuvre, b.name.len(), &b.name)));
     Ok(data)
+}
+
+/// Each log as the description says of it, with what tells its flights apart.
+fn read_each(
+    logs: &[Log],
+    schema: &Schema,
+    own: &BTreeMap<&str, Vec<&LateIn>>,
+    cuts: Cuts,
+    held: &AtomicUsize,
+) -> Vec<Result<(Assembled, Vec<u64>)>> {
+    in_parallel(logs, |log| {
+        let done = match own.get(log.name.as_str()) {
+            Some(rules) => read_log(log, &schema.for_log(rules), cuts)?,
+            None => read_log(log, schema, cuts)?,
+        };
+        let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
+        Ok((sparing(done, held), prints))
+    })
 }
 
 /// Whether the description leaves this whole log out.
