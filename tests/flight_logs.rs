@@ -385,7 +385,10 @@ fn the_folder_gives_names_and_classes() -> Outcome {
 
     put(root, "loose.csv", &other(54))?;
     assert_says(&refusal(data_set(root, &plain)), &["logs beside folders of logs: loose.csv"]);
-    assert_says(&refusal(data_set(&root.join("hover/notes.txt"), &plain)), &["a file of the kind `.txt`", ".csv or .parquet"]);
+    assert_says(
+        &refusal(data_set(&root.join("hover/notes.txt"), &plain)),
+        &["a file of the kind `.txt`", "a .csv, .parquet, .ulg or .bin file"],
+    );
     assert_says(&refusal(data_set(&root.join("nowhere"), &plain)), &["nowhere"]);
     std::fs::create_dir(root.join("empty"))?;
     assert_says(&refusal(data_set(&root.join("empty"), &plain)), &["no logs", "DATA/<manoeuvre>/<flight>.csv"]);

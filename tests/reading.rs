@@ -104,9 +104,9 @@ fn what_was_not_read_is_counted_and_what_could_be_converted_is_told() -> Outcome
     put(root, "px4/log.ulg", "ULog")?;
     put(root, "apm/00000001.BIN", "x")?;
     for (path, parts) in [
-        ("px4", ["log.ulg is a PX4 log", "ulog2csv"]),
-        ("px4/log.ulg", ["a file of the kind `.ulg`", "ulog2csv"]),
-        ("apm/00000001.BIN", ["a file of the kind `.bin`", "mavlogdump.py"]),
+        ("px4", ["log.ulg", "does not begin as a PX4 log"]),
+        ("px4/log.ulg", ["does not begin as a PX4 log", "written by PX4"]),
+        ("apm/00000001.BIN", ["does not begin as an ArduPilot log", "written by ArduPilot"]),
         ("data/hover/b.csv.gz", ["a file of the kind `.gz`", "gunzip"]),
     ] {
         assert_says(&refusal(data_set(&root.join(path), &ReadOptions::default())), &parts);

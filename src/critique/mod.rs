@@ -7,6 +7,8 @@ pub mod contest;
 pub mod diagnose;
 pub mod digits;
 mod floor;
+#[cfg(feature = "files")]
+pub mod init;
 pub mod locate;
 pub mod predictions;
 pub mod regime;

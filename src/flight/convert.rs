@@ -88,7 +88,7 @@ pub(super) fn source(table: &RawTable, schema: &Schema, step_s: f64, name: &str)
     Err(table.cell_of_header(name, found, format!("one as `columns` in dataset.toml says{hint}")))
 }
 
-const OPERATORS: [char; 8] = ['+', '*', '/', '^', '(', '<', '>', '-'];
+const OPERATORS: [char; 9] = ['+', '*', '/', '^', '(', '<', '>', '-', '\''];
 
 /// All columns of a table made canonical.
 ///

@@ -3,11 +3,11 @@
 //! Listing, messages and reading ask this list. What a file holds is the business of the format's own file; of a format that states units, axes
 //! and frames by itself, its description in the words of `dataset.toml` is here in force below the one of the data set.
 
-use super::assemble::{Assembled, Cuts};
+use super::assemble::{Assembled, Cuts, assemble};
 use super::listing::Log;
 use super::schema::Schema;
-use super::table::fault;
-use super::{stanford, table};
+use super::table::{RawTable, fault};
+use super::{Description, stanford, table};
 use crate::error::Result;
 use std::path::Path;
 
@@ -19,8 +19,13 @@ pub(super) enum Place {
     Folder(fn(&Path) -> bool),
 }
 
+/// What reads those columns of a table that are wanted.
+pub(super) type ReadTable = fn(&Path, &dyn Fn(&str) -> bool) -> Result<RawTable>;
+
 /// What reads a log.
 pub(super) enum Reader {
+    /// This function, of a log that is one table.
+    Table(ReadTable),
     /// This function.
     Of(fn(&Log, &Schema, Cuts) -> Result<Assembled>),
     /// Nothing, as the program was built without this feature.
@@ -45,6 +50,14 @@ pub(super) static FORMATS: &[Format] = &[
     super::parquet::PARQUET,
     #[cfg(not(feature = "parquet"))]
     Format::left_out("a Parquet file", "parquet", "parquet"),
+    #[cfg(feature = "ulog")]
+    super::ulog::ULOG,
+    #[cfg(not(feature = "ulog"))]
+    Format::left_out("a PX4 log", "ulg", "ulog"),
+    #[cfg(feature = "dataflash")]
+    super::dataflash::DATAFLASH,
+    #[cfg(not(feature = "dataflash"))]
+    Format::left_out("an ArduPilot log", "bin", "dataflash"),
     stanford::FORMAT,
 ];
 
@@ -60,12 +73,58 @@ impl Format {
     /// What is wrong with the log; [`crate::Error::Log`] where the program was built without what reads it.
     pub fn read(&self, log: &Log, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
         match self.reader {
+            Reader::Table(read) => {
+                let table = read(&log.path, &|name| schema.wants(name))?;
+                assemble(table, &log.name, &log.manoeuvre, schema, cuts)
+            }
             Reader::Of(read) => read(log, schema, cuts),
             Reader::LeftOut(feature) => {
                 Err(fault(&log.path, self.kind, format!("CSV; this program was built without the feature `{feature}`")))
             }
         }
     }
+}
+
+/// The description of logs whose format has one of its own: what `stated` says, and below that what the format does. `None` where no log's format
+/// has one.
+///
+/// # Errors
+/// [`crate::Error::Log`] for logs of such a format beside logs of another: a description holds for one.
+pub(super) fn description(path: &Path, logs: &[Log], stated: &str) -> Result<Option<String>> {
+    let Some(first) = logs.iter().find(|log| log.format.description.is_some()) else { return Ok(None) };
+    let own = first.format.description.unwrap_or_default();
+    if let Some(other) = logs.iter().find(|log| !std::ptr::eq(log.format, first.format)) {
+        let found = format!("{} beside {}: {} and {}", first.format.kind, other.format.kind, first.name, other.name);
+        let expected = "logs of one format, or folders for each; dataset.toml can `exclude` files";
+        return Err(fault(path, found, expected));
+    }
+    let unusual = || fault(path, "a dataset.toml in an unusual form", "one key a line, and sections as `[columns]`");
+    Ok(Some(below(stated, own).ok_or_else(unusual)?))
+}
+
+/// A description with the keys of another that it does not state.
+pub(super) fn below(stated: &str, other: &str) -> Option<String> {
+    let mut made = Description::parse(stated)?;
+    let own = made.clone();
+    let has = |names: &[&str]| names.iter().any(|name| own.get("columns", name).is_some());
+    let (angles, quaternion) = (["roll", "pitch", "yaw"], ["q1", "q2", "q3", "q4"]);
+    // Whichever attitude is stated stands alone: angles would go before a quaternion.
+    let unwanted: &[&str] = if has(&quaternion) { &angles } else { &[] };
+    for (key, value) in other.parse::<toml::Table>().ok()? {
+        match value {
+            toml::Value::Table(inside) => {
+                for (name, value) in inside {
+                    let is_unwanted = key == "columns" && unwanted.contains(&name.as_str());
+                    if own.get(&key, &name).is_none() && !is_unwanted {
+                        made = made.with(&key, &name, &value, "")?;
+                    }
+                }
+            }
+            value if own.get("", &key).is_none() => made = made.with("", &key, &value, "")?,
+            _ => {}
+        }
+    }
+    Some(made.text().to_owned())
 }
 
 /// The format of a file, by its ending.
@@ -98,15 +157,7 @@ pub(super) fn files() -> String {
 }
 
 /// What other programs' files are, and how they become logs.
-const CONVERTERS: [(&str, &str); 7] = [
-    (
-        "ulg",
-        "a PX4 log: `ulog2csv FILE` (Python package pyulog) writes its topics as CSV; join those that are needed into one table",
-    ),
-    (
-        "bin",
-        "an ArduPilot log: `mavlogdump.py --format csv --types ATT FILE` (Python package pymavlink) writes a message type as CSV",
-    ),
+const CONVERTERS: [(&str, &str); 5] = [
     ("gz", "compressed: `gunzip FILE` first"),
     ("zip", "compressed: unpack it first"),
     ("mat", "a MATLAB file: `writetable` writes CSV"),
@@ -118,4 +169,26 @@ const CONVERTERS: [(&str, &str); 7] = [
 pub(super) fn converter(path: &Path) -> Option<&'static str> {
     let ending = ending(path);
     CONVERTERS.iter().find(|known| known.0 == ending).map(|known| known.1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_description_states_goes_before_what_the_format_says() {
+        let format = "axes = \"NED/FRD\"\nresample_hz = 100\n[columns]\nroll = \"ATT.Roll\"\nu1 = \"RATE.ROut\"\n[units]\nangles = \"deg\"\n";
+        let made = below("# mine\nresample_hz = 50\n[columns]\nq1 = \"XKQ.Q1\"\n", format);
+        let expected = "# mine\nresample_hz = 50\naxes = \"NED/FRD\"\n[columns]\nq1 = \"XKQ.Q1\"\nu1 = \"RATE.ROut\"\n\n[units]\nangles = \"deg\"\n";
+        assert_eq!(made.as_deref(), Some(expected));
+    }
+
+    #[test]
+    fn each_ending_is_in_the_list_once() {
+        let endings: Vec<&str> =
+            FORMATS.iter().filter_map(|format| if let Place::File(own) = format.place { Some(own) } else { None }).collect();
+        assert_eq!(endings, ["csv", "parquet", "ulg", "bin"]);
+        assert_eq!(files(), "a .csv, .parquet, .ulg or .bin file");
+        assert!(of_file(Path::new("a/LOG.BIN")).is_some() && of_file(Path::new("a/log")).is_none());
+    }
 }

@@ -7,9 +7,13 @@
 mod assemble;
 pub mod attitude;
 mod bounds;
+#[cfg(any(feature = "ulog", feature = "dataflash"))]
+mod bytes;
 mod column;
 #[cfg(feature = "files")]
 mod convert;
+#[cfg(feature = "dataflash")]
+mod dataflash;
 pub mod derived;
 #[cfg(feature = "files")]
 mod description;
@@ -19,7 +23,11 @@ mod formats;
 #[cfg(feature = "parquet")]
 pub mod guard;
 #[cfg(feature = "files")]
+pub mod guess;
+#[cfg(feature = "files")]
 mod hypotheses;
+#[cfg(any(feature = "ulog", feature = "dataflash"))]
+mod join;
 #[cfg(feature = "files")]
 mod late;
 #[cfg(feature = "files")]
@@ -47,6 +55,8 @@ mod table;
 mod taint;
 #[cfg(feature = "files")]
 mod timing;
+#[cfg(feature = "ulog")]
+mod ulog;
 #[cfg(feature = "files")]
 mod units;
 #[cfg(feature = "files")]

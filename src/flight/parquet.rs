@@ -2,7 +2,6 @@
 //!
 //! The column-by-column interface of the `parquet` crate, without Arrow. What the columns mean is not known here.
 
-use super::assemble::assemble;
 use super::formats::{Format, Place, Reader};
 use super::guard::guarded;
 use super::source::Read;
@@ -22,14 +21,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 /// Parquet among the formats.
-pub(super) const PARQUET: Format = Format {
-    kind: "a Parquet file",
-    place: Place::File("parquet"),
-    description: None,
-    reader: Reader::Of(|log, schema, cuts| {
-        assemble(read_parquet(&log.path, &|name| schema.wants(name))?, &log.name, &log.manoeuvre, schema, cuts)
-    }),
-};
+pub(super) const PARQUET: Format =
+    Format { kind: "a Parquet file", place: Place::File("parquet"), description: None, reader: Reader::Table(read_parquet) };
 
 /// Records read at a time; bounds memory whatever a damaged file claims to hold.
 const BATCH: usize = 1 << 16;

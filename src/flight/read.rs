@@ -5,6 +5,7 @@
 //! filled in, or mended on the description's word is said in [`DataSet::notes`]. What was read is recorded in [`DataSet::source`].
 
 use super::assemble::{Assembled, Cuts, gather};
+use super::formats;
 use super::listing::{DESCRIPTION, Listing, Log, check_unique, list};
 use super::schema::{LateIn, Schema};
 use super::source::Read;
@@ -27,6 +28,8 @@ pub struct ReadOptions {
     pub split_at_gaps: bool,
     /// A `dataset.toml` that lies elsewhere; it is taken in place of the one in the folder.
     pub dataset: Option<PathBuf>,
+    /// The text of a `dataset.toml`, which is taken in place of any file.
+    pub described: Option<String>,
 }
 
 /// Columns that a data set holds in memory, bytes; four hours of flight at 100 Hz.
@@ -44,14 +47,16 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let mut notes = Vec::new();
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
     let (mut schema, mut described, mut text) = (Schema::default(), None, None);
-    if let Some(description) = options.dataset.clone().or_else(|| description(folder)) {
+    let given = options.described.as_ref().map(|text| (PathBuf::from(DESCRIPTION), text.clone().into_bytes()));
+    let found = || options.dataset.clone().or_else(|| description(folder));
+    let of_file = |path: PathBuf| std::fs::read(&path).map_err(Error::io(&path)).map(|bytes| (path, bytes));
+    if let Some((description, bytes)) = given.map(Ok).or_else(|| found().map(of_file)).transpose()? {
         notes.push(format!("read as {} describes", description.display()));
-        let bytes = std::fs::read(&description).map_err(Error::io(&description))?;
         schema = Schema::parse(&bytes, &description.display().to_string())?;
         described = Some(Read::of(&description, &bytes));
         text = String::from_utf8(bytes).ok();
     }
-    let Listing { logs, notes: unread } = list(path, &schema)?;
+    let Listing { mut logs, notes: unread } = list(path, &schema)?;
     notes.extend(unread);
     check_unique(path, &logs)?;
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
@@ -60,8 +65,13 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
     // One that lies elsewhere may be that of several sets.
     let is_of_these = is_whole && options.dataset.is_none();
-    let own = late_in(&schema, &logs, is_of_these, &mut notes)
-        .map_err(|error| described.iter().fold(error, |error, read| at(&read.path, error)))?;
+    let in_description = |error| described.iter().fold(error, |error, read| at(&read.path, error));
+    classify(&schema, &mut logs, is_of_these, &mut notes).map_err(in_description)?;
+    if let Some(whole) = formats::description(path, &logs, text.as_deref().unwrap_or_default())? {
+        schema = Schema::parse(whole.as_bytes(), "dataset.toml")?;
+        text = Some(whole);
+    }
+    let own = late_in(&schema, &logs, is_of_these, &mut notes).map_err(in_description)?;
     let held = AtomicUsize::new(0);
     let results = read_each(&logs, &schema, &own, cuts, &held);
     let mut data = DataSet { notes, ..DataSet::default() };
@@ -167,29 +177,13 @@ fn late_in<'s, 'l>(
     is_of_these: bool,
     notes: &mut Vec<String>,
 ) -> Result<BTreeMap<&'l str, Vec<&'s LateIn>>> {
-    let known = || logs.iter().map(|log| log.name.as_str());
     let mut own: BTreeMap<&str, Vec<&LateIn>> = BTreeMap::new();
     let mut elsewhere = Vec::new();
     for rule in &schema.late_in {
         for name in &rule.flights {
-            let fault = |found: &str, expected: String| Error::Config {
-                place: "flights".into(),
-                field: "late_in.flights".into(),
-                found: format!("`{name}`, which {found}"),
-                expected,
-            };
-            match names::matching(name, known()).as_slice() {
-                [] if is_of_these => {
-                    let hint = did_you_mean(name, known().chain(known().map(names::own_name)));
-                    let listed = names::listed(known().collect::<Vec<_>>().into_iter());
-                    return Err(fault("is no log of this data set", format!("one of {listed}{hint}")));
-                }
-                [] => elsewhere.push(name.as_str()),
-                [one] => own.entry(one).or_default().push(rule),
-                several => {
-                    let found = format!("{} logs are called", several.len());
-                    return Err(fault(&found, "a log's path below the data folder, without the ending".into()));
-                }
+            match the_log(name, logs, "late_in.flights", is_of_these)? {
+                Some(log) => own.entry(&logs[log].name).or_default().push(rule),
+                None => elsewhere.push(name.as_str()),
             }
         }
     }
@@ -197,6 +191,45 @@ fn late_in<'s, 'l>(
         notes.push(format!("to be moved in time, as dataset.toml says, but not among these flights: {}", elsewhere.join(", ")));
     }
     Ok(own)
+}
+
+/// Gives the logs that the description names the classes that it says.
+fn classify(schema: &Schema, logs: &mut [Log], is_of_these: bool, notes: &mut Vec<String>) -> Result<()> {
+    let mut elsewhere = Vec::new();
+    for (name, class) in &schema.classes {
+        match the_log(name, logs, "classes", is_of_these)? {
+            Some(log) => logs[log].manoeuvre.clone_from(class),
+            None => elsewhere.push(name.as_str()),
+        }
+    }
+    if !elsewhere.is_empty() {
+        notes.push(format!("of a class that dataset.toml says, but not among these flights: {}", elsewhere.join(", ")));
+    }
+    Ok(())
+}
+
+/// The log that a key of the description means by a name. One that is not there is an error if the description is of these logs.
+fn the_log(name: &str, logs: &[Log], key: &str, is_of_these: bool) -> Result<Option<usize>> {
+    let known = || logs.iter().map(|log| log.name.as_str());
+    let fault = |found: &str, expected: String| Error::Config {
+        place: "flights".into(),
+        field: key.into(),
+        found: format!("`{name}`, which {found}"),
+        expected,
+    };
+    match names::matching(name, known()).as_slice() {
+        [] if is_of_these => {
+            let hint = did_you_mean(name, known().chain(known().map(names::own_name)));
+            let listed = names::listed(known().collect::<Vec<_>>().into_iter());
+            Err(fault("is no log of this data set", format!("one of {listed}{hint}")))
+        }
+        [] => Ok(None),
+        [one] => Ok(known().position(|log| log == *one)),
+        several => {
+            let found = format!("{} logs are called", several.len());
+            Err(fault(&found, "a log's path below the data folder, without the ending".into()))
+        }
+    }
 }
 
 /// The error with the description that the key stands in.

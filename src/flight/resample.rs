@@ -42,8 +42,19 @@ impl Resampler {
         }
         let count = steps as usize + 1;
         let new_s: Vec<f64> = (0..count).map(|sample| first + step_s * sample as f64).collect();
-        let taps = new_s.iter().map(|&at| taps(time_s, at, HALF_WIDTH_STEPS * step_s.max(old_step_s)).ok_or_else(few));
-        Ok(Self { taps: taps.collect::<Result<_>>()?, time_s: new_s })
+        Self::at(time_s, new_s, HALF_WIDTH_STEPS * step_s.max(old_step_s)).ok_or_else(few)
+    }
+
+    /// From samples at increasing `time_s` to times `step_s` apart that lie among them. `None` for fewer than four samples.
+    #[cfg(any(feature = "ulog", feature = "dataflash"))]
+    pub fn onto(time_s: &[f64], new_s: Vec<f64>, step_s: f64) -> Option<Self> {
+        let old_step_s = (time_s.last()? - time_s.first()?) / time_s.len().saturating_sub(1).max(1) as f64;
+        Self::at(time_s, new_s, HALF_WIDTH_STEPS * step_s.max(old_step_s))
+    }
+
+    fn at(time_s: &[f64], new_s: Vec<f64>, half_width_s: f64) -> Option<Self> {
+        let taps = new_s.iter().map(|&at| taps(time_s, at, half_width_s)).collect::<Option<_>>()?;
+        Some(Self { taps, time_s: new_s })
     }
 
     /// One column at the new times.

@@ -19,6 +19,8 @@
 //! | `resample_hz` | rate to resample to |
 //! | `cutoff_hz` | −3 dB frequency of the differentiator where accelerations are derived |
 //! | `manoeuvre` | `"folder"` (default), or `{ separator = "_", part = 1 }` of the file's name |
+//! | `[classes]` | manoeuvre class = flights, by name: classes that neither folders nor names of files tell; before `manoeuvre` |
+//! | `damaged` | `"refuse"` (default) or `"stop"`: a binary log that ends within a message, or is damaged, is read up to there, with a note |
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
@@ -66,6 +68,15 @@ pub(crate) enum Manoeuvre {
     FilePart { separator: String, part: usize },
 }
 
+/// What is done with a binary log that is damaged from some place on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Damaged {
+    /// It is an error.
+    Refuse,
+    /// It is read up to there.
+    Stop,
+}
+
 /// A rule for known-bad cells of some columns of the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Repair {
@@ -107,6 +118,9 @@ pub(crate) struct Schema {
     /// −3 dB frequency of the differentiator; `None` for its default, lowered where the rate demands it.
     pub cutoff_hz: Option<f64>,
     pub manoeuvre: Manoeuvre,
+    /// Class by flight, as a person writes it; goes before `manoeuvre`.
+    pub classes: BTreeMap<String, String>,
+    pub damaged: Damaged,
     pub exclude: Vec<String>,
     pub leave_out: Vec<String>,
     pub ignore: Vec<String>,
@@ -136,6 +150,8 @@ impl Default for Schema {
             resample_hz: None,
             cutoff_hz: None,
             manoeuvre: Manoeuvre::Folder,
+            classes: BTreeMap::new(),
+            damaged: Damaged::Refuse,
             exclude: Vec::new(),
             leave_out: Vec::new(),
             ignore: Vec::new(),
@@ -150,6 +166,7 @@ impl Default for Schema {
 
 const FRAMES: [(&str, Frame); 2] = [("body", Frame::Body), ("inertial", Frame::Inertial)];
 const ORIGINS: [(&str, Targets); 2] = [("recorded", Targets::Recorded), ("derived", Targets::Derived)];
+const DAMAGED: [(&str, Damaged); 2] = [("refuse", Damaged::Refuse), ("stop", Damaged::Stop)];
 const TARGETS: [(&str, TargetKind); 4] = [
     ("derivative", TargetKind::Derivative),
     ("specific_force", TargetKind::SpecificForce),
@@ -187,6 +204,8 @@ impl Schema {
             extra: keys.texts("extra")?,
             notes: keys.texts("notes")?.unwrap_or_default(),
             manoeuvre: manoeuvre(&mut keys)?,
+            classes: classes(&mut keys)?,
+            damaged: keys.choice("damaged", &DAMAGED)?.unwrap_or(Damaged::Refuse),
             ..Self::default()
         };
         if let Some(hz) = schema.resample_hz.filter(|hz| !RATES_HZ.contains(hz)) {
@@ -324,6 +343,33 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
+}
+
+/// `[classes]`: the class of each flight that is in a list.
+fn classes(keys: &mut Keys) -> Result<BTreeMap<String, String>> {
+    const EXPECTED: &str = "names of flights by class, as in hover = [\"log_12\", \"log_14\"]";
+    let table = match keys.take("classes") {
+        None => return Ok(BTreeMap::new()),
+        Some(Value::Table(table)) => table,
+        Some(other) => return Err(keys.fault("classes", other.to_string(), EXPECTED.into())),
+    };
+    let mut classes = BTreeMap::new();
+    for (class, flights) in table {
+        let flights = match flights {
+            Value::Array(flights) => flights,
+            one => vec![one],
+        };
+        for flight in flights {
+            let Value::String(flight) = flight else {
+                return Err(keys.fault(&format!("classes.{class}"), flight.to_string(), EXPECTED.into()));
+            };
+            if let Some(other) = classes.insert(flight.clone(), class.clone()).filter(|other| *other != class) {
+                let found = format!("`{flight}`, which `classes.{other}` has, too");
+                return Err(keys.fault(&format!("classes.{class}"), found, "each flight in one class".into()));
+            }
+        }
+    }
+    Ok(classes)
 }
 
 /// `[units]`: a group's word first, a single column's unit over it.
@@ -539,6 +585,9 @@ mod tests {
             ("[[late_in]]\nflights = \"a\"\ncontrol = 0.01", "did you mean `controls`?"),
             ("[[late_in]]\nflights = \"a\"\ncontrols = 2", "`late_in.controls` is 2, expected a time from -1 to 1 s"),
             ("[repair]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nvalid = \"m1 > 0\"", "unknown name `m1`"),
+            ("[classes]\na = [\"f\"]\nb = \"f\"", "`classes.b` is `f`, which `classes.a` has, too"),
+            ("[classes]\na = 3", "`classes.a` is 3, expected names of flights"),
+            ("damaged = \"mend\"", "`damaged` is `mend`, expected one of refuse, stop"),
             ("manoeuvre = \"file\"", "`manoeuvre` is \"file\", expected \"folder\""),
             ("use = \"height >\"", "formula"),
             ("use = ", "is not TOML"),

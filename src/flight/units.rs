@@ -68,6 +68,11 @@ pub(crate) fn columns_of(word: &str) -> &'static [&'static str] {
     GROUPS.iter().find_map(of_group).unwrap_or_default()
 }
 
+/// Factor to SI of a unit of a group.
+pub(super) fn factor_of(group: &str, unit: &str) -> Option<f64> {
+    GROUPS.iter().find(|known| known.name == group)?.factor(unit)
+}
+
 /// All column names a log can give: `t`, the canonical columns, the quaternion.
 pub(crate) fn column_names() -> impl Iterator<Item = &'static str> {
     GROUPS.iter().flat_map(|group| group.columns.iter().copied())

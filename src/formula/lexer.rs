@@ -7,8 +7,20 @@ use crate::error::{Error, Result};
 pub(super) enum Token {
     Number(f64),
     Name(String),
+    /// A name in quotes, which is never a function's.
+    Quoted(String),
     /// One of `+ - * / ^ ( ) , < <= > >=`.
     Symbol(&'static str),
+}
+
+/// What a name stands in that holds other characters than a plain one.
+pub(super) const QUOTE: char = '\'';
+
+/// Whether a name needs no quotes: a letter or "_", then letters, digits and "_".
+pub(super) fn is_plain(name: &str) -> bool {
+    let mut characters = name.chars();
+    characters.next().is_some_and(|first| first.is_alphabetic() || first == '_')
+        && characters.all(|character| character.is_alphanumeric() || character == '_')
 }
 
 /// Longer formulas are refused: nobody writes them, and every later step is bounded by this.
@@ -55,6 +67,17 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, usize)>> {
         } else if character.is_alphabetic() || character == '_' {
             at = run(at, &|c| c.is_alphanumeric() || c == '_');
             tokens.push((Token::Name(characters.iter().skip(start).take(at - start).collect()), start));
+        } else if character == QUOTE {
+            let end = run(at + 1, &|c| c != QUOTE);
+            let name: String = characters.iter().skip(at + 1).take(end - at - 1).collect();
+            if end >= characters.len() {
+                return Err(fault(format!("the quote is not closed; a name in quotes ends in {QUOTE}"), start));
+            }
+            if name.is_empty() {
+                return Err(fault("a name without a character".into(), start));
+            }
+            at = end + 1;
+            tokens.push((Token::Quoted(name), start));
         } else if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| starts_with(symbol)) {
             at += symbol.len();
             tokens.push((Token::Symbol(symbol), start));
@@ -62,7 +85,8 @@ pub(super) fn tokens(text: &str) -> Result<Vec<(Token, usize)>> {
             let hint = match character {
                 '=' | '!' => "; comparisons are `<`, `<=`, `>`, `>=`",
                 '&' | '|' => "; join conditions with `*` (and) or `max` (or)",
-                '[' | ']' | '{' | '}' => "; group with `(` and `)`",
+                '[' | ']' | '{' | '}' => "; group with `(` and `)`, and put a column's name in quotes: 'q[0]'",
+                '"' | '`' => "; a name with other characters than letters, digits and `_` stands in single quotes: 'q[0]'",
                 _ => "",
             };
             return Err(fault(format!("unexpected character `{character}`{hint}"), start));
@@ -97,6 +121,9 @@ mod tests {
             ("1e999", 0, "too large"),
             ("a == b", 2, "comparisons"),
             ("1.2.3", 0, "not a number"),
+            ("2 * 'q[0]", 4, "not closed"),
+            ("''", 0, "without a character"),
+            ("q[0]", 1, "in quotes"),
         ] {
             match tokens(text) {
                 Err(Error::Formula { message, at, .. }) => {

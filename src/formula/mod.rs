@@ -32,6 +32,8 @@ mod shared;
 pub use graph::{Graph, Node};
 pub use lanes::{Lanes, Remembered};
 pub use machine::{Machine, StreamingFormula};
+#[cfg(feature = "files")]
+pub(crate) use print::quoted;
 pub use shared::{Shared, shared};
 
 use crate::error::{Error, Result};

@@ -120,7 +120,7 @@ impl Parser<'_> {
         match token {
             Token::Number(number) => self.program.push((Instruction::Number(number), at)),
             Token::Name(name) if self.peek_symbol() == Some("(") => self.call(&name, at, depth)?,
-            Token::Name(name) => {
+            Token::Name(name) | Token::Quoted(name) => {
                 let index = self.names.iter().position(|known| known.0 == name).unwrap_or_else(|| {
                     self.names.push((name, at));
                     self.names.len() - 1
@@ -195,7 +195,7 @@ fn infix(symbol: &str) -> Option<(Operation, u8, u8)> {
 fn describe(token: &Token) -> String {
     match token {
         Token::Number(number) => format!("`{number}`"),
-        Token::Name(name) => format!("`{name}`"),
+        Token::Name(name) | Token::Quoted(name) => format!("`{name}`"),
         Token::Symbol(symbol) => format!("`{symbol}`"),
     }
 }

@@ -1,5 +1,6 @@
 //! A formula back to text, with no more brackets than it needs; parsing the text gives the same formula.
 
+use super::lexer::{QUOTE, is_plain};
 use super::operation::{Function, Operation, binding, function_name, operator};
 use super::{Formula, Instruction};
 use std::fmt;
@@ -10,7 +11,7 @@ impl fmt::Display for Formula {
         for (instruction, _) in &self.program {
             let printed = match instruction {
                 Instruction::Number(number) => (number_text(*number), binding::ATOM),
-                Instruction::Name(index) => (self.names.get(*index).map(|name| name.0.clone()).unwrap_or_default(), binding::ATOM),
+                Instruction::Name(index) => (self.names.get(*index).map(|name| quoted(&name.0)).unwrap_or_default(), binding::ATOM),
                 Instruction::Apply(Operation::Negate, _) => {
                     let operand = bracketed(stack.pop(), binding::NEGATE);
                     (format!("-{operand}"), binding::NEGATE)
@@ -37,6 +38,11 @@ impl fmt::Display for Formula {
         }
         f.write_str(&stack.pop().unwrap_or_default().0)
     }
+}
+
+/// A name as it stands in a formula: in quotes where it is not plain. One that holds a quote itself cannot stand in a formula.
+pub(crate) fn quoted(name: &str) -> String {
+    if is_plain(name) { name.to_owned() } else { format!("{QUOTE}{name}{QUOTE}") }
 }
 
 fn bracketed(operand: Option<(String, u8)>, needed: u8) -> String {

@@ -271,3 +271,14 @@ fn formulas_are_stored_as_text() -> std::result::Result<(), serde_json::Error> {
     assert!(serde_json::from_str::<Formula>("\"vy *\"").is_err());
     Ok(())
 }
+
+#[test]
+fn a_quoted_name_may_hold_anything_but_a_quote_and_prints_as_it_parses() -> Result<()> {
+    let formula = Formula::parse("-'a.b[0]' * 'vx' + 'out 1' * abs('abs')")?;
+    assert_eq!(formula.names(), ["a.b[0]", "vx", "out 1", "abs"]);
+    assert_eq!(formula.to_string(), "-'a.b[0]' * vx + 'out 1' * abs(abs)");
+    assert_eq!(Formula::parse(&formula.to_string())?.to_string(), formula.to_string());
+    // A quoted name is no function.
+    assert!(Formula::parse("'abs'(2)").is_err());
+    Ok(())
+}

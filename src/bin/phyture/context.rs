@@ -113,7 +113,8 @@ impl<'a> Context<'a> {
 
     /// Reads the flights, and says what the reader has to say.
     pub fn flights(&self, data: &Data, history: usize) -> Result<DataSet> {
-        let options = ReadOptions { minimum_rows: history, split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone() };
+        let (split_at_gaps, dataset) = (data.split_at_gaps, data.dataset.clone());
+        let options = ReadOptions { minimum_rows: history, split_at_gaps, dataset, ..ReadOptions::default() };
         let set = without(data_set(&data.data, &options)?, data)?;
         self.say(format!(
             "{}: {}, {}, {:.0} s at {:.0} Hz",

@@ -8,7 +8,7 @@ use super::finding::{Finding, Severity};
 use super::report::CheckReport;
 use crate::critique::wrap::wrapped;
 use crate::flight::{Axes, Column, Description, Frame, Schema, Source, TargetKind, Targets, column_names, columns_of};
-use crate::formula::Formula;
+use crate::formula::{Formula, quoted};
 use std::collections::BTreeMap;
 use toml::{Table, Value};
 
@@ -239,7 +239,8 @@ impl<'a> Draft<'a> {
             if text == read {
                 return Ok(source.clone());
             }
-            let inner = Formula::parse(source).map_err(|_| format!("`{source}` cannot stand in a formula: {text}"))?;
+            let inner = Formula::parse(source).or_else(|_| Formula::parse(&quoted(source)));
+            let inner = inner.map_err(|_| format!("`{source}` cannot stand in a formula: {text}"))?;
             let with = |formula: &Formula, inner: &Formula| {
                 formula.substitute(&|_| Some(inner.clone())).map_err(|error| error.to_string())
             };

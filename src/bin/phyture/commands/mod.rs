@@ -10,6 +10,7 @@ mod effect;
 mod explainable;
 mod formula;
 mod implant;
+mod init;
 mod manual;
 mod parity;
 mod predict;
@@ -49,6 +50,7 @@ pub struct Arguments {
 pub enum Command {
     Demo(demo::Args),
     Simulate(simulate::Args),
+    Init(init::Args),
     Check(check::Args),
     Calibrate(calibrate::Args),
     Compare(compare::Args),
@@ -81,6 +83,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match &arguments.command {
         Command::Demo(args) => demo::run(&context, args),
         Command::Simulate(args) => simulate::run(&context, args),
+        Command::Init(args) => init::run(&context, args),
         Command::Check(args) => check::run(&context, args),
         Command::Calibrate(args) => calibrate::run(&context, args),
         Command::Compare(args) => compare::run(&context, args),

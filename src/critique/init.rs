@@ -1,0 +1,127 @@
+//! From logs that nobody has described to a description and a model to start from: what the log's numbers say ([`guess`]), then the lines
+//! that [`check`] finds to mend, as long as they mend something. What stays open is told with how to find out.
+
+use super::check::{CheckReport, Finding, Severity, Subject, check};
+use crate::error::{Error, Result};
+use crate::flight::DataSet;
+use crate::flight::guess::{Guess, Unknown, guess};
+use crate::flight::read::{ReadOptions, data_set};
+use serde::Serialize;
+use std::path::Path;
+
+/// How often lines that mend something are put in before the rest is left to a person.
+const ROUNDS: usize = 4;
+
+/// What is written for logs that had no description.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Initial {
+    /// The log that was looked at first.
+    pub log: String,
+    /// The `dataset.toml`.
+    pub dataset: String,
+    /// The `model.toml`.
+    pub model: String,
+    /// What the log itself shows.
+    pub sure: Vec<String>,
+    /// The findings of `check` whose lines are in the description.
+    pub mended: Vec<String>,
+    /// What is not known.
+    pub unknown: Vec<Unknown>,
+    /// Whether the logs are read with it and nothing is found at fault.
+    pub reads: bool,
+    /// Flights that are read.
+    pub flights: usize,
+}
+
+/// A description and a model for the logs at `data`, which stay as they are.
+///
+/// # Errors
+/// [`Error::Io`], [`Error::Log`], [`Error::Cell`] where there is no log that can be read as columns.
+pub fn init(data: &Path) -> Result<Initial> {
+    let Guess { log, text, sure, unknown } = guess(data)?;
+    let name = data.file_stem().map_or("aircraft".into(), |name| name.to_string_lossy().into_owned());
+    let model = model(&name);
+    let mut made = Initial { log, dataset: text, model, sure, mended: Vec::new(), unknown, reads: false, flights: 0 };
+    let (mut set, mut report) = match judged(data, &made.dataset) {
+        Ok(judged) => judged,
+        Err(error) => {
+            let how = "mend that, or say it in dataset.toml (docs/flight-logs.md), and ask `phyture check`".into();
+            made.unknown.push(Unknown { what: format!("more than that: so described the logs are not read: {error}"), how });
+            return Ok(made);
+        }
+    };
+    for _ in 0..ROUNDS {
+        let Some(suggestion) = report.suggestion(&set.source).filter(|suggestion| !suggestion.mends.is_empty()) else { break };
+        // A line may contradict what the log itself showed; then it mends nothing.
+        let Ok((next, better)) = judged(data, &suggestion.text) else { break };
+        if faults(&better).count() >= faults(&report).count() {
+            break;
+        }
+        made.dataset = suggestion.text;
+        made.mended.extend(suggestion.mends);
+        (set, report) = (next, better);
+    }
+    made.flights = set.flights.len();
+    made.reads = faults(&report).next().is_none();
+    made.unknown.extend(report.findings.iter().filter_map(open));
+    Ok(made)
+}
+
+fn judged(data: &Path, text: &str) -> Result<(DataSet, CheckReport)> {
+    let read =
+        |split_at_gaps| data_set(data, &ReadOptions { described: Some(text.into()), split_at_gaps, ..ReadOptions::default() });
+    let set = match read(false) {
+        // Gaps are another question than how the columns are to be read.
+        Err(error) if matches!(&error, Error::Cell { expected, .. } | Error::Log { expected, .. } if expected.contains("--split-at-gaps")) => {
+            read(true)?
+        }
+        result => result?,
+    };
+    let report = check(&set, None);
+    Ok((set, report))
+}
+
+fn faults(report: &CheckReport) -> impl Iterator<Item = &Finding> {
+    report.findings.iter().filter(|finding| finding.verdict == Severity::Fault)
+}
+
+/// What a finding leaves open.
+fn open(finding: &Finding) -> Option<Unknown> {
+    let how = match (finding.verdict, finding.subject) {
+        (Severity::Fault, _) => finding.set.clone().unwrap_or_else(|| "no line of a description mends it".into()),
+        (Severity::Undetermined, Subject::Conventions) => {
+            "these flights do not say; flights with more motion about this axis may".into()
+        }
+        _ => return None,
+    };
+    Some(Unknown { what: format!("{}: {}", finding.name, finding.message), how })
+}
+
+/// A model to start from. What no log says stays open in it.
+fn model(name: &str) -> String {
+    let name = toml::Value::String(name.into());
+    format!(
+        "# A model to start from: the paper's baseline, to be calibrated (`phyture calibrate`).
+[model]
+name = {name}
+baseline = \"paper\"
+# No log says these; without them the paper's helicopter is assumed, which every command then tells. Put in the aircraft's own:
+# mass_kg = 3.2                   # kg
+# inertia = [0.04, 0.10, 0.08]    # kg m², about the roll, pitch and yaw axis
+# rotor_radius_m = 0.60           # m
+"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::physics::Model;
+
+    #[test]
+    fn the_model_is_one_with_what_is_open_assumed() -> Result<()> {
+        let read = Model::from_toml(&model("a \"b\""), Path::new("model.toml"))?;
+        assert!(read.name == "a \"b\"" && read.assumed.mass && read.assumed.inertia && read.assumed.rotor_radius);
+        Ok(())
+    }
+}
