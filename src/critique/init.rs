@@ -63,7 +63,7 @@ pub fn init(data: &Path) -> Result<Initial> {
     }
     made.flights = set.flights.len();
     made.reads = faults(&report).next().is_none();
-    made.unknown.extend(report.findings.iter().filter_map(open));
+    made.unknown.extend(open(&report.findings));
     Ok(made)
 }
 
@@ -85,16 +85,22 @@ fn faults(report: &CheckReport) -> impl Iterator<Item = &Finding> {
     report.findings.iter().filter(|finding| finding.verdict == Severity::Fault)
 }
 
-/// What a finding leaves open.
-fn open(finding: &Finding) -> Option<Unknown> {
-    let how = match (finding.verdict, finding.subject) {
-        (Severity::Fault, _) => finding.set.clone().unwrap_or_else(|| "no line of a description mends it".into()),
-        (Severity::Undetermined, Subject::Conventions) => {
-            "these flights do not say; flights with more motion about this axis may".into()
-        }
-        _ => return None,
+/// What the findings leave open: each fault, and in one what these flights do not tell.
+fn open(findings: &[Finding]) -> Vec<Unknown> {
+    let fault = |finding: &Finding| Unknown {
+        what: format!("{}: {}", finding.name, finding.message),
+        how: finding.set.clone().unwrap_or_else(|| "no line of a description mends it".into()),
     };
-    Some(Unknown { what: format!("{}: {}", finding.name, finding.message), how })
+    let mut open: Vec<Unknown> = findings.iter().filter(|finding| finding.verdict == Severity::Fault).map(fault).collect();
+    let is_untold = |finding: &&Finding| (finding.verdict, finding.subject) == (Severity::Undetermined, Subject::Conventions);
+    let untold: Vec<&str> = findings.iter().filter(is_untold).map(|finding| finding.name.as_str()).collect();
+    if !untold.is_empty() {
+        open.push(Unknown {
+            what: format!("what these flights do not tell `check`: {}", untold.join(", ")),
+            how: "longer flights, and such that move more; `phyture check` says of each what it lacks".into(),
+        });
+    }
+    open
 }
 
 /// A model to start from. What no log says stays open in it.

@@ -103,7 +103,7 @@ pub(super) fn description(path: &Path, logs: &[Log], stated: &str) -> Result<Opt
 }
 
 /// A description with the keys of another that it does not state.
-pub(super) fn below(stated: &str, other: &str) -> Option<String> {
+fn below(stated: &str, other: &str) -> Option<String> {
     let mut made = Description::parse(stated)?;
     let own = made.clone();
     let has = |names: &[&str]| names.iter().any(|name| own.get("columns", name).is_some());

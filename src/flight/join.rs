@@ -284,8 +284,9 @@ fn turned(rows: &[Vec<f64>], resampler: &Resampler) -> Vec<Vec<f64>> {
         return parts.into();
     }
     let mut angles: [Vec<f64>; 3] = Default::default();
-    for row in 0..parts[0].len() {
-        let euler = quaternion_to_euler(std::array::from_fn(|part| parts[part][row]));
+    let [x, y, z, w] = &parts;
+    for (((&x, &y), &z), &w) in x.iter().zip(y).zip(z).zip(w) {
+        let euler = quaternion_to_euler([x, y, z, w]);
         angles.iter_mut().zip(euler).for_each(|(values, angle)| values.push(angle.to_degrees()));
     }
     angles.into()

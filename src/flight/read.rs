@@ -36,8 +36,8 @@ pub struct ReadOptions {
 const LARGEST_HELD: usize = 256 << 20;
 
 /// Reads a data set. `path` is a folder `DATA/<manoeuvre>/<flight>.csv`, a folder of logs (one class, named after it), a single
-/// log, or a folder in the Stanford layout (one folder a flight, or class folders of these). Parquet is read beside CSV with the
-/// feature `parquet`. A `dataset.toml` in the folder, or else in the one above it, describes logs that differ from the
+/// log, or a folder in the Stanford layout (one folder a flight, or class folders of these). Parquet, PX4 and ArduPilot logs are read
+/// beside CSV with the features `parquet`, `ulog` and `dataflash`. A `dataset.toml` in the folder, or else in the one above it, describes logs that differ from the
 /// canonical form.
 ///
 /// # Errors
@@ -46,25 +46,17 @@ const LARGEST_HELD: usize = 256 << 20;
 pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let mut notes = Vec::new();
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
-    let (mut schema, mut described, mut text) = (Schema::default(), None, None);
-    let given = options.described.as_ref().map(|text| (PathBuf::from(DESCRIPTION), text.clone().into_bytes()));
-    let found = || options.dataset.clone().or_else(|| description(folder));
-    let of_file = |path: PathBuf| std::fs::read(&path).map_err(Error::io(&path)).map(|bytes| (path, bytes));
-    if let Some((description, bytes)) = given.map(Ok).or_else(|| found().map(of_file)).transpose()? {
-        notes.push(format!("read as {} describes", description.display()));
-        schema = Schema::parse(&bytes, &description.display().to_string())?;
-        described = Some(Read::of(&description, &bytes));
-        text = String::from_utf8(bytes).ok();
-    }
+    let InForce { mut schema, read: described, mut text } = in_force(folder, options, &mut notes)?;
     let Listing { mut logs, notes: unread } = list(path, &schema)?;
     notes.extend(unread);
     check_unique(path, &logs)?;
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
 
     // A description that was found above the folder, or beside a single log, is that of a larger set.
-    let is_whole = path.is_dir() && (options.dataset.is_some() || folder.join(DESCRIPTION).is_file());
+    let is_given = options.dataset.is_some() || options.described.is_some();
+    let is_whole = path.is_dir() && (is_given || folder.join(DESCRIPTION).is_file());
     // One that lies elsewhere may be that of several sets.
-    let is_of_these = is_whole && options.dataset.is_none();
+    let is_of_these = is_whole && !is_given;
     let in_description = |error| described.iter().fold(error, |error, read| at(&read.path, error));
     classify(&schema, &mut logs, is_of_these, &mut notes).map_err(in_description)?;
     if let Some(whole) = formats::description(path, &logs, text.as_deref().unwrap_or_default())? {
@@ -130,6 +122,26 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     }
     data.flights.sort_by(|a, b| (&a.manoeuvre, a.name.len(), &a.name).cmp(&(&b.manoeuvre, b.name.len(), &b.name)));
     Ok(data)
+}
+
+/// The description in force.
+struct InForce {
+    schema: Schema,
+    read: Option<Read>,
+    text: Option<String>,
+}
+
+/// The description that was given, or else named, or else found beside the logs.
+fn in_force(folder: &Path, options: &ReadOptions, notes: &mut Vec<String>) -> Result<InForce> {
+    let given = options.described.as_ref().map(|text| (PathBuf::from(DESCRIPTION), text.clone().into_bytes()));
+    let found = || options.dataset.clone().or_else(|| description(folder));
+    let of_file = |path: PathBuf| std::fs::read(&path).map_err(Error::io(&path)).map(|bytes| (path, bytes));
+    let Some((path, bytes)) = given.map(Ok).or_else(|| found().map(of_file)).transpose()? else {
+        return Ok(InForce { schema: Schema::default(), read: None, text: None });
+    };
+    notes.push(format!("read as {} describes", path.display()));
+    let schema = Schema::parse(&bytes, &path.display().to_string())?;
+    Ok(InForce { schema, read: Some(Read::of(&path, &bytes)), text: String::from_utf8(bytes).ok() })
 }
 
 /// Each log as the description says of it, with what tells its flights apart.

@@ -205,20 +205,13 @@ impl Schema {
             notes: keys.texts("notes")?.unwrap_or_default(),
             manoeuvre: manoeuvre(&mut keys)?,
             classes: classes(&mut keys)?,
+            missing: missing(&mut keys)?,
             damaged: keys.choice("damaged", &DAMAGED)?.unwrap_or(Damaged::Refuse),
             ..Self::default()
         };
         if let Some(hz) = schema.resample_hz.filter(|hz| !RATES_HZ.contains(hz)) {
             let expected = format!("a rate from {} to {} Hz", RATES_HZ.start(), RATES_HZ.end());
             return Err(keys.fault("resample_hz", hz.to_string(), expected));
-        }
-        for name in keys.texts("missing")?.unwrap_or_default() {
-            let allowed = || MAY_LACK.into_iter().chain(Column::TARGETS);
-            let Some(column) = allowed().find(|column| column.name() == name) else {
-                let names: Vec<&str> = allowed().map(Column::name).collect();
-                return Err(keys.fault("missing", format!("`{name}`"), format!("one of {}", names.join(", "))));
-            };
-            schema.missing.push(column);
         }
         if let Some(mut columns) = keys.section("columns")? {
             for name in units::column_names() {
@@ -343,6 +336,18 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
+}
+
+/// `missing`, of the columns that may be.
+fn missing(keys: &mut Keys) -> Result<Vec<Column>> {
+    let names = keys.texts("missing")?.unwrap_or_default();
+    let allowed = || MAY_LACK.into_iter().chain(Column::TARGETS);
+    let column = |name: String| {
+        let names = || allowed().map(Column::name).collect::<Vec<&str>>().join(", ");
+        let known = allowed().find(|column| column.name() == name);
+        known.ok_or_else(|| keys.fault("missing", format!("`{name}`"), format!("one of {}", names())))
+    };
+    names.into_iter().map(column).collect()
 }
 
 /// `[classes]`: the class of each flight that is in a list.

@@ -45,7 +45,7 @@ pub struct Common {
 /// Where the flights are and how to read them.
 #[derive(Args)]
 pub struct Data {
-    /// Data folder, DATA/<manoeuvre>/<flight>.csv; or one CSV or Parquet file
+    /// Data folder, DATA/<manoeuvre>/<flight>.csv; or one CSV, Parquet, PX4 or ArduPilot log
     pub data: PathBuf,
     /// Description of logs that differ from the canonical form [default: DATA/dataset.toml if there is one]
     #[arg(long, value_name = "FILE")]

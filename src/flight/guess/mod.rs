@@ -7,10 +7,11 @@
 mod assign;
 mod consistency;
 mod decide;
+mod motion;
 mod text;
 mod vocabulary;
 
-use super::formats::{ReadTable, Reader, below};
+use super::formats::{ReadTable, Reader};
 use super::listing::{Log, list};
 use super::schema::Schema;
 use super::table::{RawTable, fault};
@@ -52,14 +53,9 @@ pub fn guess(path: &Path) -> Result<Guess> {
     let size = |log: &&Log| std::fs::metadata(&log.path).map_or(0, |file| file.len());
     let log = logs.iter().max_by_key(size).ok_or_else(|| fault(path, "no logs", "a log"))?;
     if let Some(description) = log.format.description {
-        let unusual = "the format's own description is one";
         return Ok(Guess {
             log: log.name.clone(),
-            text: format!(
-                "# {}: what the format itself says, written out.\n{}",
-                log.format.kind,
-                below("", description).expect(unusual)
-            ),
+            text: format!("# This is {}.\n{description}", log.format.kind),
             sure: vec![format!("axes, quaternion order, units and frames, as this is {}", log.format.kind)],
             unknown: vec![Unknown {
                 what: "which outputs turn which axis on this airframe".into(),

@@ -64,7 +64,7 @@ impl Draft {
             text.push_str("\n# By their names.\n[columns]\n");
             let place = |name: &str| column_names().position(|known| known == name);
             self.columns.sort_by_key(|(name, _)| place(name));
-            self.columns.iter().for_each(|(name, source)| drop(writeln!(text, "{name} = {}", quoted(source))));
+            self.columns.iter().for_each(|(name, source)| text.push_str(&format!("{name} = {}\n", quoted(source))));
         }
         if !self.units.is_empty() {
             text.push_str("\n[units]\n");
