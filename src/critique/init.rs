@@ -1,7 +1,7 @@
 //! From logs that nobody has described to a description and a model to start from: what the log's numbers say ([`guess`]), then the lines
 //! that [`check`] finds to mend, as long as they mend something. What stays open is told with how to find out.
 
-use super::check::{CheckReport, Finding, Severity, Subject, check};
+use super::check::{CheckReport, Finding, Severity, Subject, Suggestion, check};
 use crate::error::{Error, Result};
 use crate::flight::DataSet;
 use crate::flight::guess::{Guess, Unknown, guess};
@@ -51,7 +51,7 @@ pub fn init(data: &Path) -> Result<Initial> {
         }
     };
     for _ in 0..ROUNDS {
-        let Some(suggestion) = report.suggestion(&set.source).filter(|suggestion| !suggestion.mends.is_empty()) else { break };
+        let Some(suggestion) = mending(&set, &report) else { break };
         // A line may contradict what the log itself showed; then it mends nothing.
         let Ok((next, better)) = judged(data, &suggestion.text) else { break };
         if faults(&better).count() >= faults(&report).count() {
@@ -79,6 +79,20 @@ fn judged(data: &Path, text: &str) -> Result<(DataSet, CheckReport)> {
     };
     let report = check(&set, None);
     Ok((set, report))
+}
+
+/// Lines that may mend what is at fault. Of logs that nobody has described none is the odd one: what a fault says of some flights, as others do not
+/// tell, is asked of those alone, and then tried on all. No flight is left out.
+fn mending(set: &DataSet, report: &CheckReport) -> Option<Suggestion> {
+    let suspects = report.suspects();
+    let own = if suspects.is_empty() {
+        report.suggestion(&set.source)
+    } else {
+        let flights = set.flights.iter().filter(|flight| suspects.contains(&flight.name)).cloned().collect();
+        let some = DataSet { flights, ..set.clone() };
+        check(&some, None).suggestion(&set.source)
+    };
+    own.filter(|suggestion| !suggestion.mends.is_empty() && !suggestion.text.contains("\nleave_out = "))
 }
 
 fn faults(report: &CheckReport) -> impl Iterator<Item = &Finding> {

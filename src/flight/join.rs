@@ -64,8 +64,10 @@ pub(super) fn join(
     for stream in &mut streams {
         without_repeats(path, stream)?;
     }
-    streams.retain(|stream| !stream.time_s.is_empty());
     let needed = needed(&streams, schema);
+    let spare = spare(schema, &needed);
+    streams.iter_mut().for_each(|stream| stream.fields.retain(|(name, _)| !spare.contains(name)));
+    streams.retain(|stream| !stream.time_s.is_empty() && !stream.fields.is_empty());
     let is_needed = |stream: &Stream| stream.fields.iter().any(|(name, _)| needed.contains(name));
     let (main, held): (Vec<Stream>, Vec<Stream>) = streams.into_iter().partition(is_needed);
     if main.is_empty() {
@@ -116,7 +118,7 @@ pub(super) fn join(
         hold(stream, &mut table);
     }
     let rates: Vec<String> = main.iter().map(|stream| format!("{} {:.1} Hz", stream.name, rate_hz(&stream.time_s))).collect();
-    let more = if held.is_empty() { String::new() } else { format!("; {} holds its last value", list(&held)) };
+    let more = if held.is_empty() { String::new() } else { format!("; {} held at the last value", list(&held)) };
     let note = format!("joined at {} Hz with a local cubic: {}{more}", (step_s.recip() * 1e6).round() / 1e6, rates.join(", "));
     Ok(Joined { table, note })
 }
@@ -153,6 +155,19 @@ fn without_repeats(path: &Path, stream: &mut Stream) -> Result<()> {
         stream.fields.iter_mut().for_each(|(_, values)| *values = pick(values));
     }
     Ok(())
+}
+
+/// Columns that a canonical one could have been made of and is not. A second accelerometer among the further columns would give the acceleration away.
+fn spare(schema: &Schema, needed: &BTreeSet<String>) -> BTreeSet<String> {
+    let names = |text: &String| -> Vec<String> {
+        let inside = Formula::parse(text).map(|formula| formula.names().into_iter().map(str::to_owned).collect::<Vec<_>>());
+        inside.unwrap_or_default().into_iter().chain([text.clone()]).collect()
+    };
+    let asked = |name: &String| {
+        schema.extra.iter().flatten().any(|extra| extra == name)
+            || schema.rows.iter().any(|rule| rule.names().contains(&name.as_str()))
+    };
+    schema.columns.values().flatten().flat_map(names).filter(|name| !needed.contains(name) && !asked(name)).collect()
 }
 
 /// The columns of the log that canonical ones are made of: of alternatives the first that is there whole.
@@ -333,15 +348,28 @@ mod tests {
 
     #[test]
     fn smooth_signals_come_through_and_a_heading_turns_past_south() -> Result<()> {
-        let Joined { table, note } = joined(streams(0.0..0.0), false)?;
+        let mut all = streams(0.0..0.0);
+        all.push(stream("GYR", 50.0, 0.0..0.0, &[("Y", &|t| t)]));
+        all[1].fields.push(("IMU.Z".into(), vec![0.0; all[1].time_s.len()]));
+        let Joined { table, note } = joined(all, false)?;
+        assert!(table.column("IMU.Z").is_some());
         let column = |name: &str| table.column(name).unwrap_or_default();
-        assert_eq!(note, "joined at 100 Hz with a local cubic: ATT 20.0 Hz, IMU 250.0 Hz; BAT holds its last value");
+        assert_eq!(note, "joined at 100 Hz with a local cubic: ATT 20.0 Hz, IMU 250.0 Hz; BAT, GYR held at the last value");
         for (row, t) in column("t").iter().enumerate() {
             assert!((column("IMU.X")[row] - t * t).abs() < 1e-9 && column("BAT.Volt")[row] == t.floor());
             let off = (column("ATT.Yaw")[row] - (170.0 + 5.0 * t) + 540.0).rem_euclid(360.0) - 180.0;
             assert!(off.abs() < 1e-3 && (column("ATT.Pitch")[row] - t).abs() < 1e-3, "{off}");
         }
         assert!(table.rows() > 390);
+        Ok(())
+    }
+
+    #[test]
+    fn what_another_column_is_taken_for_is_left_out() -> Result<()> {
+        let mut all = streams(0.0..0.0);
+        all.push(stream("GYR", 50.0, 0.0..0.0, &[("X", &|t| t)]));
+        let table = joined(all, false)?.table;
+        assert!(table.column("GYR.X").is_some() && table.column("IMU.X").is_none());
         Ok(())
     }
 

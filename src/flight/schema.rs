@@ -546,6 +546,10 @@ mod tests {
             ignore = ["comment"]
             extra = ["Vbat"]
             notes = "Heading is derived."
+            damaged = "stop"
+            [classes]
+            hover = ["log_12", "log_14"]
+            climb = "log_13"
             [columns]
             vx = ["v_nose", "vn"]
             u4 = "1e-10 * (m1^2 + m2^2)"
@@ -564,7 +568,9 @@ mod tests {
         assert_eq!((schema.rows.len(), schema.repairs.len(), schema.missing.len()), (2, 1, 3));
         assert_eq!(schema.manoeuvre, Manoeuvre::FilePart { separator: "-".into(), part: 2 });
         assert_eq!((schema.factor("yaw"), schema.factor("roll")), (1.0, std::f64::consts::PI / 180.0));
-        assert_eq!(schema.quaternion, QuaternionOrder::ScalarFirst);
+        assert_eq!((schema.quaternion, schema.damaged), (QuaternionOrder::ScalarFirst, Damaged::Stop));
+        let classes: Vec<(&str, &str)> = schema.classes.iter().map(|(flight, class)| (flight.as_str(), class.as_str())).collect();
+        assert_eq!(classes, [("log_12", "hover"), ("log_13", "climb"), ("log_14", "hover")]);
         let stated = |key: &str| schema.stated.get(key).map(String::as_str);
         assert_eq!((stated("units.roll"), stated("units.yaw"), stated("units.vx")), (Some("deg"), Some("rad"), None));
         assert_eq!((stated("quaternion"), stated("columns.u4")), (Some("wxyz"), Some("1e-10 * (m1^2 + m2^2)")));
