@@ -37,7 +37,8 @@ fn results_go_to_standard_output_as_json_alone_when_asked() -> Result<()> {
     let place = folder()?;
     assert!(phyture(place.path(), &["simulate", "data", "--minutes", "3", "--seed", "7300"])?.status.success());
     let commands = [
-        (&["check", "data", "--json", "-"][..], "fault"),
+        (&["init", "data", "--output", "described", "--json", "-"][..], "unknown"),
+        (&["check", "data", "--json", "-"], "fault"),
         (&["calibrate", "data", "-o", "model.toml", "--lock", "chaos", "--json", "-"], "condition_number"),
         (&["compare", "data", "-m", "model.toml", "--json", "-"], "models"),
     ];

@@ -34,6 +34,7 @@ fn every_command_refuses_what_is_there_and_leaves_it_to_the_byte() -> Result<()>
     fs::write(at.join("small.toml"), SMALL).map_err(Error::io("small.toml"))?;
     let commands = [
         &["simulate", "flights", "--minutes", "10", "--baseline", "--seed", "7310"][..],
+        &["init", "flights", "--output", "described"],
         &["check", "flights", "--json", "check.json"],
         &["calibrate", "flights", "-m", "flights/model.toml", "-o", "model.toml", "--lock", "chaos"],
         &["effect", "add", "wind", "-m", "model.toml", "-o", "wind.toml"],

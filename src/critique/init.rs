@@ -17,9 +17,11 @@ const ROUNDS: usize = 4;
 pub struct Initial {
     /// The log that was looked at first.
     pub log: String,
-    /// The `dataset.toml`.
+    /// The text of the `dataset.toml`.
+    #[serde(skip)]
     pub dataset: String,
-    /// The `model.toml`.
+    /// The text of the `model.toml`.
+    #[serde(skip)]
     pub model: String,
     /// What the log itself shows.
     pub sure: Vec<String>,

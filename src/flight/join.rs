@@ -5,7 +5,7 @@
 //! and [`GAP_S`], the table has no rows. What the streams are is known by the formats' files, and what is made of them by the description.
 
 use super::attitude::{euler_to_quaternion, quaternion_to_euler};
-use super::bounds::RATES_HZ;
+use super::bounds::{MOST_SAMPLES, RATES_HZ};
 use super::resample::Resampler;
 use super::schema::Schema;
 use super::source::Read;
@@ -86,6 +86,11 @@ pub(super) fn join(
         runs.push(own);
     }
     let step_s = schema.resample_hz.unwrap_or(RATE_HZ).recip();
+    let samples: f64 = spans.iter().map(|span| (span.end - span.start) / step_s).sum();
+    if samples >= MOST_SAMPLES {
+        let found = format!("{samples:.1e} samples at {:.0} Hz", step_s.recip());
+        return Err(fault(path, found, format!("at most {MOST_SAMPLES:.0e}; a lower `resample_hz`")));
+    }
     let clock = clock(&spans, step_s);
     let Some(first) = clock.first() else {
         let spans: Vec<String> = main.iter().map(span).collect();
@@ -350,7 +355,8 @@ mod tests {
     fn smooth_signals_come_through_and_a_heading_turns_past_south() -> Result<()> {
         let mut all = streams(0.0..0.0);
         all.push(stream("GYR", 50.0, 0.0..0.0, &[("Y", &|t| t)]));
-        all[1].fields.push(("IMU.Z".into(), vec![0.0; all[1].time_s.len()]));
+        let still = vec![0.0; all[1].time_s.len()];
+        all[1].fields.push(("IMU.Z".into(), still));
         let Joined { table, note } = joined(all, false)?;
         assert!(table.column("IMU.Z").is_some());
         let column = |name: &str| table.column(name).unwrap_or_default();
@@ -393,11 +399,15 @@ mod tests {
         let mut slow = streams(0.0..0.0);
         slow[1].time_s.iter_mut().for_each(|t| *t *= 1e4);
         let unknown = streams(0.0..0.0).split_off(2);
+        let mut long = streams(0.0..0.0).split_off(1);
+        long[0].time_s = (0..450_000).map(|k| f64::from(k) / 2.0).collect();
+        long[0].fields[0].1 = vec![0.0; 450_000];
         for (streams, part) in [
             (back, "time in `IMU` that steps back"),
             (apart, "no stretch of time"),
             (slow, "samples of `IMU`, 0.025 a second"),
             (unknown, "only BAT is known"),
+            (long, "2.2e7 samples at 100 Hz"),
         ] {
             let refused = joined(streams, false).map(|_| ());
             assert!(matches!(&refused, Err(Error::Log { found, .. }) if found.contains(part)), "{refused:?}");
