@@ -7,6 +7,7 @@
 mod assemble;
 pub mod attitude;
 mod bounds;
+mod channel;
 mod column;
 #[cfg(feature = "files")]
 mod convert;
@@ -54,6 +55,7 @@ pub mod windows;
 pub mod write;
 
 pub use attitude::Axes;
+pub use channel::{Channel, PerChannel};
 pub use column::Column;
 #[cfg(feature = "files")]
 pub(crate) use description::Description;
@@ -222,7 +224,7 @@ impl Flight {
 
     /// The six acceleration targets.
     pub fn accelerations(&self) -> Accelerations {
-        Column::TARGETS.map(|target| self.column(target).to_vec())
+        PerChannel::from_fn(|channel| self.column(channel.column()).to_vec())
     }
 
     /// The same flight with other accelerations.
@@ -230,10 +232,7 @@ impl Flight {
     /// # Errors
     /// [`Error::Log`] as [`Flight::new`].
     pub fn with_accelerations(&self, accelerations: &Accelerations) -> Result<Self> {
-        self.with_columns(|column| {
-            let channel = Column::TARGETS.iter().position(|target| *target == column)?;
-            Some(accelerations[channel].clone())
-        })
+        self.with_columns(|column| Some(accelerations[Channel::of_column(column)?].clone()))
     }
 
     /// The same flight with other values in the columns for which `other` has some.
@@ -287,7 +286,7 @@ pub struct Window {
 }
 
 /// Six acceleration columns in the order of [`Column::TARGETS`]: m/s², then rad/s².
-pub type Accelerations = [Vec<f64>; 6];
+pub type Accelerations = PerChannel<Vec<f64>>;
 
 /// The flights of one data set, sorted by manoeuvre and name.
 #[derive(Clone, Debug, Default)]

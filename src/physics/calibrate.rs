@@ -16,7 +16,7 @@ use super::model::Model;
 use super::sign_doubt::{SignDoubt, SignFinding};
 use super::signal::{Stage, signal_named};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::formula::Formula;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -321,9 +321,9 @@ impl Pass {
         let value = |&(effect, index): &Free, flight: usize| {
             model.effects[effect].number(index).map_or(0.0, |number| number.in_flight(&rows.flights[flight].name))
         };
-        let mut squares = vec![0.0; Column::TARGETS.len()];
+        let mut squares = PerChannel::splat(0.0);
         for cluster in &mut self.clusters {
-            for (channel, factor) in cluster.factors.iter_mut().enumerate() {
+            for (channel, factor) in Channel::ALL.into_iter().zip(&mut cluster.factors) {
                 let free = self.layout.channels[channel].iter().map(|&column| value(&self.layout.free[column], cluster.flight));
                 let own = self.layout.own_channels[channel].iter().map(|&column| value(&self.layout.own[column], cluster.flight));
                 let values = DVector::from_iterator(factor.width() - 1, free.chain(own));
@@ -422,7 +422,7 @@ impl Pass {
             let all = hold(&layout.free);
             let shape = by_flight::Shape {
                 free: layout.free.len(),
-                channels: &layout.channels,
+                channels: layout.channels.values(),
                 own: &layout.own_columns(model),
                 hold: all.as_ref(),
             };

@@ -3,7 +3,7 @@
 
 use super::{Studio, held};
 use crate::critique::diagnose::Diagnosis;
-use crate::critique::{Intervals, PerChannel};
+use crate::critique::{ChannelValues, Intervals};
 use crate::error::Result;
 use crate::physics::{Calibration, Model};
 use serde::Serialize;
@@ -87,7 +87,7 @@ pub struct StepText {
     /// What was done.
     pub did: String,
     /// Root mean square error on what judges, m/s² and rad/s²; absent for states that were undone.
-    pub rmse: Option<PerChannel>,
+    pub rmse: Option<ChannelValues>,
     /// Its 95 % interval.
     pub ci95: Option<Intervals>,
     /// Whether its numbers come from a calibration of this very model.

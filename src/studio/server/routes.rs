@@ -1,6 +1,7 @@
 //! Requests by name: JSON in, a method of the studio, JSON out.
 
 use super::Refusal;
+use crate::flight::Channel;
 use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ struct MapWanted {
 struct DependenceWanted {
     #[serde(default)]
     part: PartWanted,
-    channel: usize,
+    channel: Channel,
 }
 
 #[derive(Deserialize)]
