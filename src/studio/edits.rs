@@ -95,6 +95,7 @@ impl Studio {
             // What cannot be judged, such as a formula that is no number in some flight, is no step.
             self.judge.path(&self.set, &self.split, &path)?;
             held(&self.history).push(state);
+            self.keep();
         }
         self.steps()
     }

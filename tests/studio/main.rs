@@ -4,6 +4,8 @@
 mod browser;
 mod http;
 mod library;
+mod mishaps;
 mod server;
 mod support;
+mod unsaved;
 mod webdriver;

@@ -139,6 +139,26 @@ impl Browser {
         self.post("/actions", &body).map(drop)
     }
 
+    /// Opens a further tab and goes there; the tab that was left.
+    pub fn new_tab(&self) -> Result<String> {
+        let path = format!("/session/{}/window", self.session);
+        let before = self.call("GET", &path, &Value::Null)?;
+        let opened = self.post("/window/new", &json!({ "type": "tab" }))?;
+        self.post("/window", &json!({ "handle": opened["handle"] }))?;
+        Ok(before.as_str().unwrap_or_default().to_owned())
+    }
+
+    /// Closes this tab and goes to another.
+    pub fn close_tab(&self, other: &str) -> Result<()> {
+        self.call("DELETE", &format!("/session/{}/window", self.session), &Value::Null)?;
+        self.to_tab(other)
+    }
+
+    /// Goes to a tab.
+    pub fn to_tab(&self, tab: &str) -> Result<()> {
+        self.post("/window", &json!({ "handle": tab })).map(drop)
+    }
+
     /// Messages of the console that are worse than a remark.
     pub fn faults(&self) -> Result<Vec<String>> {
         let log = self.post("/se/log", &json!({ "type": "browser" }))?;
