@@ -114,6 +114,30 @@ impl Comparison {
 ///
 /// # Errors
 /// [`Error::Shape`](crate::Error::Shape) if a row has not one prediction a window, or a window lies outside its flight.
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::critique::{Row, compare, finite_difference};
+/// use phyture::flight::split::Part;
+/// use phyture::flight::{Channel, PerChannel, Window};
+/// use phyture::sim::{Simulation, simulate};
+///
+/// let flights = simulate(&Simulation { minutes: 2.0, ..Simulation::baseline() })?.flights;
+/// let windows: Vec<Window> = (10..flights[0].len()).map(|last| Window { flight: 0, last }).collect();
+/// let nothing = Row { name: "nothing".into(), predicted: vec![PerChannel::splat(0.0); windows.len()] };
+/// let difference = finite_difference(&flights, &windows)?;
+/// let found = compare(&flights, &windows, &[nothing, difference], Part::All)?;
+/// for model in &found.models {
+///     println!("{}: {:?} rad/s²", model.name, model.rmse.channels()[Channel::WzDot]);
+/// }
+/// assert_eq!(found.models[1].name, "finite difference");
+/// # Ok(())
+/// # }
+/// ```
 pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part) -> Result<Comparison> {
     let measured = measured(flights, windows)?;
     let groups = Groups::new(flights, windows);

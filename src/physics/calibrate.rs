@@ -157,6 +157,28 @@ impl std::fmt::Display for Calibration {
 ///
 /// # Errors
 /// [`Error::Undetermined`] naming the numbers and why the data do not determine them; otherwise as [`Model::predict`].
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::flight::split::Split;
+/// use phyture::physics::{Model, calibrate};
+/// use phyture::sim::{INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
+///
+/// let set = simulate(&Simulation { minutes: 6.0, ..Simulation::baseline() })?;
+/// let model = Model::paper("helicopter", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+/// let (model, calibration) = calibrate(&model, &set.flights, &Split::for_search(&set.flights, 1).training)?;
+/// for estimate in &calibration.coefficients {
+///     let [low, high] = estimate.ci95.expect("six minutes hold blocks enough");
+///     println!("{} = {:.3} [{low:.3}, {high:.3}] {}", estimate.name, estimate.value, estimate.unit);
+/// }
+/// assert!(model.effects.iter().flat_map(|effect| &effect.coefficients).all(|number| number.ci95.is_some()));
+/// # Ok(())
+/// # }
+/// ```
 pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
     model.check()?;
     if let Some(span) = spans.iter().find(|span| span.flight >= flights.len()) {
