@@ -87,6 +87,21 @@ impl Browser {
         self.post("/execute/sync", &json!({ "script": format!("return {expression}"), "args": [] }))
     }
 
+    /// Runs a script on the page.
+    pub fn run(&self, script: &str) -> Result<()> {
+        self.post("/execute/sync", &json!({ "script": script, "args": [] })).map(drop)
+    }
+
+    /// What a script hands to its last argument, a function.
+    pub fn answer(&self, script: &str) -> Result<Value> {
+        self.post("/execute/async", &json!({ "script": script, "args": [] }))
+    }
+
+    /// A command of the browser's own protocol.
+    pub fn cdp(&self, command: &str, parameters: &Value) -> Result<Value> {
+        self.post("/goog/cdp/execute", &json!({ "cmd": command, "params": parameters }))
+    }
+
     /// Waits until an expression of the page is true.
     pub fn wait(&self, expression: &str) -> Result<()> {
         let begun = Instant::now();

@@ -137,9 +137,8 @@ function head() {
       'a',
       {
         href: '#',
-        role: 'tab',
         'data-view': name,
-        'aria-selected': String(name === view),
+        'aria-current': name === view ? 'page' : null,
         title: `key ${index + 1}`,
         onclick: (/** @type {Event} */ event) => {
           event.preventDefault();
@@ -160,7 +159,7 @@ function head() {
   ) => h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
   byId('head').replaceChildren(
     h('div', { class: 'brand' }, h('h1', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
-    h('nav', { role: 'tablist', 'aria-label': 'Views' }, VIEWS.map(tab)),
+    h('nav', { 'aria-label': 'Views' }, VIEWS.map(tab)),
     h(
       'div',
       { class: 'tools' },
@@ -287,6 +286,8 @@ async function start() {
   window.addEventListener('keydown', key);
   // Another tab may have changed the model, or another program its file.
   window.addEventListener('focus', look);
+  // Plots are drawn in the colours of a theme: the system's may change in the evening.
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => draw());
   await draw();
   document.body.dataset.ready = 'yes';
   watch();
