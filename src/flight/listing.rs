@@ -3,17 +3,18 @@
 //! Names, endings and kinds of nodes are looked at; no log is opened. Only plain files are logs: pipes and devices are never opened,
 //! and a symbolic link that leads back to the folder itself is not followed.
 
+use super::formats::{self, Format};
 use super::schema::{Manoeuvre, Schema};
-use super::stanford;
 use super::table::fault;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// A log file or a flight's folder, and what its flights are called.
+/// A log file or a flight's folder, what it is, and what its flights are called.
 pub(super) struct Log {
     pub path: PathBuf,
+    pub format: &'static Format,
     pub name: String,
     pub manoeuvre: String,
 }
@@ -36,43 +37,10 @@ struct Unread {
     loops: Vec<String>,
 }
 
-const KINDS: &str = "a .csv or .parquet file, or a folder of them";
-
 pub(super) const DESCRIPTION: &str = "dataset.toml";
 
 /// Files that this program writes beside flights and that are no news to anybody.
 const COMPANIONS: [&str; 3] = [DESCRIPTION, "model.toml", "truth.json"];
-
-/// What other programs' files are, and how they become logs.
-const CONVERTERS: [(&str, &str); 7] = [
-    (
-        "ulg",
-        "a PX4 log: `ulog2csv FILE` (Python package pyulog) writes its topics as CSV; join those that are needed into one table",
-    ),
-    (
-        "bin",
-        "an ArduPilot log: `mavlogdump.py --format csv --types ATT FILE` (Python package pymavlink) writes a message type as CSV",
-    ),
-    ("gz", "compressed: `gunzip FILE` first"),
-    ("zip", "compressed: unpack it first"),
-    ("mat", "a MATLAB file: `writetable` writes CSV"),
-    ("xlsx", "a spreadsheet: save it as CSV"),
-    ("bag", "a ROS bag: `rostopic echo -b FILE -p TOPIC` writes CSV"),
-];
-
-fn converter(path: &Path) -> Option<&'static str> {
-    let ending = ending(path);
-    CONVERTERS.iter().find(|known| known.0 == ending).map(|known| known.1)
-}
-
-/// The ending in lower case, without its dot.
-pub(super) fn ending(path: &Path) -> String {
-    path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default()
-}
-
-fn named_as_log(path: &Path) -> bool {
-    matches!(ending(path).as_str(), "csv" | "parquet")
-}
 
 pub(super) fn text(name: Option<&OsStr>) -> String {
     name.map(|name| name.to_string_lossy().into_owned()).unwrap_or_default()
@@ -102,7 +70,7 @@ fn entries(folder: &Path) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// [`Error::Log`] for a link that leads nowhere: its flight would be missed.
 fn is_log(path: &Path) -> Result<bool> {
-    if !named_as_log(path) || path.is_dir() {
+    if formats::of_file(path).is_none() || path.is_dir() {
         return Ok(false);
     }
     if path.is_symlink() && matches!(path.try_exists(), Ok(false)) {
@@ -117,8 +85,8 @@ pub(super) fn list(path: &Path, schema: &Schema) -> Result<Listing> {
     if !kind.is_dir() {
         return single(path, kind.is_file(), schema);
     }
-    if stanford::is_flight(path) {
-        return Ok(Listing { logs: vec![stanford_log(path, None)], notes: Vec::new() });
+    if let Some(format) = formats::of_folder(path) {
+        return Ok(Listing { logs: vec![folder_log(path, format, None)], notes: Vec::new() });
     }
     let mut unread = Unread::default();
     let (mut loose, mut logs) = (Vec::new(), Vec::new());
@@ -150,9 +118,10 @@ pub(super) fn list(path: &Path, schema: &Schema) -> Result<Listing> {
 
 /// A log given by itself.
 fn single(path: &Path, plain: bool, schema: &Schema) -> Result<Listing> {
-    if !named_as_log(path) {
-        let expected = converter(path).map_or_else(|| KINDS.to_owned(), |how| format!("{KINDS}; this is {how}"));
-        return Err(fault(path, format!("a file of the kind `.{}`", ending(path)), expected));
+    if formats::of_file(path).is_none() {
+        let kinds = format!("{}, or a folder of them", formats::files());
+        let expected = formats::converter(path).map_or_else(|| kinds.clone(), |how| format!("{kinds}; this is {how}"));
+        return Err(fault(path, format!("a file of the kind `.{}`", formats::ending(path)), expected));
     }
     if !plain {
         return Err(fault(path, "a pipe or a device", "a plain file; copy what it gives into one"));
@@ -168,8 +137,8 @@ fn of_class(data: &Path, class: &Path, schema: &Schema, logs: &mut Vec<Log>, unr
         unread.loops.push(class_name);
         return Ok(());
     }
-    if stanford::is_flight(class) {
-        logs.push(stanford_log(class, None));
+    if let Some(format) = formats::of_folder(class) {
+        logs.push(folder_log(class, format, None));
         return Ok(());
     }
     let before = logs.len();
@@ -177,8 +146,8 @@ fn of_class(data: &Path, class: &Path, schema: &Schema, logs: &mut Vec<Log>, unr
         let name = text(entry.file_name());
         if schema.exclude.contains(&name) {
             unread.excluded.push(format!("`{class_name}/{name}`"));
-        } else if stanford::is_flight(&entry) {
-            logs.push(stanford_log(&entry, Some(class)));
+        } else if let Some(format) = formats::of_folder(&entry) {
+            logs.push(folder_log(&entry, format, Some(class)));
         } else if is_log(&entry)? {
             logs.push(log(&entry, Some(&class_name), &class_name, schema)?);
         } else if entry.is_dir() {
@@ -232,7 +201,7 @@ impl Unread {
 /// A folder in which nothing is a log.
 fn none(path: &Path, unread: &Unread) -> Error {
     let mut expected = "DATA/<manoeuvre>/<flight>.csv, a folder of CSV files, or the Stanford layout".to_owned();
-    if let Some((file, how)) = unread.files.iter().find_map(|file| Some((file, converter(Path::new(file))?))) {
+    if let Some((file, how)) = unread.files.iter().find_map(|file| Some((file, formats::converter(Path::new(file))?))) {
         expected = format!("{expected}; {file} is {how}");
     }
     let found = match unread.notes().as_slice() {
@@ -244,9 +213,7 @@ fn none(path: &Path, unread: &Unread) -> Error {
 
 /// A file's flight; `below` is the folder between it and the data set.
 fn log(path: &Path, below: Option<&str>, folder: &str, schema: &Schema) -> Result<Log> {
-    if cfg!(not(feature = "parquet")) && ending(path) == "parquet" {
-        return Err(fault(path, "a Parquet file", "CSV; this program was built without the feature `parquet`"));
-    }
+    let format = formats::of_file(path).ok_or_else(|| fault(path, "a file of another kind", formats::files()))?;
     let own = text(path.file_stem());
     let manoeuvre = match &schema.manoeuvre {
         Manoeuvre::Folder => folder.to_owned(),
@@ -258,16 +225,16 @@ fn log(path: &Path, below: Option<&str>, folder: &str, schema: &Schema) -> Resul
             )
         })?,
     };
-    Ok(Log { path: path.into(), name: below.map_or(own.clone(), |below| format!("{below}/{own}")), manoeuvre })
+    Ok(Log { path: path.into(), format, name: below.map_or(own.clone(), |below| format!("{below}/{own}")), manoeuvre })
 }
 
 /// The class is the folder above the flight's, or else the flight's name without a number at its end (`hover_03`).
-fn stanford_log(path: &Path, class: Option<&Path>) -> Log {
+fn folder_log(path: &Path, format: &'static Format, class: Option<&Path>) -> Log {
     let own = folder_name(path);
     let without_number = own.trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix('_');
     let class = class.map(|class| text(class.file_name()));
     let manoeuvre = class.clone().unwrap_or_else(|| without_number.unwrap_or(&own).to_owned());
-    Log { path: path.into(), name: class.map_or(own.clone(), |class| format!("{class}/{own}")), manoeuvre }
+    Log { path: path.into(), format, name: class.map_or(own.clone(), |class| format!("{class}/{own}")), manoeuvre }
 }
 
 /// Refuses two logs of one name: `a.csv` beside `a.parquet`.

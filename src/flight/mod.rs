@@ -15,6 +15,8 @@ pub mod derived;
 #[cfg(feature = "files")]
 mod description;
 pub mod differentiate;
+#[cfg(feature = "files")]
+mod formats;
 #[cfg(feature = "parquet")]
 pub mod guard;
 #[cfg(feature = "files")]

@@ -2,6 +2,8 @@
 //!
 //! The column-by-column interface of the `parquet` crate, without Arrow. What the columns mean is not known here.
 
+use super::assemble::assemble;
+use super::formats::{Format, Place, Reader};
 use super::guard::guarded;
 use super::source::Read;
 use super::table::{RawTable, check_header, fault};
@@ -18,6 +20,16 @@ use parquet::schema::types::Type;
 use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
+
+/// Parquet among the formats.
+pub(super) const PARQUET: Format = Format {
+    kind: "a Parquet file",
+    place: Place::File("parquet"),
+    description: None,
+    reader: Reader::Of(|log, schema, cuts| {
+        assemble(read_parquet(&log.path, &|name| schema.wants(name))?, &log.name, &log.manoeuvre, schema, cuts)
+    }),
+};
 
 /// Records read at a time; bounds memory whatever a damaged file claims to hold.
 const BATCH: usize = 1 << 16;

@@ -4,12 +4,12 @@
 //! siblings. Everything that is wrong is refused with one error that names the place; nothing is half-loaded, and whatever was left out,
 //! filled in, or mended on the description's word is said in [`DataSet::notes`]. What was read is recorded in [`DataSet::source`].
 
-use super::assemble::{Assembled, Cuts, assemble, gather};
-use super::listing::{DESCRIPTION, Listing, Log, check_unique, ending, list};
+use super::assemble::{Assembled, Cuts, gather};
+use super::listing::{DESCRIPTION, Listing, Log, check_unique, list};
 use super::schema::{LateIn, Schema};
 use super::source::Read;
-use super::table::{fault, read_csv};
-use super::{DataSet, Flight, Source, names, stanford};
+use super::table::fault;
+use super::{DataSet, Flight, Source, names};
 use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;
 use std::collections::hash_map::{DefaultHasher, Entry};
@@ -132,8 +132,8 @@ fn read_each(
 ) -> Vec<Result<(Assembled, Vec<u64>)>> {
     in_parallel(logs, |log| {
         let done = match own.get(log.name.as_str()) {
-            Some(rules) => read_log(log, &schema.for_log(rules), cuts)?,
-            None => read_log(log, schema, cuts)?,
+            Some(rules) => log.format.read(log, &schema.for_log(rules), cuts)?,
+            None => log.format.read(log, schema, cuts)?,
         };
         let prints: Vec<u64> = done.flights.iter().map(fingerprint).collect();
         Ok((sparing(done, held), prints))
@@ -239,19 +239,6 @@ fn in_parallel<T: Send>(logs: &[Log], read: impl Fn(&Log) -> T + Send + Sync) ->
 #[cfg(not(feature = "rayon"))]
 fn in_parallel<T>(logs: &[Log], read: impl Fn(&Log) -> T) -> Vec<T> {
     logs.iter().map(read).collect()
-}
-
-fn read_log(log: &Log, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
-    let wanted = |name: &str| schema.wants(name);
-    if log.path.is_dir() {
-        return stanford::read(&log.path, &log.name, &log.manoeuvre, cuts);
-    }
-    let table = match ending(&log.path).as_str() {
-        #[cfg(feature = "parquet")]
-        "parquet" => super::parquet::read_parquet(&log.path, &wanted)?,
-        _ => read_csv(&log.path, &wanted)?,
-    };
-    assemble(table, &log.name, &log.manoeuvre, schema, cuts)
 }
 
 /// The description in the folder, or else in the one above it (a class folder or a log of a described set).

@@ -9,6 +9,7 @@
 use super::assemble::{Assembled, Cuts, assemble};
 use super::attitude::{cross, rotate, rotate_back, rotation_body_to_inertial};
 use super::convert::check_finite;
+use super::formats::{Format, Place, Reader};
 use super::hypotheses::{Decided, Smoother, control_scale, decide};
 use super::names::own_name;
 use super::schema::Schema;
@@ -59,8 +60,16 @@ const IDLE_RATE_RAD_S: f64 = 0.05;
 /// … for at least so long from the start of the flight, s (the set's notes say at least 10 s).
 const IDLE_LEAST_S: f64 = 8.0;
 
+/// The layout among the formats.
+pub(super) const FORMAT: Format = Format {
+    kind: "a flight in the Stanford layout",
+    place: Place::Folder(is_flight),
+    description: None,
+    reader: Reader::Of(|log, _, cuts| read(&log.path, &log.name, &log.manoeuvre, cuts)),
+};
+
 /// Whether a folder is one flight in this layout.
-pub(super) fn is_flight(folder: &Path) -> bool {
+fn is_flight(folder: &Path) -> bool {
     folder.join(SMOOTHER).is_file() && folder.join(CONTROLS).is_file()
 }
 
@@ -68,7 +77,7 @@ pub(super) fn is_flight(folder: &Path) -> bool {
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Cell`]; [`Error::Log`] if the files fit no hypothesis, with each one's error.
-pub(super) fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Result<Assembled> {
+fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Result<Assembled> {
     let smoother = read_table(&folder.join(SMOOTHER), &SMOOTHER_COLUMNS)?;
     let controls = read_table(&folder.join(CONTROLS), &CONTROL_COLUMNS)?;
     let times = column(&smoother, "time");

@@ -3,11 +3,23 @@
 //! Nothing is converted, checked against physics, or repaired here. A cell without a number is NaN and is judged later, when
 //! it is known whether a repair rule covers it; text in a number is refused at once.
 
+use super::assemble::assemble;
 use super::bounds::MOST_COLUMNS;
+use super::formats::{Format, Place, Reader};
 use super::source::Read;
 use crate::error::{Error, Result};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+
+/// CSV among the formats.
+pub(super) const CSV: Format = Format {
+    kind: "a CSV file",
+    place: Place::File("csv"),
+    description: None,
+    reader: Reader::Of(|log, schema, cuts| {
+        assemble(read_csv(&log.path, &|name| schema.wants(name))?, &log.name, &log.manoeuvre, schema, cuts)
+    }),
+};
 
 /// Columns of one file, equally long.
 #[derive(Clone, Debug, Default)]
