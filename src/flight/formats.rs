@@ -1,11 +1,11 @@
 //! The formats of logs that are read: one line each in [`FORMATS`], and a file that knows the format.
 //!
-//! Listing, messages and reading ask this list. What a file holds is the business of the format's own file; of a format that states units, axes
-//! and frames by itself, its description in the words of `dataset.toml` is here in force below the one of the data set.
+//! Listing, messages and reading ask this list. What a file holds is the business of the format's own file.
 
 use super::assemble::{Assembled, Cuts};
 use super::listing::Log;
 use super::schema::Schema;
+#[cfg(not(feature = "parquet"))]
 use super::table::fault;
 use super::{stanford, table};
 use crate::error::Result;
@@ -23,18 +23,14 @@ pub(super) enum Place {
 pub(super) enum Reader {
     /// This function.
     Of(fn(&Log, &Schema, Cuts) -> Result<Assembled>),
-    /// Nothing, as the program was built without this feature.
-    #[cfg_attr(all(feature = "parquet", feature = "ulog", feature = "dataflash"), allow(dead_code))]
-    LeftOut(&'static str),
+    /// Nothing: what the file is, and the feature without which the program was built.
+    #[cfg(not(feature = "parquet"))]
+    LeftOut { kind: &'static str, feature: &'static str },
 }
 
 /// A format of logs.
 pub(super) struct Format {
-    /// With its article, for messages.
-    pub kind: &'static str,
     pub place: Place,
-    /// What holds for every log of the format where the data set's own description says nothing else, as a `dataset.toml`.
-    pub description: Option<&'static str>,
     pub reader: Reader,
 }
 
@@ -49,9 +45,9 @@ pub(super) static FORMATS: &[Format] = &[
 ];
 
 impl Format {
-    #[cfg_attr(all(feature = "parquet", feature = "ulog", feature = "dataflash"), allow(dead_code))]
+    #[cfg(not(feature = "parquet"))]
     const fn left_out(kind: &'static str, ending: &'static str, feature: &'static str) -> Self {
-        Self { kind, place: Place::File(ending), description: None, reader: Reader::LeftOut(feature) }
+        Self { place: Place::File(ending), reader: Reader::LeftOut { kind, feature } }
     }
 
     /// The flights of a log.
@@ -61,8 +57,9 @@ impl Format {
     pub fn read(&self, log: &Log, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
         match self.reader {
             Reader::Of(read) => read(log, schema, cuts),
-            Reader::LeftOut(feature) => {
-                Err(fault(&log.path, self.kind, format!("CSV; this program was built without the feature `{feature}`")))
+            #[cfg(not(feature = "parquet"))]
+            Reader::LeftOut { kind, feature } => {
+                Err(fault(&log.path, kind, format!("CSV; this program was built without the feature `{feature}`")))
             }
         }
     }

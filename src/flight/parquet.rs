@@ -23,9 +23,7 @@ use std::sync::Arc;
 
 /// Parquet among the formats.
 pub(super) const PARQUET: Format = Format {
-    kind: "a Parquet file",
     place: Place::File("parquet"),
-    description: None,
     reader: Reader::Of(|log, schema, cuts| {
         assemble(read_parquet(&log.path, &|name| schema.wants(name))?, &log.name, &log.manoeuvre, schema, cuts)
     }),

@@ -61,12 +61,8 @@ const IDLE_RATE_RAD_S: f64 = 0.05;
 const IDLE_LEAST_S: f64 = 8.0;
 
 /// The layout among the formats.
-pub(super) const FORMAT: Format = Format {
-    kind: "a flight in the Stanford layout",
-    place: Place::Folder(is_flight),
-    description: None,
-    reader: Reader::Of(|log, _, cuts| read(&log.path, &log.name, &log.manoeuvre, cuts)),
-};
+pub(super) const FORMAT: Format =
+    Format { place: Place::Folder(is_flight), reader: Reader::Of(|log, _, cuts| read(&log.path, &log.name, &log.manoeuvre, cuts)) };
 
 /// Whether a folder is one flight in this layout.
 fn is_flight(folder: &Path) -> bool {

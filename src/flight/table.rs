@@ -13,9 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// CSV among the formats.
 pub(super) const CSV: Format = Format {
-    kind: "a CSV file",
     place: Place::File("csv"),
-    description: None,
     reader: Reader::Of(|log, schema, cuts| {
         assemble(read_csv(&log.path, &|name| schema.wants(name))?, &log.name, &log.manoeuvre, schema, cuts)
     }),

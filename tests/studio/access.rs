@@ -105,7 +105,7 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         println!("skipped axe-core: npm could not fetch {AXE}");
     }
     let place = folder()?;
-    let running = Running::start(studio(None)?)?;
+    let running = Running::new(studio(None)?)?;
     let settled = "!document.body.classList.contains('busy')";
     let mut found = Vec::new();
     for (view, ready) in [
