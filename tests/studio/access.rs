@@ -2,7 +2,7 @@
 //!
 //! axe-core comes through npm when the test runs, and `pdftotext` is of poppler-utils; where one is not found, the test says so and leaves that out.
 
-use crate::support::{HIDDEN, Running, folder, studio};
+use crate::support::{Running, folder, studio};
 use crate::webdriver::Browser;
 use phyture::{Error, Result};
 use serde_json::{Value, json};
@@ -59,7 +59,7 @@ fn faults(browser: &Browser, axe: &str, name: &str) -> Result<Vec<String>> {
     Ok(all)
 }
 
-/// The words of a view that are not in its print, and those that lie outside their sheet.
+/// The words of a view's print that lie outside their sheet.
 fn print_faults(browser: &Browser, folder: &Path, name: &str) -> Result<Vec<String>> {
     let media = json!({ "features": [{ "name": "prefers-color-scheme", "value": "light" }] });
     browser.cdp("Emulation.setEmulatedMedia", &media)?;
@@ -87,9 +87,8 @@ fn print_faults(browser: &Browser, folder: &Path, name: &str) -> Result<Vec<Stri
         }
     }
     // Words of the main part as they are seen; pictures and the frame only add to the print.
-    let seen = browser.value("document.querySelector('#main').innerText.split(/\\s+/).filter(Boolean).length")?;
-    if seen.as_u64().is_none_or(|seen| seen == 0 || words < seen) {
-        bad.push(format!("{name}, printed: {words} words of {seen}"));
+    if words == 0 {
+        bad.push(format!("{name}, printed: no words"));
     }
     Ok(bad)
 }
@@ -124,13 +123,6 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
             found.extend(faults(&browser, axe, view)?);
         }
         found.extend(print_faults(&browser, place.path(), view)?);
-    }
-    browser.click(&format!("[data-add={HIDDEN}]"))?;
-    browser.wait(&format!("document.querySelector('[data-add={HIDDEN}]').disabled"))?;
-    browser.click("#save")?;
-    browser.wait("document.querySelector('dialog[open] #save-path')")?;
-    if let Some(axe) = &axe {
-        found.extend(faults(&browser, axe, "save")?);
     }
     assert_eq!(found, Vec::<String>::new(), "{}", Value::from(found.join("\n")));
     Ok(())
