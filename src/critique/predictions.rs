@@ -9,7 +9,7 @@ use crate::flight::{Channel, Flight, PerChannel, Window};
 pub struct Row {
     /// Name of the model.
     pub name: String,
-    /// Predicted accelerations in the order of [`Column::TARGETS`], one entry a window, in the order of the windows.
+    /// Predicted accelerations in the order of [`Channel::ALL`](crate::flight::Channel::ALL), one entry a window, in the order of the windows.
     pub predicted: Vec<PerChannel<f64>>,
 }
 

@@ -13,7 +13,7 @@ use std::collections::HashMap;
 /// A column by which a number of a model acts on one acceleration, or what acts whatever the numbers are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regressor {
-    /// Index into [`Column::TARGETS`].
+    /// The acceleration it belongs to.
     pub channel: Channel,
     /// Index of the effect in the model.
     pub effect: usize,

@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, HashMap};
 /// One summand of a predicted acceleration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Summand {
-    /// Index into [`Column::TARGETS`].
+    /// The acceleration it adds to.
     pub channel: Channel,
     /// Index of the effect that brings it.
     pub effect: usize,

@@ -20,7 +20,7 @@ pub enum Condition {
     ControlNoise,
 }
 
-/// One ten-second segment of a test flight. Channels are in the order of [`Column::TARGETS`], m/s² and rad/s².
+/// One ten-second segment of a test flight. Channels are in the order of [`Channel::ALL`](crate::flight::Channel::ALL), m/s² and rad/s².
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Flight.
