@@ -117,15 +117,6 @@ impl<T> PerChannel<T> {
         Self(Channel::ALL.map(of))
     }
 
-    /// As [`PerChannel::from_fn`], up to the first error.
-    ///
-    /// # Errors
-    /// Those of `of`.
-    pub fn try_from_fn<E>(of: impl FnMut(Channel) -> Result<T, E>) -> Result<Self, E> {
-        let [x, y, z, p, q, r] = Channel::ALL.map(of);
-        Ok(Self([x?, y?, z?, p?, q?, r?]))
-    }
-
     /// Each value changed.
     pub fn map<U>(self, change: impl FnMut(T) -> U) -> PerChannel<U> {
         PerChannel(self.0.map(change))
@@ -154,11 +145,6 @@ impl<T> PerChannel<T> {
     /// The values as an array.
     pub const fn values(&self) -> &[T; Channel::COUNT] {
         &self.0
-    }
-
-    /// The values as an array, to be changed.
-    pub const fn values_mut(&mut self) -> &mut [T; Channel::COUNT] {
-        &mut self.0
     }
 
     /// The values as an array.

@@ -233,16 +233,21 @@ impl Studio {
     pub(super) fn keep(&self) {
         self.revision.fetch_add(1, Ordering::Relaxed);
         let mut drafts = held(&self.drafts);
-        let draft = self.draft(&drafts);
-        drafts.put(draft.as_ref());
+        match self.draft(&drafts) {
+            Ok(draft) => drafts.put(draft.as_ref()),
+            Err(error) => drafts.fault = Some(error.to_string()),
+        }
     }
 
     /// The history as it is written; nothing where all of it is saved.
-    fn draft(&self, drafts: &Drafts) -> Option<Draft> {
+    ///
+    /// # Errors
+    /// As [`Model::to_toml`].
+    fn draft(&self, drafts: &Drafts) -> Result<Option<Draft>> {
         let (states, at, unsaved) = held(&self.history).unsaved();
         let heard = self.heard().filter(|heard| drafts.saved.is_none_or(|saved| heard.ended > saved));
         if !unsaved && heard.is_none() {
-            return None;
+            return Ok(None);
         }
         let mut searches: Vec<Arc<Diagnosis>> = Vec::new();
         let mut place = |found: &Arc<Diagnosis>| {
@@ -253,19 +258,20 @@ impl Studio {
         };
         let mut steps = Vec::with_capacity(states.len());
         for state in &states {
-            // A model that is no TOML was never read from any, and there is none.
-            let model = state.model.to_toml().ok()?;
+            let model = state.model.to_toml()?;
             let found = state.found.as_ref().map(&mut place);
             steps.push(DraftStep { did: state.did.clone(), model, calibration: state.calibration.clone(), found });
         }
-        let search = heard.and_then(|heard| {
-            let step = states.iter().position(|state| state.id == heard.state.id)?;
-            let model = heard.model.to_toml().ok()?;
-            Some(DraftSearch { step, found: place(&heard.diagnosis), model, seconds: heard.seconds })
+        // A search of a step that was replaced since goes with it.
+        let searched = heard.and_then(|heard| Some((states.iter().position(|state| state.id == heard.state.id)?, heard)));
+        let search = searched.map(|(step, heard)| {
+            let (found, model) = (place(&heard.diagnosis), heard.model.to_toml()?);
+            Ok::<_, Error>(DraftSearch { step, found, model, seconds: heard.seconds })
         });
+        let search = search.transpose()?;
         let searches = searches.iter().map(|found| Diagnosis::clone(found)).collect();
         let (version, data_sha256) = (env!("CARGO_PKG_VERSION").into(), self.set.source.sha256.clone());
-        Some(Draft { format: FORMAT, version, data_sha256, at, steps, searches, search })
+        Ok(Some(Draft { format: FORMAT, version, data_sha256, at, steps, searches, search }))
     }
 
     /// Takes up the steps that an earlier studio left unsaved, as steps after the present one.
