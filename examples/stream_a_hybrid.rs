@@ -9,7 +9,7 @@
 //!
 //! It needs none of the features: what runs on board reads no logs. Here the built-in helicopter stands in for the aircraft.
 
-use phyture::flight::Column;
+use phyture::flight::{Channel, Column, PerChannel};
 use phyture::hybrid::Hybrid;
 use phyture::sim::{Simulation, simulate};
 use phyture::{Error, Result};
@@ -32,23 +32,23 @@ fn main() -> Result<()> {
     // Samples have to come one training step apart; the simulator logs at 100 Hz.
     let set = simulate(&Simulation { minutes: 0.5, seed: 8, ..Simulation::default() })?;
     let mut stream = hybrid.stream()?;
-    let mut squares = [0.0; 6];
+    let mut squares = PerChannel::splat(0.0);
     let mut predictions = 0_u32;
     let flight = &set.flights[0];
     for sample in 0..flight.len() {
         // Position, Euler angles, velocity, rates, controls, in SI units and radians: what the aircraft knows at this moment.
-        let state: [f64; 16] = std::array::from_fn(|channel| flight.column(Column::STATE[channel])[sample]);
+        let state: [f64; 16] = std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]);
         // `None` until the history is full.
         let Some(predicted) = stream.push(&state)? else { continue };
         predictions += 1;
-        for (channel, target) in Column::TARGETS.into_iter().enumerate() {
-            squares[channel] += (predicted[channel] - flight.column(target)[sample]).powi(2);
+        for channel in Channel::ALL {
+            squares[channel] += (predicted[channel] - flight.column(channel.column())[sample]).powi(2);
         }
     }
 
     println!("root mean square error of {predictions} predictions");
-    for (target, square) in Column::TARGETS.into_iter().zip(squares) {
-        println!("  {:<7} {:.3} {}", target.name(), (square / f64::from(predictions.max(1))).sqrt(), target.unit());
+    for (channel, square) in squares.pairs() {
+        println!("  {channel:<7} {:.3} {}", (square / f64::from(predictions.max(1))).sqrt(), channel.unit());
     }
     Ok(())
 }

@@ -6,7 +6,7 @@ mod program;
 
 use phyture::critique::diagnose::{Options, Status, diagnose};
 use phyture::flight::split::Split;
-use phyture::flight::{DataSet, Targets};
+use phyture::flight::{Channel, DataSet, Targets};
 use phyture::physics::{Effect, Model, SignFinding, implant};
 use phyture::sim::{INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::{Error, Result};
@@ -322,7 +322,7 @@ fn an_effect_with_the_wrong_sign_is_not_named() -> Result<()> {
         diagnose(&set.flights, &model, &split.training, &split.test, "test", &Options::default())
     };
     for (size, named) in [(0.04, true), (-0.04, false)] {
-        let changed = implant(&set, &model, &Effect::formula("fin", 5, "airspeed * vy", size)?)?;
+        let changed = implant(&set, &model, &Effect::formula("fin", Channel::WzDot, "airspeed * vy", size)?)?;
         assert!(changed.flights.iter().all(|flight| flight.targets == Targets::Recorded));
         let found = search(&changed)?.diagnosis;
         assert_eq!(found.accepted.iter().any(|effect| effect == "weathercock"), named, "{size}: {found:#}");

@@ -1,5 +1,5 @@
 //! PX4 and ArduPilot logs as they are: what `fixtures/logs/generate.py` wrote from a simulated flight is read back.
-#![cfg(all(feature = "ulog", feature = "dataflash"))]
+#![cfg(feature = "files")]
 
 mod support;
 

@@ -3,7 +3,7 @@
 mod flights;
 
 use flights::{Normal, STEP_S, message, random, with_targets};
-use phyture::flight::{Column, Flight, Span, Targets};
+use phyture::flight::{Channel, Column, Flight, Span, Targets};
 use phyture::physics::{Effect, Model, Parameter, Term, calibrate};
 use phyture::{Error, Result};
 use phyture_kernels::Tolerance;
@@ -46,11 +46,11 @@ proptest! {
     fn exact_data_give_back_the_coefficients(seed in 0u64..1_000_000, delay_s in 0.0..0.05f64) {
         let mut truth = paper();
         truth.data.control_delay_s = delay_s;
-        truth.effects.push(Effect::formula("drag", 0, "vx * airspeed", 0.0)?);
-        truth.effects.push(Effect::formula("lagged", 4, "lag(vx, 0.2)", 0.0)?);
+        truth.effects.push(Effect::formula("drag", Channel::VxDot, "vx * airspeed", 0.0)?);
+        truth.effects.push(Effect::formula("lagged", Channel::WyDot, "lag(vx, 0.2)", 0.0)?);
         // One coefficient shared by two channels.
-        let mut shared = Effect::formula("shared", 1, "vx", 0.0)?;
-        let twin = Term { channel: 2, coefficient: shared.terms[0].coefficient.clone(), regressor: "-vy".parse()? };
+        let mut shared = Effect::formula("shared", Channel::VyDot, "vx", 0.0)?;
+        let twin = Term { channel: Channel::VzDot, coefficient: shared.terms[0].coefficient.clone(), regressor: "-vy".parse()? };
         shared.terms.push(twin);
         truth.effects.push(shared);
         let truth = randomised(truth, seed);
@@ -71,8 +71,7 @@ proptest! {
         let truth = randomised(paper(), 5);
         let flight = flown_by(&truth, 5, 2000)?;
         let mut normal = Normal::new(6);
-        let noisy: Vec<Vec<f64>> = Column::TARGETS.iter().map(|target| flight.column(*target).iter().map(|value| value + normal.next()).collect()).collect();
-        let targets: [Vec<f64>; 6] = noisy.try_into().map_err(|_| TestCaseError::fail("six channels"))?;
+        let targets = flight.accelerations().map(|values| values.iter().map(|value| value + normal.next()).collect::<Vec<f64>>());
         let flights = [with_targets(&flight, &targets)?];
         let (_, once) = calibrate(&paper(), &flights, &whole(&flights))?;
         let pieces = [Span { flight: 0, start: cut - overlap, end: 2000 }, Span { flight: 0, start: 0, end: cut }];
@@ -86,9 +85,9 @@ fn only_the_spans_count() -> Result<()> {
     let truth = randomised(paper(), 9);
     let flight = flown_by(&truth, 9, 3000)?;
     // Spoil everything outside [1000, 2000).
-    let targets: [Vec<f64>; 6] = Column::TARGETS.map(|target| {
-        flight.column(target).iter().enumerate().map(|(k, value)| if (1000..2000).contains(&k) { *value } else { 1e3 }).collect()
-    });
+    let targets = flight
+        .accelerations()
+        .map(|values| values.iter().enumerate().map(|(k, value)| if (1000..2000).contains(&k) { *value } else { 1e3 }).collect());
     let flights = [with_targets(&flight, &targets)?];
     let (found, calibration) = calibrate(&paper(), &flights, &[Span { flight: 0, start: 1000, end: 2000 }])?;
     assert_eq!(calibration.rows, 1000);
@@ -114,7 +113,7 @@ fn disturbed(seed: u64, samples: usize, correlation_s: f64) -> Result<Flight> {
 fn vertical() -> Result<Model> {
     let mut model = Model { effects: Vec::new(), ..paper() };
     for (name, formula) in [("heave", "vz"), ("thrust", "u4"), ("bias", "1")] {
-        model.effects.push(Effect::formula(name, 2, formula, 0.0)?);
+        model.effects.push(Effect::formula(name, Channel::VzDot, formula, 0.0)?);
     }
     Ok(model)
 }
@@ -164,7 +163,7 @@ fn lagged(seed: u64, samples: usize, tau_s: f64, correlation_s: f64) -> Result<F
             .parse::<phyture::formula::Formula>()?
             .evaluate(samples, STEP_S, &|name| (name == "u4").then(|| stick.into()))?;
     let mut targets = flight.accelerations();
-    targets[2].iter_mut().zip(late).for_each(|(target, late)| *target += late);
+    targets[Channel::VzDot].iter_mut().zip(late).for_each(|(target, late)| *target += late);
     with_targets(&flight, &targets)
 }
 
@@ -216,7 +215,7 @@ fn undetermined_coefficients_are_named_with_the_reason() -> Result<()> {
 
     let flights = [random(4, 2000)?];
     let mut model = paper();
-    model.effects.push(Effect::formula("again", 0, "3 * vx", 0.0)?);
+    model.effects.push(Effect::formula("again", Channel::VxDot, "3 * vx", 0.0)?);
     let text = message(calibrate(&model, &flights, &whole(&flights)))?;
     for part in ["`a_x` of effect `linear_drag` and `coefficient` of effect `again`", "`air_vx` and `3 * vx`", "linearly dependent"]
     {
@@ -234,7 +233,7 @@ fn undetermined_coefficients_are_named_with_the_reason() -> Result<()> {
     assert!(text.contains("2 rows cannot determine 3 coefficients") || text.contains("rows cannot determine 1"), "{text}");
     assert!(message(calibrate(&paper(), &flights, &[]))?.contains("spans are empty"));
     assert!(message(calibrate(&paper(), &flights, &[Span { flight: 3, start: 0, end: 1 }]))?.contains("an index of the 1 flights"));
-    model.effects.push(Effect::formula("infinite", 0, "1 / (u1 - u1)", 0.0)?);
+    model.effects.push(Effect::formula("infinite", Channel::VxDot, "1 / (u1 - u1)", 0.0)?);
     assert!(message(calibrate(&model, &flights, &whole(&flights)))?.contains("effect `infinite` is not a finite number"));
     Ok(())
 }

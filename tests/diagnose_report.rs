@@ -4,7 +4,7 @@
 //! The page is left in `target/tmp/diagnose.html`, to be looked at.
 #![cfg(feature = "report")]
 
-use phyture::critique::PerChannel;
+use phyture::critique::ChannelValues;
 use phyture::critique::diagnose::{
     Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Kept, Locked, Method, Number, Status, Step, TriedFormula,
     UnknownChannel, Verdict, Worth,
@@ -62,7 +62,7 @@ fn candidate(effect: &str, status: Status, fall: f64) -> CandidateReport {
 }
 
 fn found() -> Diagnosis {
-    let rmse = |value: f64| PerChannel::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)]);
+    let rmse = |value: f64| ChannelValues::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)].into());
     Diagnosis {
         accepted: vec!["ground_effect".into()],
         steps: vec![Step {
@@ -299,7 +299,7 @@ fn diagnoses_that_found_nothing_have_pages_too() -> Result<()> {
 }
 
 /// Bars that add one effect after the other.
-fn bars(effects: &[&str], errors: &[PerChannel]) -> Vec<Bar> {
+fn bars(effects: &[&str], errors: &[ChannelValues]) -> Vec<Bar> {
     let added = [Vec::new()].into_iter().chain(effects.iter().map(|effect| vec![(*effect).to_owned()]));
     added.zip(errors).map(|(added, &rmse)| Bar { added, rmse, ..Bar::default() }).collect()
 }
@@ -308,7 +308,7 @@ fn bars(effects: &[&str], errors: &[PerChannel]) -> Vec<Bar> {
 #[test]
 fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> {
     let [before, after] = models();
-    let rmse = |value: f64| PerChannel::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)]);
+    let rmse = |value: f64| ChannelValues::new([Some(0.3), Some(0.3), Some(value), Some(0.3), Some(0.3), Some(0.3)].into());
     let of = |effect: &str, errors: [f64; 2]| {
         let mut round = found();
         round.accepted = vec![effect.into()];
@@ -334,7 +334,7 @@ fn the_rounds_of_a_loop_are_one_list_with_the_floor_as_last_bar() -> Result<()> 
         waterfall: bars(&["ground_effect", "wind"], &[0.8764, 0.6543, 0.4321].map(rmse)),
         ..Locked::default()
     };
-    locked.set_floor(PerChannel::new([0.29, 0.29, 0.2357, 0.29, 0.29, 0.29].map(Some)));
+    locked.set_floor(ChannelValues::new([0.29, 0.29, 0.2357, 0.29, 0.29, 0.29].map(Some).into()));
     let together = Diagnosis {
         accepted: vec!["ground_effect".into(), "wind".into()],
         steps: rounds.iter().flat_map(|round| round.steps.clone()).collect(),

@@ -2,7 +2,7 @@
 //!
 //! Simulated flights are written in other names, units, axes and orders, and read back as `init` says; the recorded ones are compared with the
 //! descriptions that were written for them by hand.
-#![cfg(all(feature = "files", feature = "sim", feature = "ulog", feature = "dataflash"))]
+#![cfg(all(feature = "files", feature = "sim"))]
 
 mod support;
 

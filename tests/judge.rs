@@ -2,11 +2,11 @@
 //! coefficients of its model. The networks are small and untrained: what is tested holds for any weights.
 #![cfg(feature = "sim")]
 
-use phyture::critique::PerChannel;
+use phyture::critique::ChannelValues;
 use phyture::critique::uncertainty::{Effort, Uncertainty, uncertainty};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{Column, DataSet, Flight, Span, Window};
+use phyture::flight::{Channel, Column, DataSet, Flight, PerChannel, Span, Window};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::sensitivity::{HALF_WIDTH, half_width};
 use phyture::hybrid::{Description, Hybrid, network_target, sequence};
@@ -52,7 +52,7 @@ impl Case {
             config,
             inputs,
             linear: Some(linear),
-            gate: [1.0, 0.5, 1.0, 0.0, 1.0, 0.75],
+            gate: [1.0, 0.5, 1.0, 0.0, 1.0, 0.75].into(),
             step_s: 0.01,
         };
         let parameters = description.network(false)?.initial(11);
@@ -64,7 +64,7 @@ impl Case {
         Hybrid::new(Description { model: model.clone(), ..self.description.clone() }, self.parameters.clone())
     }
 
-    fn predict(&self, model: &Model) -> Result<Vec<[f64; 6]>> {
+    fn predict(&self, model: &Model) -> Result<Vec<PerChannel<f64>>> {
         self.hybrid(model)?.predict(&self.set.flights, &self.windows, Threads(2))
     }
 
@@ -91,10 +91,13 @@ fn stages_end_in_the_prediction_and_a_shut_gate_leaves_the_linear_history() -> R
         assert_eq!(stages.with_linear.is_some(), variant.predicts_residual());
         if let (Some(window), Some(physics)) = (case.windows.last(), stages.physics.last()) {
             let expected = case.description.model.predict(&case.set.flights[window.flight])?;
-            assert!((0..6).all(|channel| physics[channel].to_bits() == expected[channel][window.last].to_bits()));
+            assert!(Channel::ALL.into_iter().all(|channel| physics[channel].to_bits() == expected[channel][window.last].to_bits()));
         }
         for (linear, hybrid) in stages.with_linear.iter().flatten().zip(&stages.hybrid) {
-            assert!(linear[3].to_bits() == hybrid[3].to_bits() && linear[0].to_bits() != hybrid[0].to_bits());
+            assert!(
+                linear[Channel::WxDot].to_bits() == hybrid[Channel::WxDot].to_bits()
+                    && linear[Channel::VxDot].to_bits() != hybrid[Channel::VxDot].to_bits()
+            );
         }
     }
     Ok(())
@@ -114,10 +117,13 @@ fn reverse_mode_is_the_central_difference_of_the_prediction() -> Result<()> {
             let step = 0.1;
             let at = |sign: f64| case.predict(&case.moved(estimate, sign * step * half_width(estimate)));
             let (up, down) = (at(1.0)?, at(-1.0)?);
-            let differences: Vec<[f64; 6]> =
-                up.iter().zip(&down).map(|(up, down)| std::array::from_fn(|c| (up[c] - down[c]) / (2.0 * step))).collect();
+            let differences: Vec<PerChannel<f64>> =
+                up.iter().zip(&down).map(|(up, down)| PerChannel::from_fn(|c| (up[c] - down[c]) / (2.0 * step))).collect();
             let error = largest(
-                differences.iter().zip(found).flat_map(|(expected, found)| (0..6).map(move |c| expected[c] - found.hybrid[c])),
+                differences
+                    .iter()
+                    .zip(found)
+                    .flat_map(|(expected, found)| Channel::ALL.into_iter().map(move |c| expected[c] - found.hybrid[c])),
             );
             let scale = largest(differences.iter().flatten().copied());
             assert!(
@@ -126,7 +132,8 @@ fn reverse_mode_is_the_central_difference_of_the_prediction() -> Result<()> {
                 estimate.effect,
                 estimate.name
             );
-            let learned = found.iter().flat_map(|movement| (0..6).map(|c| movement.hybrid[c] - movement.physics[c]));
+            let learned =
+                found.iter().flat_map(|movement| Channel::ALL.into_iter().map(|c| movement.hybrid[c] - movement.physics[c]));
             through_network = through_network.max(largest(learned) / scale.max(f64::MIN_POSITIVE));
         }
         // Where the network reads physics, a good part of the movement goes through it: the test tests something.
@@ -146,7 +153,7 @@ fn drawing_coefficients_anew_agrees_with_reverse_mode_where_the_network_is_nearl
     let movements = hybrid.movements(flights, windows, &estimates, Threads(2))?;
     let correlations = hybrid.correlations(&estimates);
     let resampled = hybrid.resampled(flights, windows, &estimates, DRAWS, 5, Threads(2))?;
-    for channel in 0..6 {
+    for channel in Channel::ALL {
         let count = windows.len() as f64;
         let square = |window: usize| {
             let moved = |one: usize| movements[one][window].hybrid[channel];
@@ -179,7 +186,7 @@ fn the_uncertainty_of_a_network_is_a_table_with_totals() -> Result<()> {
     let found = uncertainty("run", &hybrid, &case.set.flights, &case.windows, effort, Threads(2))?;
     assert_eq!((found.windows, found.draws, found.coefficients.len()), (10.min(case.windows.len()), 4, 11));
     assert_eq!(found.without_interval, ["moment_bias.d_x", "moment_bias.d_y", "moment_bias.d_z"]);
-    for channel in 0..6 {
+    for channel in Channel::ALL {
         let squares = found.coefficients.iter().filter_map(|one| one.movement.channels()[channel]).map(|value| value * value);
         let total = squares.sum::<f64>().sqrt() / HALF_WIDTH;
         let close = |value: f64| (value - total).abs() <= Tolerance::Close.relative_f64() * total;
@@ -217,7 +224,7 @@ fn totals_are_of_coefficients_that_vary_together() -> Result<()> {
     };
     let [against, apart, along] = [of(Some(-1.0))?, of(None)?, of(Some(1.0))?];
     assert!(against.note().contains("together") && apart.note().contains("independent"));
-    let value = |of: PerChannel| of.vz_dot.unwrap_or(f64::NAN);
+    let value = |of: ChannelValues| of.vz_dot.unwrap_or(f64::NAN);
     for pick in [|found: &Uncertainty| found.sd, |found: &Uncertainty| found.sd_of_physics] {
         let [against, apart, along] = [&against, &apart, &along].map(|found| value(pick(found)));
         let halves = (against.powi(2) + along.powi(2)) / 2.0;
@@ -266,8 +273,8 @@ fn what_the_network_learned_is_left_over_by_the_model() -> Result<()> {
                 let model = case.description.model.predict(made)?;
                 for (row, &last) in lasts.iter().enumerate() {
                     assert_eq!(made.column(Column::U2)[row].to_bits(), original.column(Column::U2)[last].to_bits());
-                    for channel in 0..6 {
-                        let left = made.column(Column::TARGETS[channel])[row] - model[channel][row];
+                    for channel in Channel::ALL {
+                        let left = made.column(channel.column())[row] - model[channel][row];
                         let learned = said[row][channel] - physics[channel][last];
                         assert!((left - learned).abs() <= Tolerance::Close.relative_f64() * (1.0 + learned.abs()), "{channel}");
                     }

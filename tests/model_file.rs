@@ -1,6 +1,7 @@
 //! The model file: what it means, that it reads back as written, and how it refuses.
 #![cfg(feature = "files")]
 
+use phyture::flight::Channel;
 use phyture::physics::{Assumed, Correlation, Effect, Entry, Model, Parameter};
 use phyture::{Error, Result};
 use proptest::prelude::*;
@@ -154,7 +155,7 @@ fn faults_are_refused_with_line_found_and_expected() -> Result<()> {
 #[test]
 fn what_a_file_cannot_hold_is_not_written() -> Result<()> {
     let mut model = Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8);
-    let mut two = Effect::formula("two", 0, "vx", 1.0)?;
+    let mut two = Effect::formula("two", Channel::VxDot, "vx", 1.0)?;
     two.terms.push(two.terms[0].clone());
     model.effects.push(two);
     let text = message(model.to_toml())?;
@@ -205,7 +206,7 @@ proptest! {
         mass_kg in 1e-3..1e3f64,
     ) {
         let mut model = Model::paper(name.clone(), mass_kg, [0.1, 0.2, 0.8 / 3.0], 0.8);
-        let mut own = Effect::formula(format!("own {name}"), 5, "lag(vx, tau_s)^2 - -3e-7 * vy", -0.1)?;
+        let mut own = Effect::formula(format!("own {name}"), Channel::WzDot, "lag(vx, tau_s)^2 - -3e-7 * vy", -0.1)?;
         own.parameters.push(Parameter { name: "tau_s".into(), value: half_width, unit: String::new(), fixed: true, ci95: None });
         own.added_by = Some(name);
         model.effects.push(own);

@@ -3,8 +3,8 @@
 
 mod program;
 
-use phyture::flight::Column;
 use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::{Channel, Column};
 use phyture::physics::Model;
 use phyture::{Error, Result};
 use program::{folder, phyture, refused, succeed};
@@ -105,7 +105,7 @@ fn a_model_alone_predicts_and_files_are_told_by_their_ending() -> Result<()> {
             let flight = set.flights.iter().find(|known| known.name == cells[name]);
             let flight = flight.ok_or_else(|| Error::Undetermined(format!("no flight {}", cells[name])))?;
             let sample = ((number(time) - flight.start_s) / flight.step_s).round() as usize;
-            assert_eq!(number(predicted).to_bits(), model.predict(flight)?[2][sample].to_bits(), "{line}");
+            assert_eq!(number(predicted).to_bits(), model.predict(flight)?[Channel::VzDot][sample].to_bits(), "{line}");
             assert_eq!(number(column("vz_dot")).to_bits(), flight.column(Column::VzDot)[sample].to_bits());
         }
         rows += 1;

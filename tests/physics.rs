@@ -4,7 +4,7 @@ mod flights;
 
 use flights::{STEP_S, message, random};
 use phyture::flight::attitude::{cross, dot};
-use phyture::flight::{Column, Flight, GRAVITY_M_S2, Targets};
+use phyture::flight::{Channel, Column, Flight, GRAVITY_M_S2, PerChannel, Targets};
 use phyture::formula::Formula;
 use phyture::physics::{Effect, Model, Parameter, Swap};
 use phyture::{Error, Result};
@@ -24,7 +24,7 @@ fn set(model: &mut Model, effect: &str, name: &str, value: f64) -> Result<()> {
 }
 
 /// One sample of the given state (order of `Column::STATE`), predicted.
-fn at(model: &Model, state: [f64; 16]) -> Result<[f64; 6]> {
+fn at(model: &Model, state: [f64; 16]) -> Result<PerChannel<f64>> {
     let columns = std::array::from_fn(|column| vec![state.get(column).copied().unwrap_or(0.0)]);
     let predicted = model.predict(&Flight::new("one", "state", 0.0, STEP_S, columns, Targets::Recorded)?)?;
     Ok(predicted.map(|channel| channel[0]))
@@ -61,7 +61,7 @@ fn the_baseline_is_equations_14_and_15_by_hand() -> Result<()> {
     // Level, at rest, collective 0.5: gravity down, thrust -10, bias -0.5.
     let mut level = [0.0; 16];
     level[Column::U4 as usize] = 0.5;
-    assert_close(&at(&model, level)?, &[0.0, 0.0, GRAVITY_M_S2 - 10.5, -1.0, 0.5, 0.25]);
+    assert_close(at(&model, level)?.values(), &[0.0, 0.0, GRAVITY_M_S2 - 10.5, -1.0, 0.5, 0.25]);
 
     // Rolled 90 degrees to starboard: gravity along body y. v = (10, 2, -1), w = (1, 2, 3):
     // -w x v = -(2·(-1) - 3·2, 3·10 - 1·(-1), 1·2 - 2·10) = (8, -31, 18).
@@ -78,12 +78,12 @@ fn the_baseline_is_equations_14_and_15_by_hand() -> Result<()> {
         0.30 / 0.34 - 8.0 - 2.0 + 0.5,
         -0.32 / 0.28 - 9.0 + 9.0 + 0.25,
     ];
-    assert_close(&at(&model, rolled)?, &expected);
+    assert_close(at(&model, rolled)?.values(), &expected);
 
     // Nose straight up: gravity pulls towards the tail.
     let mut up = [0.0; 16];
     up[Column::Pitch as usize] = std::f64::consts::FRAC_PI_2;
-    assert_close(&at(&model, up)?, &[-GRAVITY_M_S2, 0.0, -0.5, -1.0, 0.5, 0.25]);
+    assert_close(at(&model, up)?.values(), &[-GRAVITY_M_S2, 0.0, -0.5, -1.0, 0.5, 0.25]);
     Ok(())
 }
 
@@ -101,16 +101,16 @@ proptest! {
         let scale = 1e2 * Tolerance::Close.relative_f64();
         let coriolis = alone("coriolis")?;
         // Perpendicular to both v and w, and -w x v itself.
-        prop_assert!(dot([coriolis[0], coriolis[1], coriolis[2]], v).abs() < scale);
-        prop_assert!(dot([coriolis[0], coriolis[1], coriolis[2]], w).abs() < scale);
-        assert_close(&coriolis[..3], &cross(w, v).map(|part| -part));
+        prop_assert!(dot([coriolis[Channel::VxDot], coriolis[Channel::VyDot], coriolis[Channel::VzDot]], v).abs() < scale);
+        prop_assert!(dot([coriolis[Channel::VxDot], coriolis[Channel::VyDot], coriolis[Channel::VzDot]], w).abs() < scale);
+        assert_close(&coriolis.values()[..3], &cross(w, v).map(|part| -part));
         // The gyroscopic moment changes neither the energy w·Iw nor the angular momentum |Iw|².
         let gyroscopic = alone("gyroscopic")?;
-        let energy: f64 = (0..3).map(|axis| INERTIA[axis] * w[axis] * gyroscopic[3 + axis]).sum();
-        let momentum: f64 = (0..3).map(|axis| INERTIA[axis].powi(2) * w[axis] * gyroscopic[3 + axis]).sum();
+        let energy: f64 = (0..3).map(|axis| INERTIA[axis] * w[axis] * gyroscopic.values()[3 + axis]).sum();
+        let momentum: f64 = (0..3).map(|axis| INERTIA[axis].powi(2) * w[axis] * gyroscopic.values()[3 + axis]).sum();
         prop_assert!(energy.abs() < scale && momentum.abs() < scale);
         let gravity = alone("gravity")?;
-        assert_close(&[dot([gravity[0], gravity[1], gravity[2]], [gravity[0], gravity[1], gravity[2]]).sqrt()], &[GRAVITY_M_S2]);
+        assert_close(&[dot([gravity[Channel::VxDot], gravity[Channel::VyDot], gravity[Channel::VzDot]], [gravity[Channel::VxDot], gravity[Channel::VyDot], gravity[Channel::VzDot]]).sqrt()], &[GRAVITY_M_S2]);
     }
 }
 
@@ -123,16 +123,16 @@ fn with_memory() -> Result<Model> {
         }
     }
     model.data.control_delay_s = 0.005;
-    let mut blowback = Effect::formula("blowback", 3, "lag(vy, tau_s) * hypot(vx, vy) + rate(wx)", 0.02)?;
+    let mut blowback = Effect::formula("blowback", Channel::WxDot, "lag(vy, tau_s) * hypot(vx, vy) + rate(wx)", 0.02)?;
     blowback.parameters.push(Parameter { name: "tau_s".into(), value: 0.07, unit: "s".into(), fixed: true, ci95: None });
     model.effects.push(blowback);
     model.effects.push(Effect::formula(
         "wake",
-        2,
+        Channel::VzDot,
         "battery * exp(-height / rotor_radius_m) + 0.01 * t + sin(beta) - cos(alpha)",
         -0.4,
     )?);
-    let mut servo = Effect::formula("servo", 0, "airspeed", 0.0)?;
+    let mut servo = Effect::formula("servo", Channel::VxDot, "airspeed", 0.0)?;
     servo.parameters.push(Parameter { name: "tau_s".into(), value: 0.03, unit: "s".into(), fixed: false, ci95: None });
     servo.swaps.push(Swap { name: "u1".into(), with: Formula::parse("lag(u1, tau_s)")?, within: vec!["control_moment".into()] });
     model.effects.push(servo);
@@ -153,7 +153,7 @@ fn a_stream_gives_the_same_bits_as_a_flight() -> Result<()> {
         for sample in 0..flight.len() {
             let state: [f64; 16] = std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]);
             let found = stream.push_with(&state, &[flight.extra["battery"][sample]])?;
-            for (channel, values) in predicted.iter().enumerate() {
+            for (channel, values) in predicted.pairs() {
                 assert_eq!(found[channel].to_bits(), values[sample].to_bits(), "round {round}, sample {sample}, channel {channel}");
             }
         }
@@ -176,12 +176,12 @@ fn a_swap_and_the_control_delay_change_the_controls_the_terms_see() -> Result<()
     let flight = random(3, 400)?;
     let expected = Formula::parse("lag(delay(u1, 0.005), 0.03)")?
         .evaluate(flight.len(), STEP_S, &|name| (name == "u1").then(|| flight.column(Column::U1).into()))?;
-    assert_close(&swapped.predict(&flight)?[3], &expected);
-    assert_close(&bare.predict(&flight)?[3], flight.column(Column::U1));
+    assert_close(&swapped.predict(&flight)?[Channel::WxDot], &expected);
+    assert_close(&bare.predict(&flight)?[Channel::WxDot], flight.column(Column::U1));
     // A disabled effect swaps nothing.
     swapped.effects.iter_mut().filter(|effect| effect.name == "servo").for_each(|effect| effect.enabled = false);
     swapped.data.control_delay_s = 0.0;
-    assert_close(&swapped.predict(&flight)?[3], flight.column(Column::U1));
+    assert_close(&swapped.predict(&flight)?[Channel::WxDot], flight.column(Column::U1));
     Ok(())
 }
 
@@ -189,24 +189,24 @@ fn a_swap_and_the_control_delay_change_the_controls_the_terms_see() -> Result<()
 fn what_a_flight_does_not_carry_is_refused_by_name() -> Result<()> {
     let mut flight = random(1, 50)?;
     let mut model = paper();
-    model.effects.push(Effect::formula("wake", 2, "exp(-hieght)", 1.0)?);
+    model.effects.push(Effect::formula("wake", Channel::VzDot, "exp(-hieght)", 1.0)?);
     let text = message(model.predict(&flight))?;
     assert!(text.contains("effect `wake`: unknown name `hieght`; did you mean `height`?"), "{text}");
 
     model.effects.pop();
-    model.effects.push(Effect::formula("wake", 2, "1 / height", 1.0)?);
+    model.effects.push(Effect::formula("wake", Channel::VzDot, "1 / height", 1.0)?);
     assert!(model.predict(&flight).is_ok());
     flight.absent.push(Column::Z);
     let text = message(model.predict(&flight))?;
     assert!(text.contains("no column `z`") && text.contains("effect `wake` reads it"), "{text}");
 
     model.effects.pop();
-    model.effects.push(Effect::formula("log", 2, "log(vx - 1e6)", 0.0)?);
+    model.effects.push(Effect::formula("log", Channel::VzDot, "log(vx - 1e6)", 0.0)?);
     let text = message(model.predict(&flight))?;
     assert!(text.contains("effect `log` is not a finite number for `vz_dot` in flight `flight1` at t = 0.000 s"), "{text}");
 
     model.effects.pop();
-    model.effects.push(Effect::formula("cheat", 2, "2 * vz_dot", 0.0)?);
+    model.effects.push(Effect::formula("cheat", Channel::VzDot, "2 * vz_dot", 0.0)?);
     let text = message(model.predict(&flight))?;
     assert!(text.contains("effect `cheat`: an acceleration cannot be an input") && text.ends_with("2 * vz_dot\n      ^"), "{text}");
     Ok(())
@@ -216,11 +216,11 @@ fn what_a_flight_does_not_carry_is_refused_by_name() -> Result<()> {
 fn rmse_counts_the_rows_of_the_spans() -> Result<()> {
     let flight = random(1, 300)?;
     let model = Model { effects: Vec::new(), ..paper() };
-    let targets = std::array::from_fn(|channel| (0..300).map(|k| if k < 100 { 9.0 } else { channel as f64 }).collect());
+    let targets = PerChannel::from_fn(|channel| (0..300).map(|k| if k < 100 { 9.0 } else { channel.index() as f64 }).collect());
     let flight = flights::with_targets(&flight, &targets)?;
     let span = phyture::flight::Span { flight: 0, start: 100, end: 9999 };
     let flights = [flight];
-    assert_close(&model.rmse(&flights, &[span])?, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+    assert_close(model.rmse(&flights, &[span])?.values(), &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
     assert!(message(model.rmse(&flights, &[]))?.contains("spans are empty"));
     Ok(())
 }

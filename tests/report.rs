@@ -3,9 +3,9 @@
 //! The page is left in `target/tmp/compare.html`, to be looked at.
 #![cfg(feature = "report")]
 
-use phyture::critique::{Comparison, PerChannel, Row, compare};
+use phyture::critique::{ChannelValues, Comparison, Row, compare};
 use phyture::flight::split;
-use phyture::flight::{Column, Flight, Targets, Window};
+use phyture::flight::{Channel, Column, Flight, PerChannel, Targets, Window};
 use phyture::report::figures::LineData;
 use phyture::report::{CompareReport, Page, Part, Section, compare_page, page};
 use phyture::{Error, Result};
@@ -77,13 +77,13 @@ fn case(awkward_name: &str) -> Result<Case> {
             let flight = &flights[window.flight];
             let vx = flight.column(Column::Vx)[window.last];
             let above = -flight.column(Column::Z)[window.last];
-            std::array::from_fn(|channel| {
+            PerChannel::from_fn(|channel| {
                 let lacks = match channel {
-                    0 => 0.04 * vx * vx.abs(),
-                    2 => 1.5 / (1.0 + above * above),
+                    Channel::VxDot => 0.04 * vx * vx.abs(),
+                    Channel::VzDot => 1.5 / (1.0 + above * above),
                     _ => 0.0,
                 };
-                flight.column(Column::TARGETS[channel])[window.last] + missing * lacks + spread * next()
+                flight.column(channel.column())[window.last] + missing * lacks + spread * next()
             })
         };
         windows.iter().map(one).collect::<Vec<_>>()
@@ -298,7 +298,7 @@ fn a_known_floor_stands_below_the_rmse_in_table_and_picture() -> Result<()> {
     let mut case = case("turn_demos1")?;
     let without = html(&case, 0)?;
     assert!(!without.contains(">floor"));
-    case.comparison.floor = Some(PerChannel::new([0.1, 0.2, 0.3, 0.4, 0.5, 0.654_321].map(Some)));
+    case.comparison.floor = Some(ChannelValues::new([0.1, 0.2, 0.3, 0.4, 0.5, 0.654_321].map(Some).into()));
     let own = html(&case, 0)?;
     let table = own.find("RMSE, root mean square error").unwrap_or_default();
     let table = &own[table..table + own[table..].find("</table>").unwrap_or_default()];

@@ -7,7 +7,7 @@ mod program;
 use phyture::critique::rollout::{Quantity, Rollouts};
 use phyture::flight::attitude::quaternion_to_euler;
 use phyture::flight::split::{Protocol, Split};
-use phyture::flight::{Flight, Window};
+use phyture::flight::{Flight, PerChannel, Window};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::{Description, Hybrid, HybridRollout, sequence};
 use phyture::nn::{Architecture, PhyTureConfig};
@@ -47,7 +47,7 @@ fn hybrid(model: Model, flights: &[Flight], gate: f64, linear: bool) -> Result<H
         config,
         inputs,
         linear,
-        gate: [gate; 6],
+        gate: PerChannel::splat(gate),
         step_s: flights[0].step_s,
     };
     let parameters = description.network(false)?.initial(11);
@@ -95,7 +95,7 @@ fn a_hybrid_adds_at_each_step_what_its_batch_says_of_the_flight_so_far() -> Resu
                 let added = hybrid.predict(&so_far, &[at], Threads(1))?[0];
                 for axis in 0..3 {
                     let found = (path[step + 1].rates[axis] - path[step].rates[axis]) / flights[1].step_s;
-                    let expected = added[3 + axis];
+                    let expected = added.values()[3 + axis];
                     // The network works in f32, on inputs that went from quaternion to angles and back.
                     assert!((found - expected).abs() <= 1e-4 * expected.abs().max(1.0), "step {step}: {found} {expected}");
                 }

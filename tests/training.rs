@@ -4,7 +4,7 @@
 
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, Window};
+use phyture::flight::{Channel, DataSet, PerChannel, Window};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::{Description, Hybrid, sequence};
 use phyture::nn::PhyTureConfig;
@@ -68,7 +68,7 @@ fn job_of(set: DataSet, model: &Model, inputs: Vec<String>, linear: LinearConfig
         config: config.network.clone(),
         inputs: config.inputs.clone(),
         linear: Some(linear),
-        gate: [1.0; 6],
+        gate: PerChannel::splat(1.0),
         step_s: 0.01,
     };
     let [windows, validation] = [&split.training, &split.validation].map(|part| windows(part, 16, config.stride));
@@ -280,9 +280,9 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
     let broken: [fn(&mut Description); 6] = [
         |description| description.inputs.truncate(3),
         |description| description.scaling.state.truncate(3),
-        |description| description.scaling.physics[2].deviation = 0.0,
+        |description| description.scaling.physics[Channel::VzDot].deviation = 0.0,
         |description| description.config = PhyTureConfig { outputs: 5, ..PhyTureConfig::default() }.into(),
-        |description| description.gate[1] = f64::NAN,
+        |description| description.gate[Channel::VyDot] = f64::NAN,
         |description| description.step_s = 0.0,
     ];
     for breakage in broken {

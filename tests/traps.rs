@@ -5,7 +5,7 @@
 use phyture::critique::diagnose::{CandidateReport, Options, Outcome, Status, Verdict, diagnose};
 use phyture::flight::attitude::{rotate, rotation_body_to_inertial};
 use phyture::flight::split::Split;
-use phyture::flight::{Column, Flight};
+use phyture::flight::{Channel, Column, Flight};
 use phyture::physics::{Effect, Model};
 use phyture::sim::{COEFFICIENTS, INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Simulation, simulate};
 use phyture::{Error, Result};
@@ -102,9 +102,12 @@ fn lagging_outcome() -> Result<&'static Outcome> {
 fn held(flight: &Flight, late: usize) -> Result<Flight> {
     let mut accelerations = flight.accelerations();
     let c = COEFFICIENTS;
-    for (channel, column, power) in
-        [(2, Column::U4, c.c1_z), (3, Column::U1, c.c2[0]), (4, Column::U2, c.c2[1]), (5, Column::U3, c.c2[2])]
-    {
+    for (channel, column, power) in [
+        (Channel::VzDot, Column::U4, c.c1_z),
+        (Channel::WxDot, Column::U1, c.c2[0]),
+        (Channel::WyDot, Column::U2, c.c2[1]),
+        (Channel::WzDot, Column::U3, c.c2[2]),
+    ] {
         let stick = flight.column(column);
         for (sample, value) in accelerations[channel].iter_mut().enumerate() {
             let acted = stick[sample.saturating_sub(late)];
@@ -150,7 +153,7 @@ fn a_true_delay_of_held_controls_is_a_delay() -> Result<()> {
 #[test]
 fn a_lag_with_a_free_coefficient_fits_the_pilot_and_a_swap_does_not() -> Result<()> {
     let mut model = paper();
-    for (name, channel, stick) in [("free_roll_lag", 3, "u1"), ("free_pitch_lag", 4, "u2")] {
+    for (name, channel, stick) in [("free_roll_lag", Channel::WxDot, "u1"), ("free_pitch_lag", Channel::WyDot, "u2")] {
         let effect = Effect::formula(name, channel, &format!("lag({stick}, 0.05)"), 0.0)?;
         model.effects.push(Effect { enabled: false, ..effect });
     }
@@ -235,7 +238,9 @@ fn intervals_from_rows_would_be_too_narrow() -> Result<()> {
     for span in Split::for_search(flights, SEED).training {
         let flight = &flights[span.flight];
         let predicted = outcome.model.predict(flight)?;
-        for ((measured, predicted), vx) in flight.column(Column::VxDot).iter().zip(&predicted[0]).zip(flight.column(Column::Vx)) {
+        for ((measured, predicted), vx) in
+            flight.column(Column::VxDot).iter().zip(&predicted[Channel::VxDot]).zip(flight.column(Column::Vx))
+        {
             error += (measured - predicted).powi(2);
             energy += vx * vx;
             rows += 1.0;
@@ -255,10 +260,10 @@ fn in_one_flight(formula: &str, flight: usize, size: f64) -> Result<Outcome> {
     let mut accelerations = own.accelerations();
     let added = phyture::physics::evaluate(&phyture::formula::Formula::parse(formula)?, own)?;
     let third = own.len() / 3;
-    accelerations[0].iter_mut().zip(&added).take(third).for_each(|(value, added)| *value += size * added);
+    accelerations[Channel::VxDot].iter_mut().zip(&added).take(third).for_each(|(value, added)| *value += size * added);
     flights[flight] = own.with_accelerations(&accelerations)?;
     let mut model = paper();
-    model.effects.push(Effect { enabled: false, ..Effect::formula("fluke", 0, formula, 0.0)? });
+    model.effects.push(Effect { enabled: false, ..Effect::formula("fluke", Channel::VxDot, formula, 0.0)? });
     search(&flights, &model)
 }
 
@@ -314,7 +319,7 @@ fn winds(seed: u64, minutes: f64) -> Result<Vec<(String, [f64; 2])>> {
             let at = |column: Column| flight.column(column)[sample];
             let air: [f64; 3] = std::array::from_fn(|axis| {
                 let target = [Column::VxDot, Column::VyDot, Column::VzDot][axis];
-                -(at(target) - predicted[axis][sample]) / COEFFICIENTS.a[axis]
+                -(at(target) - predicted.values()[axis][sample]) / COEFFICIENTS.a[axis]
             });
             let rotation = rotation_body_to_inertial(at(Column::Roll), at(Column::Pitch), at(Column::Yaw));
             sum.iter_mut().zip(rotate(&rotation, air)).for_each(|(sum, value)| *sum += value / flight.len() as f64);

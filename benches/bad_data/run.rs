@@ -234,7 +234,7 @@ fn search(line: &mut Line, set: &DataSet) {
             line.verdict = diagnosis.verdict.words().into();
             line.accepted = diagnosis.accepted;
             line.notes.extend(diagnosis.notes);
-            line.rmse = diagnosis.locked.map_or_else(Vec::new, |locked| locked.rmse_after.channels().to_vec());
+            line.rmse = diagnosis.locked.map_or_else(Vec::new, |locked| locked.rmse_after.channels().values().to_vec());
         }
         Err(error) => line.verdict = format!("error: {error}"),
     }

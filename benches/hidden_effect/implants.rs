@@ -5,7 +5,7 @@ use phyture::Result;
 use phyture::critique::diagnose::{Diagnosis, Options, Step, diagnose};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::split::Split;
-use phyture::flight::{DataSet, Span};
+use phyture::flight::{Channel, DataSet, Span};
 use phyture::physics::{Effect, Model, calibrate, catalogue, implant, spread_over_flights, typical};
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub fn print(data: &Path, fixtures: &Path) -> Result<()> {
         for size in SIZES {
             let of = |scale: f64| spread_over_flights(typical(definition, scale, &model), &set.flights);
             let share = |set: &DataSet, changed: &DataSet| {
-                (0..6).map(|channel| change(set, changed, channel) / rest[channel]).fold(0.0, f64::max)
+                Channel::ALL.into_iter().map(|channel| change(set, changed, channel) / rest[channel]).fold(0.0, f64::max)
             };
             let [mut low, mut high] = SCALES;
             for _ in 0..HALVINGS {
@@ -83,8 +83,8 @@ fn row(implanted: &DataSet, model: &Model, effect: &Effect, without: &Diagnosis)
 }
 
 /// Root mean square of what an implant changed.
-fn change(before: &DataSet, after: &DataSet, channel: usize) -> f64 {
-    let column = phyture::flight::Column::TARGETS[channel];
+fn change(before: &DataSet, after: &DataSet, channel: Channel) -> f64 {
+    let column = channel.column();
     let (mut sum, mut count) = (0.0, 0);
     for (before, after) in before.flights.iter().zip(&after.flights) {
         for (before, after) in before.column(column).iter().zip(after.column(column)) {

@@ -3,7 +3,7 @@
 use crate::cases::{ALIENS, CONFUSABLE, FOREIGN, PAIRS, SINGLES, SIZES, Single};
 use phyture::critique::diagnose::{Diagnosis, Met, Options, diagnose, met, stepwise_and_stlsq};
 use phyture::flight::split::Split;
-use phyture::flight::{Column, DataSet, Flight};
+use phyture::flight::{Channel, Column, DataSet, Flight, PerChannel};
 use phyture::formula::Formula;
 use phyture::physics::{Model, catalogue, evaluate};
 use phyture::sim::{INERTIA_KG_M2, Level, MASS_KG, Mechanisms, ROTOR_RADIUS_M, Simulation, simulate};
@@ -74,7 +74,7 @@ struct Bench<'a> {
     out: &'a Path,
     done: Vec<String>,
     /// Mean squared errors of data without a hidden effect, by seed, level and whether there is wind beside it.
-    floors: BTreeMap<(u64, u8, bool), [f64; 6]>,
+    floors: BTreeMap<(u64, u8, bool), PerChannel<f64>>,
     minutes: f64,
 }
 
@@ -127,7 +127,7 @@ impl Bench<'_> {
     }
 
     /// Of the baseline on flights that no search sees; where it blows with the wind that it finds.
-    fn mse(&self, set: &DataSet, split: &Split, is_windy: bool) -> Result<[f64; 6]> {
+    fn mse(&self, set: &DataSet, split: &Split, is_windy: bool) -> Result<PerChannel<f64>> {
         let model = if is_windy { model_with_wind() } else { model() };
         let (fitted, _) = phyture::physics::calibrate(&model, &set.flights, &split.training)?;
         let Met { models, judged, .. } = met(&set.flights, &[&fitted], &split.test)?;
@@ -156,7 +156,7 @@ impl Bench<'_> {
         let is_windy = hidden.is_windy(level);
         let floor = match self.floors.get(&(seed, level, is_windy)) {
             Some(floor) => *floor,
-            None if line.hidden == "null" => [0.0; 6],
+            None if line.hidden == "null" => PerChannel::splat(0.0),
             None => {
                 // What is left at best: the same session without the hidden effect.
                 let mechanisms = if is_windy { Vec::new() } else { vec![("wind", 0.0)] };
@@ -181,7 +181,14 @@ impl Bench<'_> {
         self.write(&line)
     }
 
-    fn fill(&self, line: &mut Line, diagnosis: &Diagnosis, floor: &[f64; 6], alone: Option<[f64; 6]>, known: Option<&Single>) {
+    fn fill(
+        &self,
+        line: &mut Line,
+        diagnosis: &Diagnosis,
+        floor: &PerChannel<f64>,
+        alone: Option<PerChannel<f64>>,
+        known: Option<&Single>,
+    ) {
         line.verdict = diagnosis.verdict.words().into();
         line.accepted.clone_from(&diagnosis.accepted);
         line.indistinguishable = diagnosis.steps.first().map_or_else(Vec::new, |step| step.indistinguishable.clone());
@@ -192,11 +199,11 @@ impl Bench<'_> {
             }
         }
         let Some(locked) = &diagnosis.locked else { return };
-        let squares = |values: phyture::critique::PerChannel| values.channels().map(|value| value.unwrap_or(0.0).powi(2));
+        let squares = |values: phyture::critique::ChannelValues| values.channels().map(|value| value.unwrap_or(0.0).powi(2));
         let (before, after) = (squares(locked.rmse_before), squares(locked.rmse_after));
         let with = alone.unwrap_or(before);
-        let share = |channel: usize| 1.0 - floor[channel] / with[channel];
-        let best = (0..6).max_by(|&left, &right| share(left).total_cmp(&share(right))).unwrap_or(0);
+        let share = |channel: Channel| 1.0 - floor[channel] / with[channel];
+        let best = Channel::ALL.into_iter().max_by(|&left, &right| share(left).total_cmp(&share(right))).unwrap_or(Channel::VxDot);
         line.share = share(best);
         line.removed = Some((before[best] - after[best]) / (before[best] - floor[best]));
         let Some((single, (name, truth))) = known.and_then(|single| Some((single, single.truth?))) else { return };

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use phyture_kernels::activation::{self, Activation};
-use phyture_kernels::attention::{self, Gradients};
+use phyture_kernels::attention::{self, Gradients, Inputs};
 use phyture_kernels::conv1d::{self, Epilogue, Geometry, Weight};
 use phyture_kernels::dropout::{self, Mask};
 use phyture_kernels::random::Stream;
@@ -145,8 +145,7 @@ fn convolution(criterion: &mut Criterion) {
                     isa,
                     geometry,
                     x,
-                    Weight::Packed(&packed),
-                    None,
+                    (Weight::Packed(&packed), None),
                     epilogue,
                     RowsMut::packed(black_box(&mut y), after, WIDTH),
                     &mut scratch,
@@ -201,12 +200,13 @@ fn attention_maps(criterion: &mut Criterion) {
         let [q, k, v, d_o] = [&q, &k, &v, &d_o].map(|x| Rows::packed(x, rows, WIDTH));
         let scratch = || vec![0.0; attention::scratch_len(HEADS, rows, rows, WIDTH / HEADS)];
         for (kind, dropout) in [("", None), ("_dropout", Some(Mask::new(Stream::new(1, 2, 3, 4), 0.2)))] {
+            let inputs = Inputs { heads: HEADS, q, k, v, dropout };
             let (shape, operations) = (format!("{rows}x{HEADS}x{}", WIDTH / HEADS), (4 * rows * rows * WIDTH) as u64);
             let mut contenders = each_level(|isa| {
                 let (mut o, mut lse, mut scratch) = (vec![0.0; rows * WIDTH], vec![0.0; HEADS * rows], scratch());
                 Box::new(move || {
                     let o = RowsMut::packed(black_box(&mut o), rows, WIDTH);
-                    attention::forward(isa, HEADS, q, k, v, dropout, o, &mut lse, &mut scratch);
+                    attention::forward(isa, inputs, o, &mut lse, &mut scratch);
                 })
             });
             if with_reference {
@@ -221,7 +221,7 @@ fn attention_maps(criterion: &mut Criterion) {
             compare(criterion, &format!("attention_forward{kind}"), &shape, operations, contenders);
             let (mut o, mut lse) = (vec![0.0_f32; rows * WIDTH], vec![0.0_f32; HEADS * rows]);
             let best = levels()[0];
-            attention::forward(best, HEADS, q, k, v, dropout, RowsMut::packed(&mut o, rows, WIDTH), &mut lse, &mut scratch());
+            attention::forward(best, inputs, RowsMut::packed(&mut o, rows, WIDTH), &mut lse, &mut scratch());
             let (o, lse) = (&o, &lse);
             let mut contenders = each_level(|isa| {
                 let mut gradients = [(); 3].map(|()| vec![0.0_f32; rows * WIDTH]);
@@ -229,19 +229,7 @@ fn attention_maps(criterion: &mut Criterion) {
                 Box::new(move || {
                     let [dq, dk, dv] = black_box(&mut gradients).each_mut().map(|x| RowsMut::packed(x, rows, WIDTH));
                     let gradients = Gradients { dq, dk, dv, write_q: Write::Set, write_k: Write::Set, write_v: Write::Set };
-                    attention::backward(
-                        isa,
-                        HEADS,
-                        q,
-                        k,
-                        v,
-                        dropout,
-                        Rows::packed(o, rows, WIDTH),
-                        lse,
-                        d_o,
-                        gradients,
-                        &mut scratch,
-                    );
+                    attention::backward(isa, inputs, (Rows::packed(o, rows, WIDTH), lse), d_o, gradients, &mut scratch);
                 })
             });
             if with_reference {
@@ -250,7 +238,7 @@ fn attention_maps(criterion: &mut Criterion) {
                     "reference",
                     Box::new(move || {
                         let [dq, dk, dv] = black_box(&mut gradients).each_mut().map(|x| RowsMut::packed(x, rows, WIDTH));
-                        reference::attention_backward(HEADS, q, k, v, dropout, d_o, dq, dk, dv);
+                        reference::attention_backward(inputs, d_o, [dq, dk, dv]);
                     }),
                 ));
             }
@@ -274,7 +262,7 @@ fn pointwise(criterion: &mut Criterion) {
 
     let mut rows = each_level(|isa| {
         let (mut y, [mut mean, mut rstd]) = (output(), moments());
-        Box::new(move || layer_norm::forward(isa, x, gamma, gamma, 1e-5, write(&mut y), &mut mean, &mut rstd))
+        Box::new(move || layer_norm::forward(isa, x, (gamma, gamma), 1e-5, write(&mut y), (&mut mean, &mut rstd)))
     });
     let (mut y, [mut mean, mut rstd]) = (output(), moments());
     rows.push(("reference", Box::new(move || reference::layer_norm(x, gamma, gamma, 1e-5, write(&mut y), &mut mean, &mut rstd))));
@@ -326,7 +314,9 @@ fn pointwise(criterion: &mut Criterion) {
     let rows = each_level(|isa| {
         let gradient = numbers(5, ROWS * WIDTH);
         let [mut theta, mut first, mut second] = [output(), output(), output()];
-        Box::new(move || adam::step(isa, &adam::Adam::default(), 3, 1.0, &gradient, black_box(&mut theta), &mut first, &mut second))
+        Box::new(move || {
+            adam::step(isa, &adam::Adam::default(), 3, 1.0, &gradient, black_box(&mut theta), (&mut first, &mut second))
+        })
     });
     compare(criterion, "adam", &shape, elements, rows);
 }

@@ -26,7 +26,7 @@ impl Default for Adam {
     }
 }
 
-/// Step number `step` (1 is the first). `gradient` is multiplied by `scale` on reading (1, or one over a number of samples).
+/// Step number `step` (1 is the first). `first` and `second` are the two moments; `gradient` is multiplied by `scale` on reading (1, or one over a number of samples).
 pub fn step<T: Real>(
     isa: InstructionSet,
     adam: &Adam,
@@ -34,8 +34,7 @@ pub fn step<T: Real>(
     scale: f64,
     gradient: &[T],
     parameters: &mut [T],
-    first: &mut [T],
-    second: &mut [T],
+    (first, second): (&mut [T], &mut [T]),
 ) {
     let n = parameters.len();
     assert!(gradient.len() == n && first.len() == n && second.len() == n, "adam: {n} parameters, other slices differ");
@@ -106,7 +105,7 @@ mod tests {
             let start = start.min(len);
             for t in 1..=10 {
                 let gradient = numbers::<T>(seed + t, len);
-                step(isa, &adam, t, scale, &gradient[start..], &mut theta[start..], &mut m[start..], &mut v[start..]);
+                step(isa, &adam, t, scale, &gradient[start..], &mut theta[start..], (&mut m[start..], &mut v[start..]));
                 let moments = expected.1.iter_mut().zip(&mut expected.2);
                 for ((theta, (m, v)), g) in expected.0.iter_mut().zip(moments).zip(&gradient).skip(start) {
                     (*theta, *m, *v) = reference::adam(&adam, t, *theta, g.f64() * scale, *m, *v);
@@ -130,7 +129,7 @@ mod tests {
     #[test]
     fn the_first_step_is_one_learning_rate_against_the_sign_of_the_gradient() {
         let (mut theta, mut m, mut v) = ([1.0_f64, 1.0], [0.0; 2], [0.0; 2]);
-        step(InstructionSet::PLAIN, &Adam::default(), 1, 1.0, &[3.0, -40.0], &mut theta, &mut m, &mut v);
+        step(InstructionSet::PLAIN, &Adam::default(), 1, 1.0, &[3.0, -40.0], &mut theta, (&mut m, &mut v));
         assert_near("parameters", &theta, &[1.0 - 1e-3, 1.0 + 1e-3], Tolerance::Close);
     }
 }

@@ -44,6 +44,21 @@ pub fn scratch_len(heads: usize, queries: usize, keys: usize, head_size: usize) 
     3 * keys * wide + 2 * head_size * QUERIES + 3 * QUERIES * wide + 2 * KEYS * QUERIES + 3 * QUERIES
 }
 
+/// What attention is computed from, and how.
+#[derive(Clone, Copy)]
+pub struct Inputs<'a, T> {
+    /// Heads, which divide the width.
+    pub heads: usize,
+    /// Queries, `[queries, heads·d_k]`.
+    pub q: Rows<'a, T>,
+    /// Keys, `[keys, heads·d_k]`.
+    pub k: Rows<'a, T>,
+    /// Values, `[keys, heads·d_k]`.
+    pub v: Rows<'a, T>,
+    /// Dropout of the probabilities, of the whole also where only some rows are computed.
+    pub dropout: Option<Mask>,
+}
+
 /// Shapes of one call.
 #[derive(Clone, Copy)]
 struct Shape {
@@ -162,19 +177,9 @@ impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
 ///
 /// # Panics
 /// If shapes disagree, `heads` does not divide the width, or there is no key.
-pub fn forward<T: Real>(
-    isa: InstructionSet,
-    heads: usize,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
-    dropout: Option<Mask>,
-    o: RowsMut<'_, T>,
-    log_sum_exp: &mut [T],
-    scratch: &mut [T],
-) {
-    assert_eq!(q.rows(), o.rows(), "attention: rows of q and o");
-    forward_rows(isa, heads, q, k, v, dropout, 0, o, log_sum_exp, scratch);
+pub fn forward<T: Real>(isa: InstructionSet, inputs: Inputs<'_, T>, o: RowsMut<'_, T>, log_sum_exp: &mut [T], scratch: &mut [T]) {
+    assert_eq!(inputs.q.rows(), o.rows(), "attention: rows of q and o");
+    forward_rows(isa, inputs, 0, o, log_sum_exp, scratch);
 }
 
 /// Rows `first…` of what [`forward`] gives, as many as o `[≤ queries − first, heads·d_k]` has, with their rows of `log_sum_exp`; q, k, v
@@ -184,16 +189,13 @@ pub fn forward<T: Real>(
 /// As [`forward`].
 pub fn forward_rows<T: Real>(
     isa: InstructionSet,
-    heads: usize,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
-    dropout: Option<Mask>,
+    inputs: Inputs<'_, T>,
     first: usize,
     o: RowsMut<'_, T>,
     log_sum_exp: &mut [T],
     scratch: &mut [T],
 ) {
+    let Inputs { heads, q, k, v, dropout } = inputs;
     assert!(first + o.rows() <= q.rows(), "attention: rows of o");
     let shape = Shape::of(heads, &q, &k, &v, &o.view(), log_sum_exp);
     T::attention_forward(isa, Forward { shape, q, k, v, dropout, first, o, log_sum_exp, scratch });
@@ -361,11 +363,12 @@ mod tests {
         reference::attention(heads, q.view(), k.view(), v.view(), dropout, o_expected.view_mut(), &mut lse_expected);
         let mut expected = (query(), key(), key());
         let views = (expected.0.view_mut(), expected.1.view_mut(), expected.2.view_mut());
-        reference::attention_backward(heads, q.view(), k.view(), v.view(), dropout, d_o.view(), views.0, views.1, views.2);
+        let inputs = Inputs { heads, q: q.view(), k: k.view(), v: v.view(), dropout };
+        reference::attention_backward(inputs, d_o.view(), [views.0, views.1, views.2]);
         for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
             let (mut o, mut lse) = (query(), vec![T::NAN; heads * queries]);
-            forward(isa, heads, q.view(), k.view(), v.view(), dropout, o.view_mut(), &mut lse, &mut scratch);
+            forward(isa, inputs, o.view_mut(), &mut lse, &mut scratch);
             o.check_gaps();
             assert_near(&format!("o at {isa}"), &o.to_vec(), &o_expected.to_vec(), Tolerance::Close);
             assert_near(&format!("log-sum-exp at {isa}"), &lse, &lse_expected, Tolerance::Close);
@@ -379,7 +382,7 @@ mod tests {
                     write_k: write,
                     write_v: write,
                 };
-                backward(isa, heads, q.view(), k.view(), v.view(), dropout, o.view(), &lse, d_o.view(), gradients, &mut scratch);
+                backward(isa, inputs, (o.view(), &lse), d_o.view(), gradients, &mut scratch);
                 let times = if write == Write::Set { T::ONE } else { T::of(2.0) };
                 let pairs = [(&found.0, &expected.0, "dq"), (&found.1, &expected.1, "dk"), (&found.2, &expected.2, "dv")];
                 for (found, expected, name) in pairs {
@@ -418,13 +421,14 @@ mod tests {
         let q = Matrix::<T>::random(1, (queries, width));
         let (k, v) = (Matrix::<T>::random(2, (keys, width)), Matrix::<T>::random(3, (keys, width)));
         for dropout in [None, Some(Mask::new(Stream::new(4, 0, 0, 0), 0.2))] {
+            let inputs = Inputs { heads, q: q.view(), k: k.view(), v: v.view(), dropout };
             for isa in InstructionSet::available() {
                 let mut scratch = vec![T::NAN; scratch_len(heads, queries, keys, size)];
                 let found = |step: usize, scratch: &mut [T]| {
                     let (mut o, mut lse) = (Matrix::<T>::poisoned(5, (queries, width)), vec![T::NAN; queries * heads]);
                     for (first, lse) in (0..queries).step_by(step).zip(lse.chunks_mut(step * heads)) {
                         let o = o.view_mut().range(first, queries.min(first + step));
-                        forward_rows(isa, heads, q.view(), k.view(), v.view(), dropout, first, o, lse, scratch);
+                        forward_rows(isa, inputs, first, o, lse, scratch);
                     }
                     o.check_gaps();
                     (bits(&o.to_vec()), bits(&lse))
@@ -448,7 +452,8 @@ mod tests {
             (vec![0.0; rows.0 * width], vec![0.0; rows.0], vec![0.0; scratch_len(1, rows.0, rows.1, width)]);
         let keys = |x| Rows::packed(x, rows.1, width);
         let o_view = RowsMut::packed(&mut o, rows.0, width);
-        forward(InstructionSet::PLAIN, 1, Rows::packed(q, rows.0, width), keys(k), keys(v), None, o_view, &mut lse, &mut scratch);
+        let inputs = Inputs { heads: 1, q: Rows::packed(q, rows.0, width), k: keys(k), v: keys(v), dropout: None };
+        forward(InstructionSet::PLAIN, inputs, o_view, &mut lse, &mut scratch);
         (o, lse)
     }
 

@@ -154,8 +154,7 @@ pub fn backward_input<T: Real>(
     gamma: &[T],
     dy: Rows<'_, T>,
     sums: Option<(&[T], usize)>,
-    dx: RowsMut<'_, T>,
-    write: Write,
+    (dx, write): (RowsMut<'_, T>, Write),
 ) {
     same_shape(&dy, &dx.view());
     T::batch_norm_backward_input(isa, BackwardInput { x, mean, rstd, gamma, dy, sums, dx, write });
@@ -244,7 +243,7 @@ mod tests {
                 assert_near("y", &y.to_vec(), &own(&expected[0]).to_vec(), Tolerance::Approximate);
                 check_writes("dx", &own(&expected[1]), Tolerance::Approximate, |dx, write| {
                     let sums = Some((sums.as_slice(), samples * rows));
-                    backward_input(isa, x[sample].view(), (mean, &rstd), &gamma, dy[sample].view(), sums, dx, write);
+                    backward_input(isa, x[sample].view(), (mean, &rstd), &gamma, dy[sample].view(), sums, (dx, write));
                 });
             }
         }

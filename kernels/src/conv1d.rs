@@ -76,14 +76,13 @@ pub fn forward<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
-    weight: Weight<'_, T>,
-    bias: Option<&[T]>,
+    (weight, bias): (Weight<'_, T>, Option<&[T]>),
     epilogue: Epilogue,
     y: RowsMut<'_, T>,
     scratch: &mut [T],
 ) {
     assert_eq!(y.rows(), geometry.output_rows(x.rows()), "conv1d: rows of y");
-    forward_rows(isa, geometry, x, weight, bias, epilogue, 0, y, scratch);
+    forward_rows(isa, geometry, x, (weight, bias), epilogue, (0, y), scratch);
 }
 
 /// Rows `first…` of what [`forward`] gives, as many as y `[≤ n′ − first, out]` has; x and the dropout mask are those of the whole.
@@ -94,11 +93,9 @@ pub fn forward_rows<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
-    weight: Weight<'_, T>,
-    bias: Option<&[T]>,
+    (weight, bias): (Weight<'_, T>, Option<&[T]>),
     epilogue: Epilogue,
-    first: usize,
-    y: RowsMut<'_, T>,
+    (first, y): (usize, RowsMut<'_, T>),
     scratch: &mut [T],
 ) {
     assert!(first + y.rows() <= geometry.output_rows(x.rows()), "conv1d: rows of y");
@@ -237,7 +234,7 @@ mod tests {
             let mut packed = vec![T::NAN; packed_len(geometry, inputs, outputs)];
             pack(isa, geometry, (inputs, outputs), &weight, &mut packed);
             for weight in [Weight::Plain(&weight), Weight::Packed(&packed)] {
-                forward(isa, geometry, x.view(), weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+                forward(isa, geometry, x.view(), (weight, Some(&bias)), Epilogue::NONE, y.view_mut(), &mut scratch);
                 y.check_gaps();
                 assert_near(&format!("forward at {isa}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
             }
@@ -266,7 +263,7 @@ mod tests {
                 for first in (0..after).step_by(step) {
                     let y = y.view_mut().range(first, after.min(first + step));
                     let weight = Weight::Plain(&weight);
-                    forward_rows(isa, geometry, x.view(), weight, Some(&bias), epilogue, first, y, &mut scratch);
+                    forward_rows(isa, geometry, x.view(), (weight, Some(&bias)), epilogue, (first, y), &mut scratch);
                 }
                 y.check_gaps();
                 bits(&y.to_vec())
@@ -301,7 +298,7 @@ mod tests {
                 let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dx) = (vec![f64::NAN; dz.len()], vec![f64::NAN; x.len()]);
                 let x_view = Rows::packed(&x, rows, inputs);
-                forward(isa, geometry, x_view, Weight::Plain(&weight), None, Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
+                forward(isa, geometry, x_view, (Weight::Plain(&weight), None), Epilogue::NONE, RowsMut::packed(&mut y, after, outputs), &mut scratch);
                 let dx_view = RowsMut::packed(&mut dx, rows, inputs);
                 backward_input(isa, geometry, Rows::packed(&dz, after, outputs), Weight::Plain(&weight), dx_view, Write::Set, &mut scratch);
                 assert_near("<Ax, y> and <x, A'y>", &[inner(&y, &dz)], &[inner(&x, &dx)], Tolerance::Close);
@@ -331,8 +328,7 @@ mod tests {
             InstructionSet::PLAIN,
             geometry,
             x.view(),
-            Weight::Plain(&turned),
-            None,
+            (Weight::Plain(&turned), None),
             Epilogue::NONE,
             conv.view_mut(),
             &mut scratch,
@@ -356,7 +352,7 @@ mod tests {
                 let (mut y, mut scratch) =
                     (vec![f32::NAN; rows * channels], vec![f32::NAN; scratch_len(geometry, channels, channels)]);
                 let (x, to) = (Rows::packed(&single, rows, channels), RowsMut::packed(&mut y, rows, channels));
-                forward(isa, geometry, x, Weight::Plain(&weight), None, Epilogue::NONE, to, &mut scratch);
+                forward(isa, geometry, x, (Weight::Plain(&weight), None), Epilogue::NONE, to, &mut scratch);
                 let squares = |numbers: &mut dyn Iterator<Item = f64>| numbers.map(|x| x * x).sum::<f64>().sqrt();
                 let error = squares(&mut y.iter().zip(&z).map(|(y, z)| f64::from(*y) - z)) / squares(&mut z.iter().copied());
                 println!("{taps} taps, level {isa}: {error:.1e} of the root mean square");

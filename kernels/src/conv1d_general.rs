@@ -113,8 +113,7 @@ pub fn forward<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
-    weight: &[T],
-    bias: Option<&[T]>,
+    (weight, bias): (&[T], Option<&[T]>),
     epilogue: Epilogue,
     y: RowsMut<'_, T>,
     scratch: &mut [T],
@@ -415,7 +414,7 @@ mod tests {
         for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (geometry.rows, outputs));
-            forward(isa, geometry, x.view(), &weight, Some(&bias), Epilogue::NONE, y.view_mut(), &mut scratch);
+            forward(isa, geometry, x.view(), (&weight, Some(&bias)), Epilogue::NONE, y.view_mut(), &mut scratch);
             y.check_gaps();
             assert_near(&format!("forward at {isa}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
             check_writes(&format!("dx at {isa}"), &dx, Tolerance::Close, |dx, write| {
@@ -451,8 +450,8 @@ mod tests {
                 for isa in InstructionSet::available() {
                     let mut scratch = vec![f32::NAN; scratch_len(geometry, channels, 3).max(conv1d::scratch_len(same, channels, 3))];
                     let [mut y, mut expected] = [(); 2].map(|()| Matrix::<f32>::poisoned(seed, (rows, 3)));
-                    forward(isa, geometry, x.view(), &weight, None, epilogue, y.view_mut(), &mut scratch);
-                    conv1d::forward(isa, same, x.view(), conv1d::Weight::Plain(&turned), None, epilogue, expected.view_mut(), &mut scratch);
+                    forward(isa, geometry, x.view(), (&weight, None), epilogue, y.view_mut(), &mut scratch);
+                    conv1d::forward(isa, same, x.view(), (conv1d::Weight::Plain(&turned), None), epilogue, expected.view_mut(), &mut scratch);
                     assert_near("conv1d and conv1d_general", &y.to_vec(), &expected.to_vec(), Tolerance::Exact);
                 }
             }

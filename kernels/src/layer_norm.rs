@@ -18,12 +18,10 @@ use crate::{Real, Rows, RowsMut, Write, row_reductions};
 pub fn forward<T: Real>(
     isa: InstructionSet,
     x: Rows<'_, T>,
-    gamma: &[T],
-    beta: &[T],
+    (gamma, beta): (&[T], &[T]),
     epsilon: f64,
     y: RowsMut<'_, T>,
-    mean: &mut [T],
-    rstd: &mut [T],
+    (mean, rstd): (&mut [T], &mut [T]),
 ) {
     same_shape(&x, &y.view());
     assert!(gamma.len() == x.cols() && beta.len() == x.cols(), "layer norm: length of gamma or beta");
@@ -66,8 +64,7 @@ pub fn backward_input<T: Real>(
     isa: InstructionSet,
     x: Rows<'_, T>,
     gamma: &[T],
-    mean: &[T],
-    rstd: &[T],
+    (mean, rstd): (&[T], &[T]),
     dy: Rows<'_, T>,
     dx: RowsMut<'_, T>,
     write: Write,
@@ -124,11 +121,9 @@ const CHUNK: usize = 64;
 pub fn backward_parameters<T: Real>(
     isa: InstructionSet,
     x: Rows<'_, T>,
-    mean: &[T],
-    rstd: &[T],
+    (mean, rstd): (&[T], &[T]),
     dy: Rows<'_, T>,
-    dgamma: &mut [T],
-    dbeta: &mut [T],
+    (dgamma, dbeta): (&mut [T], &mut [T]),
     write: Write,
 ) {
     same_shape(&x, &dy);
@@ -198,19 +193,19 @@ mod tests {
         for isa in InstructionSet::available() {
             let mut y = Matrix::<T>::poisoned(seed, (rows, cols));
             let (mut mean, mut rstd) = (vec![T::NAN; rows], vec![T::NAN; rows]);
-            forward(isa, x.view(), &gamma, &beta, EPSILON, y.view_mut(), &mut mean, &mut rstd);
+            forward(isa, x.view(), (&gamma, &beta), EPSILON, y.view_mut(), (&mut mean, &mut rstd));
             y.check_gaps();
             assert_near("y", &y.to_vec(), &y_expected.to_vec(), Tolerance::Close);
             check_writes("dx", &dx_expected, Tolerance::Close, |dx, write| {
-                backward_input(isa, x.view(), &gamma, &mean, &rstd, dy.view(), dx, write);
+                backward_input(isa, x.view(), &gamma, (&mean, &rstd), dy.view(), dx, write);
             });
             check_writes("dgamma", &parameters.0, Tolerance::Close, |mut dgamma, write| {
                 let mut dbeta = vec![T::ZERO; cols];
-                backward_parameters(isa, x.view(), &mean, &rstd, dy.view(), dgamma.row_mut(0), &mut dbeta, write);
+                backward_parameters(isa, x.view(), (&mean, &rstd), dy.view(), (dgamma.row_mut(0), &mut dbeta), write);
             });
             check_writes("dbeta", &parameters.1, Tolerance::Close, |mut dbeta, write| {
                 let mut dgamma = vec![T::ZERO; cols];
-                backward_parameters(isa, x.view(), &mean, &rstd, dy.view(), &mut dgamma, dbeta.row_mut(0), write);
+                backward_parameters(isa, x.view(), (&mean, &rstd), dy.view(), (&mut dgamma, dbeta.row_mut(0)), write);
             });
         }
     }
@@ -230,9 +225,9 @@ mod tests {
             for isa in InstructionSet::available() {
                 let (mut y, mut dx, mut mean, mut rstd) = (vec![0.0; cols], vec![0.0; cols], [0.0], [0.0]);
                 let row = |x| Rows::packed(x, 1, cols);
-                forward(isa, row(&x), &gamma, &beta, 0.0, RowsMut::packed(&mut y, 1, cols), &mut mean, &mut rstd);
+                forward(isa, row(&x), (&gamma, &beta), 0.0, RowsMut::packed(&mut y, 1, cols), (&mut mean, &mut rstd));
                 let dx_view = RowsMut::packed(&mut dx, 1, cols);
-                backward_input(isa, row(&x), &gamma, &mean, &rstd, row(&dy), dx_view, Write::Set);
+                backward_input(isa, row(&x), &gamma, (&mean, &rstd), row(&dy), dx_view, Write::Set);
                 let found = [inner(&dx, &gamma), inner(&dx, &y)];
                 assert_near("dx along 1 and along the normalised row", &found, &[0.0; 2], Tolerance::Close);
             }

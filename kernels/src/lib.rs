@@ -8,8 +8,6 @@
 //! Conventions: sequences are channels-last, `[time, channel]` row-major with a row stride, so that the odd and the even rows
 //! of a sequence are views; the [`InstructionSet`] is the first argument, chosen once; backward kernels take a [`Write`] for each gradient they produce; scratch comes from the caller.
 
-#![expect(clippy::too_many_arguments, reason = "a kernel takes its sizes and buffers one by one, as BLAS does")]
-
 pub mod activation;
 pub mod adam;
 pub mod attention;

@@ -108,8 +108,7 @@ pub fn backward<T: Real>(
     geometry: Geometry,
     (x, y): (Rows<'_, T>, Rows<'_, T>),
     dy: Rows<'_, T>,
-    mut dx: RowsMut<'_, T>,
-    write: Write,
+    (mut dx, write): (RowsMut<'_, T>, Write),
     scratch: &mut [T],
 ) {
     check(geometry, &dx.view(), &dy);
@@ -183,7 +182,7 @@ mod tests {
                 assert_near(&format!("{pool:?}"), &y.to_vec(), &expected, Tolerance::Close);
                 let mut scratch = vec![T::NAN; shape.1];
                 check_writes(&format!("d{pool:?}"), &dx, Tolerance::Close, |dx, write| {
-                    backward(isa, pool, geometry, (x.view(), y.view()), dy.view(), dx, write, &mut scratch);
+                    backward(isa, pool, geometry, (x.view(), y.view()), dy.view(), (dx, write), &mut scratch);
                 });
             }
         }

@@ -59,9 +59,7 @@ pub fn forward<T: Real>(
     isa: InstructionSet,
     sparse: Sparse,
     stream: Stream,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
+    [q, k, v]: [Rows<'_, T>; 3],
     mut o: RowsMut<'_, T>,
     kept: &mut [T],
     scratch: &mut [T],
@@ -248,9 +246,7 @@ pub struct Gradients<'a, T> {
 pub fn backward<T: Real>(
     isa: InstructionSet,
     sparse: Sparse,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
+    [q, k, v]: [Rows<'_, T>; 3],
     d_o: Rows<'_, T>,
     kept: &[T],
     gradients: Gradients<'_, T>,
@@ -380,7 +376,7 @@ mod tests {
             let mut kept = vec![T::NAN; sparse.kept_len(queries, keys)];
             let mut scratch = vec![T::NAN; sparse.scratch_len(queries, keys, d)];
             let mut o = Matrix::<T>::poisoned(seed, (queries, d));
-            forward(isa, sparse, stream, q.view(), k.view(), v.view(), o.view_mut(), &mut kept, &mut scratch);
+            forward(isa, sparse, stream, [q.view(), k.view(), v.view()], o.view_mut(), &mut kept, &mut scratch);
             o.check_gaps();
             let count = sparse.chosen(queries);
             let chosen: Vec<usize> = kept[..sparse.heads * count].iter().map(|i| i.f64() as usize).collect();
@@ -405,7 +401,7 @@ mod tests {
                     *[&mut dq, &mut dk, &mut dv][which] = target;
                     let gradients = Gradients { dq, dk, dv, writes };
                     scratch.fill(T::NAN);
-                    backward(isa, sparse, q.view(), k.view(), v.view(), d_o.view(), &kept, gradients, &mut scratch);
+                    backward(isa, sparse, [q.view(), k.view(), v.view()], d_o.view(), &kept, gradients, &mut scratch);
                 });
             }
         }

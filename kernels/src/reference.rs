@@ -4,6 +4,7 @@
 //! that a comparison measures the kernel's rounding and not this file's. Outputs are overwritten.
 
 use crate::activation::Activation;
+use crate::attention::Inputs;
 use crate::conv1d::Geometry;
 use crate::dropout::Mask;
 use crate::{Real, Rows, RowsMut};
@@ -151,17 +152,8 @@ fn probabilities<T: Real>(
 }
 
 /// Gradients of [`attention`], from the stored maps.
-pub fn attention_backward<T: Real>(
-    heads: usize,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
-    dropout: Option<Mask>,
-    d_o: Rows<'_, T>,
-    mut dq: RowsMut<'_, T>,
-    mut dk: RowsMut<'_, T>,
-    mut dv: RowsMut<'_, T>,
-) {
+pub fn attention_backward<T: Real>(inputs: Inputs<'_, T>, d_o: Rows<'_, T>, [mut dq, mut dk, mut dv]: [RowsMut<'_, T>; 3]) {
+    let Inputs { heads, q, k, v, dropout } = inputs;
     let size = q.cols() / heads;
     let scale = 1.0 / (size as f64).sqrt();
     for h in 0..heads {

@@ -25,10 +25,8 @@ pub fn scale_backward<T: Real>(
     x: Rows<'_, T>,
     s: Rows<'_, T>,
     dy: Rows<'_, T>,
-    dx: RowsMut<'_, T>,
-    write_x: Write,
-    ds: RowsMut<'_, T>,
-    write_s: Write,
+    (dx, write_x): (RowsMut<'_, T>, Write),
+    (ds, write_s): (RowsMut<'_, T>, Write),
 ) {
     same_shape(&x, &s);
     same_shape(&x, &dy);
@@ -103,11 +101,11 @@ mod tests {
             for other in crate::testing::WRITES {
                 check_writes("dx", &dx_expected, Tolerance::Close, |dx, write| {
                     let mut ds = Matrix::<T>::random(seed, shape);
-                    scale_backward(isa, x.view(), s.view(), dy.view(), dx, write, ds.view_mut(), other);
+                    scale_backward(isa, x.view(), s.view(), dy.view(), (dx, write), (ds.view_mut(), other));
                 });
                 check_writes("ds", &ds_expected, Tolerance::Close, |ds, write| {
                     let mut dx = Matrix::<T>::random(seed, shape);
-                    scale_backward(isa, x.view(), s.view(), dy.view(), dx.view_mut(), other, ds, write);
+                    scale_backward(isa, x.view(), s.view(), dy.view(), (dx.view_mut(), other), (ds, write));
                 });
             }
         }

@@ -3,7 +3,7 @@
 //! Takes predictions as numbers, whoever made them; which windows and which channels are worth judging is the caller's
 //! matter. Printing the result is `table.rs`; where in the flights the error lies is `locate.rs`.
 
-use super::channels::{Intervals, PerChannel};
+use super::channels::{ChannelValues, Intervals};
 use super::contest::{self, Best, Difference, RowSums};
 use super::predictions::{Row, check_row, measured, variation};
 use super::regime::Regime;
@@ -12,7 +12,7 @@ use super::uncertainty::Uncertainty;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;
 use crate::flight::split::Part;
-use crate::flight::{Flight, Targets, Window};
+use crate::flight::{Channel, Flight, PerChannel, Targets, Window};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartError {
     /// Root mean square error; all `None` when the part has fewer than two windows: one says nothing.
-    pub rmse: PerChannel,
+    pub rmse: ChannelValues,
     /// 95 % interval of the RMSE.
     pub rmse_ci95: Intervals,
     /// Windows in the part.
@@ -38,15 +38,15 @@ pub struct ModelError {
     /// Number of windows N.
     pub windows: usize,
     /// Root mean square error, m/s² and rad/s².
-    pub rmse: PerChannel,
+    pub rmse: ChannelValues,
     /// 95 % interval of the RMSE.
     pub rmse_ci95: Intervals,
     /// Mean absolute error, m/s² and rad/s².
-    pub mae: PerChannel,
+    pub mae: ChannelValues,
     /// Largest absolute error, m/s² and rad/s²; its `mean` is the mean of the six largest errors.
-    pub max_abs: PerChannel,
+    pub max_abs: ChannelValues,
     /// Coefficient of determination; `None` for a channel that does not vary.
-    pub r2: PerChannel,
+    pub r2: ChannelValues,
     /// Windows with a prediction that is not finite. They make the measures of their channel `None`.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub not_finite: usize,
@@ -89,7 +89,7 @@ pub struct Comparison {
     pub best_by_regime: BTreeMap<String, usize>,
     /// RMSE that no model can go below, where the explainable part of the flights is known (see [`super::floor()`]); added by whoever has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub floor: Option<PerChannel>,
+    pub floor: Option<ChannelValues>,
     /// Who explains what, one entry a trained network; added by whoever has the network (see [`mod@super::shares`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<Shares>,
@@ -100,7 +100,7 @@ pub struct Comparison {
 
 impl Comparison {
     /// Notes the floor (see [`super::floor()`]), and in the shares of each network what part of the error it is.
-    pub fn set_floor(&mut self, floor: PerChannel) {
+    pub fn set_floor(&mut self, floor: ChannelValues) {
         self.floor = Some(floor);
         for shares in &mut self.shares {
             if let Some(model) = self.models.iter().find(|model| model.name == shares.name) {
@@ -114,16 +114,40 @@ impl Comparison {
 ///
 /// # Errors
 /// [`Error::Shape`](crate::Error::Shape) if a row has not one prediction a window, or a window lies outside its flight.
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::critique::{Row, compare, finite_difference};
+/// use phyture::flight::split::Part;
+/// use phyture::flight::{Channel, PerChannel, Window};
+/// use phyture::sim::{Simulation, simulate};
+///
+/// let flights = simulate(&Simulation { minutes: 2.0, ..Simulation::baseline() })?.flights;
+/// let windows: Vec<Window> = (10..flights[0].len()).map(|last| Window { flight: 0, last }).collect();
+/// let nothing = Row { name: "nothing".into(), predicted: vec![PerChannel::splat(0.0); windows.len()] };
+/// let difference = finite_difference(&flights, &windows)?;
+/// let found = compare(&flights, &windows, &[nothing, difference], Part::All)?;
+/// for model in &found.models {
+///     println!("{}: {:?} rad/s²", model.name, model.rmse.channels()[Channel::WzDot]);
+/// }
+/// assert_eq!(found.models[1].name, "finite difference");
+/// # Ok(())
+/// # }
+/// ```
 pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part) -> Result<Comparison> {
     let measured = measured(flights, windows)?;
     let groups = Groups::new(flights, windows);
     let derived = windows.iter().any(|window| flights[window.flight].targets == Targets::Derived);
     rows.iter().try_for_each(|row| check_row(row, windows))?;
-    let errors: Vec<Vec<[f64; 6]>> = rows.iter().map(|row| errors(row, &measured)).collect();
+    let errors: Vec<Vec<PerChannel<f64>>> = rows.iter().map(|row| errors(row, &measured)).collect();
     let mut models: Vec<ModelError> =
         rows.iter().zip(&errors).map(|(row, errors)| model_error(row, errors, &measured, &groups)).collect();
     let whole = groups.rows_of(&errors, |_| true);
-    let variances = std::array::from_fn(|channel| Some(variation(&measured, channel)? / measured.len() as f64));
+    let variances = PerChannel::from_fn(|channel| Some(variation(&measured, channel)? / measured.len() as f64));
     let smallest = models.iter().enumerate().filter_map(|(index, model)| Some((index, model.rmse.mean?)));
     if let Some((best, _)) = smallest.min_by(|left, right| left.1.total_cmp(&right.1)) {
         let to = models[best].name.clone();
@@ -167,8 +191,8 @@ pub fn paired(flights: &[Flight], windows: &[Window], one: &Row, other: &Row) ->
 }
 
 /// Measured minus predicted, one entry a window.
-fn errors(row: &Row, measured: &[[f64; 6]]) -> Vec<[f64; 6]> {
-    measured.iter().zip(&row.predicted).map(|(y, p)| std::array::from_fn(|channel| y[channel] - p[channel])).collect()
+fn errors(row: &Row, measured: &[PerChannel<f64>]) -> Vec<PerChannel<f64>> {
+    measured.iter().zip(&row.predicted).map(|(y, p)| PerChannel::from_fn(|channel| y[channel] - p[channel])).collect()
 }
 
 /// To which block, manoeuvre and regime each window belongs.
@@ -191,14 +215,14 @@ impl Groups {
     }
 
     /// Windows and sums of errors of each block, over the windows that are in, for each model.
-    fn rows_of(&self, errors: &[Vec<[f64; 6]>], is_in: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<RowSums>) {
+    fn rows_of(&self, errors: &[Vec<PerChannel<f64>>], is_in: impl Fn(usize) -> bool) -> (Vec<f64>, Vec<RowSums>) {
         let mut counts = vec![0.0; self.blocks.len()];
-        let blank = || vec![[0.0; 6]; self.blocks.len()];
+        let blank = || vec![PerChannel::splat(0.0); self.blocks.len()];
         let mut rows: Vec<RowSums> = errors.iter().map(|_| RowSums { squares: blank(), sizes: blank() }).collect();
         for (window, &block) in self.blocks.of_window.iter().enumerate().filter(|(window, _)| is_in(*window)) {
             counts[block] += 1.0;
             for (sums, errors) in rows.iter_mut().zip(errors) {
-                for (channel, error) in errors[window].iter().enumerate() {
+                for (channel, error) in errors[window].pairs() {
                     sums.squares[block][channel] += error * error;
                     sums.sizes[block][channel] += error.abs();
                 }
@@ -208,9 +232,9 @@ impl Groups {
     }
 
     /// Error over each of `count` parts, `part` naming the part of each window.
-    fn parts(&self, squares: &[[f64; 6]], part: impl Fn(usize) -> usize, count: usize) -> Vec<PartError> {
+    fn parts(&self, squares: &[PerChannel<f64>], part: impl Fn(usize) -> usize, count: usize) -> Vec<PartError> {
         let blocks = self.blocks.len();
-        let mut sums = vec![(0_usize, [0.0; 6]); count * blocks];
+        let mut sums = vec![(0_usize, PerChannel::splat(0.0)); count * blocks];
         for (window, square) in squares.iter().enumerate() {
             let (n, sum) = &mut sums[part(window) * blocks + self.blocks.of_window[window]];
             *n += 1;
@@ -226,25 +250,25 @@ impl Groups {
 }
 
 /// From the number of windows and the sums of squared errors of each block.
-fn part_error(blocks: &[(usize, [f64; 6])]) -> PartError {
-    let means: [Option<BlockMean>; 6] = std::array::from_fn(|channel| {
+fn part_error(blocks: &[(usize, PerChannel<f64>)]) -> PartError {
+    let means: PerChannel<Option<BlockMean>> = PerChannel::from_fn(|channel| {
         BlockMean::new(blocks.iter().map(|(n, sum)| BlockSum { samples: *n as f64, sum: sum[channel] }))
     });
     let n: usize = blocks.iter().map(|(n, _)| n).sum();
-    let means = if n > 1 { means } else { [None; 6] };
+    let means = if n > 1 { means } else { PerChannel::splat(None) };
     PartError {
-        rmse: PerChannel::new(means.map(|mean| Some(mean?.mean.sqrt()))),
+        rmse: ChannelValues::new(means.map(|mean| Some(mean?.mean.sqrt()))),
         rmse_ci95: Intervals::new(means.map(|mean| mean?.root_interval())),
         n,
         blocks: blocks.iter().filter(|(n, _)| *n > 0).count(),
     }
 }
 
-fn model_error(row: &Row, errors: &[[f64; 6]], measured: &[[f64; 6]], groups: &Groups) -> ModelError {
-    let squares: Vec<[f64; 6]> = errors.iter().map(|error| error.map(|value| value * value)).collect();
+fn model_error(row: &Row, errors: &[PerChannel<f64>], measured: &[PerChannel<f64>], groups: &Groups) -> ModelError {
+    let squares: Vec<PerChannel<f64>> = errors.iter().map(|error| error.map(|value| value * value)).collect();
     let whole = groups.parts(&squares, |_| 0, 1).pop().unwrap_or_default();
     let count = errors.len() as f64;
-    let over = |channel: usize, fold: fn(f64, f64) -> f64| {
+    let over = |channel: Channel, fold: fn(f64, f64) -> f64| {
         let values = errors.iter().map(|error| error[channel].abs());
         // A fold with `max` would swallow NaN; the sum does not.
         (!errors.is_empty() && values.clone().sum::<f64>().is_finite()).then(|| values.fold(0.0, fold))
@@ -257,9 +281,9 @@ fn model_error(row: &Row, errors: &[[f64; 6]], measured: &[[f64; 6]], groups: &G
         windows: errors.len(),
         rmse: whole.rmse,
         rmse_ci95: whole.rmse_ci95,
-        mae: PerChannel::new(std::array::from_fn(|channel| over(channel, |sum, value| sum + value).map(|sum| sum / count))),
-        max_abs: PerChannel::new(std::array::from_fn(|channel| over(channel, f64::max))),
-        r2: PerChannel::new(std::array::from_fn(|channel| {
+        mae: ChannelValues::new(PerChannel::from_fn(|channel| over(channel, |sum, value| sum + value).map(|sum| sum / count))),
+        max_abs: ChannelValues::new(PerChannel::from_fn(|channel| over(channel, f64::max))),
+        r2: ChannelValues::new(PerChannel::from_fn(|channel| {
             let residual: f64 = squares.iter().map(|square| square[channel]).sum();
             Some(1.0 - residual / variation(measured, channel)?)
         })),
@@ -312,8 +336,8 @@ pub(super) mod tests {
         found.is_some_and(|found| (found - expected).abs() <= CLOSE * expected.abs().max(1.0))
     }
 
-    fn one_channel(values: &[f64]) -> PerChannel {
-        PerChannel::new([values[0], 0.0, 0.0, 0.0, 0.0, 0.0].map(Some))
+    fn one_channel(values: &[f64]) -> ChannelValues {
+        ChannelValues::new(PerChannel::new([values[0], 0.0, 0.0, 0.0, 0.0, 0.0]).map(Some))
     }
 
     #[test]
@@ -321,7 +345,7 @@ pub(super) mod tests {
         // Measured 1 2 3 4 (mean 2.5, variation 5), predicted 1 1 5 4: errors 0 1 -2 0.
         let flights = flights(|_, sample, _| sample as f64 + 1.0)?;
         let windows: Vec<Window> = (0..4).map(|last| Window { flight: 0, last }).collect();
-        let row = Row { name: "m".into(), predicted: [1.0, 1.0, 5.0, 4.0].map(|value| [value; 6]).to_vec() };
+        let row = Row { name: "m".into(), predicted: [1.0, 1.0, 5.0, 4.0].map(PerChannel::splat).to_vec() };
         let found = compare(&flights, &windows, &[row], Part::All)?;
         let model = &found.models[0];
         assert!(close(model.rmse.vx_dot, (5.0_f64 / 4.0).sqrt()) && close(model.rmse.mean, (5.0_f64 / 4.0).sqrt()));
@@ -335,7 +359,7 @@ pub(super) mod tests {
     fn the_json_has_the_documented_shape() -> Result<()> {
         let flights = flights(|flight, sample, channel| ((flight + sample * 7 + channel) % 5) as f64)?;
         let windows = every_window(&flights);
-        let row = Row { name: "paper".into(), predicted: vec![[0.0; 6]; windows.len()] };
+        let row = Row { name: "paper".into(), predicted: vec![PerChannel::splat(0.0); windows.len()] };
         let found = compare(&flights, &windows, &[row], Part::Locked)?;
         let json = serde_json::to_value(&found).map_err(|error| Error::Undetermined(error.to_string()))?;
         assert_eq!((&json["target"], &json["split"]), (&"recorded".into(), &"locked".into()));
@@ -362,10 +386,10 @@ pub(super) mod tests {
     fn nothing_nan_and_constants_are_null() -> Result<()> {
         let flights = flights(|_, _, _| 0.1)?;
         let empty = compare(&flights, &[], &[Row { name: "m".into(), predicted: vec![] }], Part::All)?;
-        assert_eq!((empty.models[0].rmse, empty.models[0].r2), (PerChannel::default(), PerChannel::default()));
+        assert_eq!((empty.models[0].rmse, empty.models[0].r2), (ChannelValues::default(), ChannelValues::default()));
         let windows = every_window(&flights);
-        let mut predicted = vec![[0.0; 6]; windows.len()];
-        predicted[3][2] = f64::NAN;
+        let mut predicted = vec![PerChannel::splat(0.0); windows.len()];
+        predicted[3][Channel::VzDot] = f64::NAN;
         let found = compare(&flights, &windows, &[Row { name: "m".into(), predicted }], Part::All)?;
         let model = &found.models[0];
         assert_eq!((model.not_finite, model.rmse.vz_dot, model.mae.vz_dot, model.max_abs.vz_dot), (1, None, None, None));
@@ -399,8 +423,8 @@ pub(super) mod tests {
         fn the_measures_hang_together(errors in prop::collection::vec(-5.0..5.0_f64, 200), scale in 0.1..10.0_f64, turn in 0..200_usize) {
             let flights = flights(|flight, sample, _| errors[flight * 100 + sample])?;
             let mut windows = every_window(&flights);
-            let zero = Row { name: "zero".into(), predicted: vec![[0.0; 6]; 200] };
-            let scaled = Row { name: "scaled".into(), predicted: errors.iter().map(|e| [e * (1.0 - scale); 6]).collect() };
+            let zero = Row { name: "zero".into(), predicted: vec![PerChannel::splat(0.0); 200] };
+            let scaled = Row { name: "scaled".into(), predicted: errors.iter().map(|e| PerChannel::splat(e * (1.0 - scale))).collect() };
             let found = compare(&flights, &windows, &[zero.clone(), scaled], Part::All)?;
             let [model, other] = [&found.models[0], &found.models[1]];
             // MAE ≤ RMSE ≤ largest error; errors scaled by s scale the RMSE by s.

@@ -1,8 +1,9 @@
 //! Which of several models is best, and is that more than chance? Differences of errors are paired: every model is judged on the same
 //! blocks of ten seconds, so a hard block is no scatter of the difference. No prediction is made and nothing printed here.
 
-use super::channels::{Intervals, PerChannel};
+use super::channels::{ChannelValues, Intervals};
 use crate::blocks::{BlockMean, BlockSum};
+use crate::flight::{Channel, PerChannel};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -12,7 +13,7 @@ pub struct Difference {
     /// The other model.
     pub to: String,
     /// RMSE of this one less RMSE of the other, m/s² and rad/s².
-    pub rmse: PerChannel,
+    pub rmse: ChannelValues,
     /// 95 % interval.
     pub ci95: Intervals,
 }
@@ -25,9 +26,9 @@ pub type Best = BTreeMap<String, BTreeMap<String, usize>>;
 #[derive(Clone, Debug)]
 pub(super) struct RowSums {
     /// Σ e² by block and channel.
-    pub squares: Vec<[f64; 6]>,
+    pub squares: Vec<PerChannel<f64>>,
     /// Σ |e|.
-    pub sizes: Vec<[f64; 6]>,
+    pub sizes: Vec<PerChannel<f64>>,
 }
 
 /// What is summed over a block for one statistic of one model: a combination of its block sums whose mean over windows changes with the
@@ -46,25 +47,25 @@ enum Measure {
     Rmse,
     Mae,
     /// Σ e² over the variance: one minus R².
-    Unexplained([f64; 6]),
+    Unexplained(PerChannel<f64>),
 }
 
 impl Measure {
     /// Of the mean over some channels.
-    fn of(self, counts: &[f64], sums: &RowSums, channels: &[usize]) -> Statistic {
+    fn of(self, counts: &[f64], sums: &RowSums, channels: &[Channel]) -> Statistic {
         let windows: f64 = counts.iter().sum();
         let share = 1.0 / channels.len() as f64;
         let of_blocks = if self == Self::Mae { &sums.sizes } else { &sums.squares };
-        let mean = |channel: usize| of_blocks.iter().map(|sums| sums[channel]).sum::<f64>() / windows;
+        let mean = |channel: Channel| of_blocks.iter().map(|sums| sums[channel]).sum::<f64>() / windows;
         // A model without any error in a channel has no scatter there either.
-        let weight = |channel: usize| match self {
+        let weight = |channel: Channel| match self {
             Self::Rmse => Some(0.5 / mean(channel).sqrt()).filter(|weight| weight.is_finite()).unwrap_or_default(),
             Self::Mae => 1.0,
             Self::Unexplained(variances) => 1.0 / variances[channel],
         };
-        let weights: Vec<(usize, f64)> = channels.iter().map(|&channel| (channel, share * weight(channel))).collect();
+        let weights: Vec<(Channel, f64)> = channels.iter().map(|&channel| (channel, share * weight(channel))).collect();
         let blocks = of_blocks.iter().map(|sums| weights.iter().map(|&(channel, weight)| weight * sums[channel]).sum()).collect();
-        let value = |channel: usize| match self {
+        let value = |channel: Channel| match self {
             Self::Rmse => mean(channel).sqrt(),
             Self::Mae => mean(channel),
             Self::Unexplained(variances) => mean(channel) / variances[channel],
@@ -93,8 +94,6 @@ impl Statistic {
     }
 }
 
-const ALL: [usize; 6] = [0, 1, 2, 3, 4, 5];
-
 /// The index of the smallest statistic, if every other one's difference to it lies beyond its interval.
 fn clear_best(statistics: &[Statistic], counts: &[f64]) -> Option<usize> {
     let finite = || statistics.iter().enumerate().filter(|(_, statistic)| statistic.value.is_finite());
@@ -108,32 +107,31 @@ fn clear_best(statistics: &[Statistic], counts: &[f64]) -> Option<usize> {
 }
 
 /// A measure for a channel, or for the mean of all; `None` where it cannot be had.
-type Choose<'a> = &'a dyn Fn(Option<usize>) -> Option<Measure>;
+type Choose<'a> = &'a dyn Fn(Option<Channel>) -> Option<Measure>;
 
 /// The best models on some blocks: by measure, by channel. `variances` are those of the measured channels; where one is missing there is no
 /// best R² of the mean.
-pub(super) fn best(counts: &[f64], rows: &[RowSums], variances: &[Option<f64>; 6]) -> Best {
+pub(super) fn best(counts: &[f64], rows: &[RowSums], variances: &PerChannel<Option<f64>>) -> Best {
     let all: Option<Vec<f64>> = variances.iter().copied().collect();
-    let unexplained = |channel: usize| {
-        let mut of = [1.0; 6];
+    let unexplained = |channel: Channel| {
+        let mut of = PerChannel::splat(1.0);
         of[channel] = variances[channel]?;
         Some(Measure::Unexplained(of))
     };
-    let whole = all.and_then(|all| Some(Measure::Unexplained(all.try_into().ok()?)));
+    let whole = all.and_then(|all| Some(Measure::Unexplained(PerChannel::new(all.try_into().ok()?))));
     let measures: [(&str, Choose<'_>); 3] = [
         ("rmse", &|_| Some(Measure::Rmse)),
         ("mae", &|_| Some(Measure::Mae)),
         ("r2", &|channel| channel.map_or(whole, unexplained)),
     ];
     let of_measure = |(name, measure): &(&str, Choose<'_>)| {
-        let column = |channel: Option<usize>| {
+        let column = |channel: Option<Channel>| {
             let measure = measure(channel)?;
-            let channels = channel.map_or(ALL.to_vec(), |channel| vec![channel]);
+            let channels = channel.map_or(Channel::ALL.to_vec(), |channel| vec![channel]);
             let statistics: Vec<Statistic> = rows.iter().map(|row| measure.of(counts, row, &channels)).collect();
             clear_best(&statistics, counts)
         };
-        let names = crate::flight::Column::TARGETS.map(|column| column.name());
-        let channels = names.into_iter().enumerate().map(|(channel, name)| (name, Some(channel))).chain([("mean", None)]);
+        let channels = Channel::ALL.into_iter().map(|channel| (channel.name(), Some(channel))).chain([("mean", None)]);
         let found = channels.filter_map(|(name, channel)| Some((name.to_owned(), column(channel)?))).collect();
         ((*name).to_owned(), found)
     };
@@ -142,20 +140,20 @@ pub(super) fn best(counts: &[f64], rows: &[RowSums], variances: &[Option<f64>; 6
 
 /// The best model by the mean RMSE of the channels.
 pub(super) fn best_mean(counts: &[f64], rows: &[RowSums]) -> Option<usize> {
-    let statistics: Vec<Statistic> = rows.iter().map(|row| Measure::Rmse.of(counts, row, &ALL)).collect();
+    let statistics: Vec<Statistic> = rows.iter().map(|row| Measure::Rmse.of(counts, row, &Channel::ALL)).collect();
     clear_best(&statistics, counts)
 }
 
 /// RMSE of `one` less that of `other`, paired.
 pub(super) fn difference(counts: &[f64], one: &RowSums, other: &RowSums, to: &str) -> Difference {
-    let of = |channels: &[usize]| {
+    let of = |channels: &[Channel]| {
         let (one, other) = (Measure::Rmse.of(counts, one, channels), Measure::Rmse.of(counts, other, channels));
         one.less(&other, counts)
     };
-    let found: [Option<(f64, Option<f64>)>; 6] = std::array::from_fn(|channel| of(&[channel]));
+    let found: PerChannel<Option<(f64, Option<f64>)>> = PerChannel::from_fn(|channel| of(&[channel]));
     let interval = |found: Option<(f64, Option<f64>)>| found.and_then(|(value, half)| Some([value - half?, value + half?]));
-    let mut rmse = PerChannel::new(found.map(|found| Some(found?.0)));
-    let mean = of(&ALL);
+    let mut rmse = ChannelValues::new(found.map(|found| Some(found?.0)));
+    let mean = of(&Channel::ALL);
     rmse.mean = mean.map(|(value, _)| value);
     Difference { to: to.to_owned(), rmse, ci95: Intervals::new(found.map(interval)).with_mean(interval(mean)) }
 }
@@ -172,7 +170,7 @@ mod tests {
     fn row(level: f64, own: f64, seed: u64, blocks: usize) -> RowSums {
         let (shared, other) = (Stream::new(7, 0, 0, 0), Stream::new(seed, 1, 0, 0));
         let of = |block: usize| level * (1.0 + 20.0 * shared.uniform(block as u64).powi(4) + own * other.uniform(block as u64));
-        let squares: Vec<[f64; 6]> = (0..blocks).map(|block| [10.0 * of(block); 6]).collect();
+        let squares: Vec<PerChannel<f64>> = (0..blocks).map(|block| PerChannel::splat(10.0 * of(block))).collect();
         let sizes = squares.iter().map(|square| square.map(f64::sqrt)).collect();
         RowSums { squares, sizes }
     }
@@ -181,7 +179,7 @@ mod tests {
     fn a_small_difference_on_the_same_blocks_is_clear_though_the_errors_scatter() {
         let counts = vec![10.0; 30];
         let rows = [row(1.0, 0.1, 1, 30), row(1.1, 0.1, 2, 30)];
-        let found = best(&counts, &rows, &[Some(9.0); 6]);
+        let found = best(&counts, &rows, &PerChannel::splat(Some(9.0)));
         assert!(["rmse", "mae", "r2"].iter().all(|measure| found[*measure].len() == 7), "{found:?}");
         assert!(found.values().flat_map(BTreeMap::values).all(|index| *index == 0));
         let apart = difference(&counts, &rows[1], &rows[0], "first");
@@ -189,7 +187,7 @@ mod tests {
             apart.ci95.vx_dot.is_some_and(|[low, _]| low > 0.0) && apart.ci95.mean.is_some_and(|[low, _]| low > 0.0),
             "{apart:?}"
         );
-        let rmse = |row: &RowSums| (row.squares.iter().map(|square| square[0]).sum::<f64>() / 300.0).sqrt();
+        let rmse = |row: &RowSums| (row.squares.iter().map(|square| square[Channel::VxDot]).sum::<f64>() / 300.0).sqrt();
         assert!(apart.rmse.vx_dot.is_some_and(|value| (value - (rmse(&rows[1]) - rmse(&rows[0]))).abs() <= CLOSE));
     }
 
@@ -197,10 +195,12 @@ mod tests {
     fn a_difference_within_its_interval_has_no_best() {
         let counts = vec![10.0; 30];
         let rows = [row(1.0, 3.0, 1, 30), row(1.0, 3.0, 2, 30)];
-        assert!(best(&counts, &rows, &[Some(9.0); 6]).values().all(BTreeMap::is_empty));
+        assert!(best(&counts, &rows, &PerChannel::splat(Some(9.0))).values().all(BTreeMap::is_empty));
         assert_eq!(best_mean(&counts, &rows), None);
         // One block, or one model, shows nothing either.
-        assert!(best(&[10.0], &[row(1.0, 0.0, 1, 1), row(9.0, 0.0, 2, 1)], &[None; 6]).values().all(BTreeMap::is_empty));
+        assert!(
+            best(&[10.0], &[row(1.0, 0.0, 1, 1), row(9.0, 0.0, 2, 1)], &PerChannel::splat(None)).values().all(BTreeMap::is_empty)
+        );
         assert_eq!(best_mean(&counts, &rows[..1]), None);
     }
 
@@ -215,8 +215,8 @@ mod tests {
     #[test]
     fn no_error_at_all_and_no_number_are_no_panic() {
         let counts = vec![10.0; 30];
-        let nothing = RowSums { squares: vec![[0.0; 6]; 30], sizes: vec![[0.0; 6]; 30] };
-        let broken = RowSums { squares: vec![[f64::NAN; 6]; 30], sizes: vec![[f64::NAN; 6]; 30] };
+        let nothing = RowSums { squares: vec![PerChannel::splat(0.0); 30], sizes: vec![PerChannel::splat(0.0); 30] };
+        let broken = RowSums { squares: vec![PerChannel::splat(f64::NAN); 30], sizes: vec![PerChannel::splat(f64::NAN); 30] };
         let rows = [nothing, row(1.0, 0.1, 1, 30), broken];
         assert_eq!(best_mean(&counts, &rows), Some(0));
         assert_eq!(difference(&counts, &rows[2], &rows[0], "nothing").rmse.vx_dot, None);

@@ -1,8 +1,8 @@
 //! The floor: what no model can remove of the error, where the explainable part of the flights is known, as it is of simulated ones.
 
-use super::channels::PerChannel;
+use super::channels::ChannelValues;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Span, Window};
+use crate::flight::{Column, Flight, PerChannel, Span, Window};
 
 /// Root mean square of what was recorded less what is explainable, at the last row of each window: m/s², rad/s².
 ///
@@ -11,9 +11,9 @@ use crate::flight::{Column, Flight, Span, Window};
 ///
 /// # Errors
 /// [`Error::Log`] naming a flight whose explainable part is missing or of another length.
-pub fn floor(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> Result<PerChannel> {
+pub fn floor(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> Result<ChannelValues> {
     let partners = partners(flights, windows, explainable)?;
-    let mut squares = [0.0; 6];
+    let mut squares = PerChannel::splat(0.0);
     for window in windows {
         let (log, calm) = (&flights[window.flight], partners[window.flight]);
         for (sum, column) in squares.iter_mut().zip(Column::TARGETS) {
@@ -21,14 +21,14 @@ pub fn floor(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> 
             *sum += calm.map_or(f64::NAN, |calm| log.column(column)[window.last] - calm.column(column)[window.last]).powi(2);
         }
     }
-    Ok(PerChannel::new(squares.map(|sum| (!windows.is_empty()).then(|| (sum / windows.len() as f64).sqrt()))))
+    Ok(ChannelValues::new(squares.map(|sum| (!windows.is_empty()).then(|| (sum / windows.len() as f64).sqrt()))))
 }
 
 /// The same over every sample of the spans.
 ///
 /// # Errors
 /// As [`floor()`].
-pub fn floor_of_spans(flights: &[Flight], spans: &[Span], explainable: &[Flight]) -> Result<PerChannel> {
+pub fn floor_of_spans(flights: &[Flight], spans: &[Span], explainable: &[Flight]) -> Result<ChannelValues> {
     let length = |span: &Span| flights.get(span.flight).map_or(0, Flight::len);
     let samples = |span: &Span| {
         let flight = span.flight;

@@ -6,7 +6,7 @@
 use super::predictions::{Row, check_row, measured, variation};
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;
-use crate::flight::{Column, Flight, Span, Window};
+use crate::flight::{Channel, Column, Flight, PerChannel, Span, Window};
 use serde::Serialize;
 use std::ops::Range;
 
@@ -47,18 +47,18 @@ pub struct Traced {
 /// # Errors
 /// [`crate::Error::Shape`] if the row has not one prediction a window, or a window lies outside its flight.
 pub fn stretches(flights: &[Flight], windows: &[Window], row: &Row) -> Result<Option<Stretches>> {
-    stretches_in(flights, windows, row, [true; 6])
+    stretches_in(flights, windows, row, PerChannel::splat(true))
 }
 
 /// As [`stretches`], by the error of some channels alone.
 ///
 /// # Errors
 /// As [`stretches`].
-pub fn stretches_in(flights: &[Flight], windows: &[Window], row: &Row, channels: [bool; 6]) -> Result<Option<Stretches>> {
+pub fn stretches_in(flights: &[Flight], windows: &[Window], row: &Row, channels: PerChannel<bool>) -> Result<Option<Stretches>> {
     check_row(row, windows)?;
     let measured = measured(flights, windows)?;
-    let of = |channel: usize| Some(variation(&measured, channel).filter(|_| channels[channel])? / measured.len() as f64);
-    let scale: [Option<f64>; 6] = std::array::from_fn(of);
+    let of = |channel: Channel| Some(variation(&measured, channel).filter(|_| channels[channel])? / measured.len() as f64);
+    let scale: PerChannel<Option<f64>> = PerChannel::from_fn(of);
     let channels = scale.iter().flatten().count() as f64;
     let blocks = Blocks::new(flights, windows);
     let mut sums = vec![BlockSum::default(); blocks.len()];
@@ -186,15 +186,16 @@ pub fn dependences(
     windows: &[Window],
     row: &Row,
     variables: &[Variable],
-) -> Result<Vec<(Variable, [Dependence; 6])>> {
+) -> Result<Vec<(Variable, PerChannel<Dependence>)>> {
     check_row(row, windows)?;
     let measured = measured(flights, windows)?;
     let blocks = Blocks::new(flights, windows);
-    let residuals: Vec<Option<[f64; 6]>> = measured
+    let residuals: Vec<Option<PerChannel<f64>>> = measured
         .iter()
         .zip(&row.predicted)
         .map(|(y, p)| {
-            Some(std::array::from_fn(|channel| y[channel] - p[channel])).filter(|r: &[f64; 6]| r.iter().all(|r| r.is_finite()))
+            Some(PerChannel::from_fn(|channel| y[channel] - p[channel]))
+                .filter(|r: &PerChannel<f64>| r.iter().all(|r| r.is_finite()))
         })
         .collect();
     let of = |variable: &Variable| {
@@ -207,7 +208,7 @@ pub fn dependences(
 }
 
 /// Bins residuals that come with a variable and the number of their block.
-fn bin(used: &[(f64, usize, [f64; 6])], blocks: usize) -> Option<[Dependence; 6]> {
+fn bin(used: &[(f64, usize, PerChannel<f64>)], blocks: usize) -> Option<PerChannel<Dependence>> {
     let mut values: Vec<f64> = used.iter().map(|(value, ..)| *value).collect();
     let last = values.len().saturating_sub(1);
     let mut quantile = |share: f64| {
@@ -218,7 +219,7 @@ fn bin(used: &[(f64, usize, [f64; 6])], blocks: usize) -> Option<[Dependence; 6]
     if high <= low {
         return None;
     }
-    let mut cells = vec![(BlockSum::default(), [0.0; 6]); BINS * blocks];
+    let mut cells = vec![(BlockSum::default(), PerChannel::splat(0.0)); BINS * blocks];
     for (value, block, residual) in used {
         let bin = ((value - low) / (high - low) * BINS as f64).clamp(0.0, BINS as f64 - 1.0) as usize;
         let (of_variable, sums) = &mut cells[bin * blocks + block];
@@ -226,7 +227,7 @@ fn bin(used: &[(f64, usize, [f64; 6])], blocks: usize) -> Option<[Dependence; 6]
         of_variable.sum += value;
         sums.iter_mut().zip(residual).for_each(|(sum, value)| *sum += value);
     }
-    Some(std::array::from_fn(|channel| {
+    Some(PerChannel::from_fn(|channel| {
         let bins = cells.chunks_exact(blocks).filter_map(|cells| {
             let at = BlockMean::new(cells.iter().map(|(sum, _)| *sum))?.mean;
             let mean = BlockMean::new(cells.iter().map(|(of, sums)| BlockSum { samples: of.samples, sum: sums[channel] }))?;
@@ -258,7 +259,7 @@ mod tests {
     const CLOSE: f64 = Tolerance::Close.relative_f64();
 
     fn zero(windows: &[Window]) -> Row {
-        Row { name: "zero".into(), predicted: vec![[0.0; 6]; windows.len()] }
+        Row { name: "zero".into(), predicted: vec![PerChannel::splat(0.0); windows.len()] }
     }
 
     #[test]
@@ -285,7 +286,8 @@ mod tests {
         let variables = [Column::Roll, Column::Vx].map(Variable::Column);
         let found = dependences(&flights, &windows, &zero(&windows), &variables)?;
         // Roll does not vary and is left out.
-        let [(Variable::Column(Column::Vx), [vx_dot, vy_dot, ..])] = found.as_slice() else { panic!("only vx varies") };
+        let [(Variable::Column(Column::Vx), of)] = found.as_slice() else { panic!("only vx varies") };
+        let [vx_dot, vy_dot, ..] = of.values();
         assert_eq!(vx_dot.bins.iter().map(|bin| bin.n).sum::<usize>(), 200);
         assert!(vx_dot.bins.iter().filter(|bin| bin.at < 4.5).all(|bin| bin.mean == 0.0), "{vx_dot:?}");
         assert!(vx_dot.bins.iter().filter(|bin| bin.at > 5.5).all(|bin| (bin.mean - 2.0).abs() <= CLOSE), "{vx_dot:?}");
@@ -302,7 +304,7 @@ mod tests {
         assert_eq!(Variable::Height.value(&flights[0], 3), None);
         let windows = every_window(&flights);
         let found = dependences(&flights, &windows, &zero(&windows), &[Variable::Airspeed])?;
-        assert!(matches!(found.as_slice(), [(Variable::Airspeed, of)] if of[0].share == 0.0));
+        assert!(matches!(found.as_slice(), [(Variable::Airspeed, of)] if of[Channel::VxDot].share == 0.0));
         Ok(())
     }
 
@@ -315,10 +317,10 @@ mod tests {
             let windows = every_window(&flights);
             let found = dependences(&flights, &windows, &zero(&windows), &[Variable::Airspeed])?;
             let [(_, found)] = found.as_slice() else { return Err(TestCaseError::fail("speed varies")) };
-            let pooled: f64 = found[3].bins.iter().map(|bin| bin.n as f64 * bin.mean).sum();
+            let pooled: f64 = found[Channel::WxDot].bins.iter().map(|bin| bin.n as f64 * bin.mean).sum();
             prop_assert!((pooled - residuals.iter().sum::<f64>()).abs() <= CLOSE * 600.0);
             prop_assert!(found.iter().all(|found| (0.0..=1.0).contains(&found.share)));
-            prop_assert!(found[0].bins.windows(2).all(|pair| pair[0].at < pair[1].at));
+            prop_assert!(found[Channel::VxDot].bins.windows(2).all(|pair| pair[0].at < pair[1].at));
         }
     }
 }

@@ -21,7 +21,7 @@ pub mod unknown;
 pub mod wrap;
 pub mod yardstick;
 
-pub use channels::{Intervals, PerChannel};
+pub use channels::{ChannelValues, Intervals};
 pub use compare::{Comparison, ModelError, PartError, compare, paired};
 pub use contest::{Best, Difference};
 pub use floor::{floor, floor_of_spans};

@@ -1,26 +1,26 @@
 //! Predictions at the ends of windows, and what was measured there. Errors are made of them in `compare`.
 
-use super::channels::PerChannel;
+use super::channels::ChannelValues;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Channel, Flight, PerChannel, Window};
 
 /// The predictions of one model.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// Name of the model.
     pub name: String,
-    /// Predicted accelerations in the order of [`Column::TARGETS`], one entry a window, in the order of the windows.
-    pub predicted: Vec<[f64; 6]>,
+    /// Predicted accelerations in the order of [`Channel::ALL`](crate::flight::Channel::ALL), one entry a window, in the order of the windows.
+    pub predicted: Vec<PerChannel<f64>>,
 }
 
 /// The measured accelerations at the last row of each window, in the order of [`Column::TARGETS`].
 ///
 /// # Errors
 /// [`Error::Shape`] if a window lies outside its flight.
-pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f64; 6]>> {
+pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<PerChannel<f64>>> {
     let target = |window: &Window| {
         let flight = flights.get(window.flight)?;
-        (window.last < flight.len()).then(|| Column::TARGETS.map(|column| flight.column(column)[window.last]))
+        (window.last < flight.len()).then(|| PerChannel::from_fn(|channel| flight.column(channel.column())[window.last]))
     };
     let fault = |window: &Window| Error::Shape {
         operation: "compare",
@@ -34,10 +34,10 @@ pub(super) fn measured(flights: &[Flight], windows: &[Window]) -> Result<Vec<[f6
 ///
 /// # Errors
 /// [`Error::Shape`] if a window lies outside its flight.
-pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<PerChannel> {
+pub fn deviation(flights: &[Flight], windows: &[Window]) -> Result<ChannelValues> {
     let measured = measured(flights, windows)?;
     let one = |channel| Some((variation(&measured, channel)? / measured.len() as f64).sqrt());
-    Ok(PerChannel::new(std::array::from_fn(one)))
+    Ok(ChannelValues::new(PerChannel::from_fn(one)))
 }
 
 /// Refuses a row that has not one prediction a window.
@@ -51,7 +51,7 @@ pub(super) fn check_row(row: &Row, windows: &[Window]) -> Result<()> {
 }
 
 /// Σ (y − ȳ)² of one channel; `None` if the channel is constant up to rounding, or there is nothing.
-pub(super) fn variation(measured: &[[f64; 6]], channel: usize) -> Option<f64> {
+pub(super) fn variation(measured: &[PerChannel<f64>], channel: Channel) -> Option<f64> {
     let count = measured.len() as f64;
     let mean = measured.iter().map(|y| y[channel]).sum::<f64>() / count;
     let total: f64 = measured.iter().map(|y| (y[channel] - mean).powi(2)).sum();

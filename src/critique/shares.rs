@@ -9,13 +9,13 @@
 //! gusts, and physics that the network did not learn: it bounds the noise from above and is not the noise.
 
 use super::Row;
-use super::channels::PerChannel;
+use super::channels::ChannelValues;
 use super::digits::{aligned, significant};
 use super::predictions::{check_row, measured, variation};
 use super::wrap::wrapped;
 use crate::blocks::{BlockMean, BlockSum, Blocks, FEW_BLOCKS};
 use crate::error::Result;
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Channel, Column, Flight, PerChannel, Window};
 use crate::hybrid::Stages;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -136,7 +136,7 @@ pub struct Judged<'a> {
 pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, judged: &Judged<'_>) -> Result<Shares> {
     let measured = measured(flights, windows)?;
     let blocks = Blocks::new(flights, windows);
-    let row = |predicted: &[[f64; 6]]| Row { name: judged.name.to_owned(), predicted: predicted.to_vec() };
+    let row = |predicted: &[PerChannel<f64>]| Row { name: judged.name.to_owned(), predicted: predicted.to_vec() };
     let sums = |row: Row| {
         check_row(&row, windows)?;
         Ok::<_, crate::Error>(block_sums(&measured, &row.predicted, &blocks))
@@ -145,17 +145,17 @@ pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, j
         Some(reference) => sums(reference.clone())?,
         None => {
             let count = measured.len().max(1) as f64;
-            let mean = std::array::from_fn(|channel| measured.iter().map(|y| y[channel]).sum::<f64>() / count);
+            let mean = PerChannel::from_fn(|channel| measured.iter().map(|y| y[channel]).sum::<f64>() / count);
             block_sums(&measured, &vec![mean; measured.len()], &blocks)
         }
     };
     let model = sums(row(&judged.stages.physics))?;
     let hybrid = sums(row(&judged.stages.hybrid))?;
     let linear = judged.stages.with_linear.as_ref().map(|predicted| sums(row(predicted))).transpose()?;
-    let weights: [Option<f64>; 6] =
-        std::array::from_fn(|channel| variation(&measured, channel).map(|total| measured.len() as f64 / total));
-    let of = |from: &[[f64; 6]], to: &[[f64; 6]]| share_of(from, to, &of_reference, &weights);
-    let left = |by: &[[f64; 6]]| share_left(by, &of_reference, &weights);
+    let weights: PerChannel<Option<f64>> =
+        PerChannel::from_fn(|channel| variation(&measured, channel).map(|total| measured.len() as f64 / total));
+    let of = |from: &[PerChannel<f64>], to: &[PerChannel<f64>]| share_of(from, to, &of_reference, &weights);
+    let left = |by: &[PerChannel<f64>]| share_left(by, &of_reference, &weights);
     Ok(Shares {
         name: judged.name.to_owned(),
         model: judged.model.to_owned(),
@@ -170,8 +170,8 @@ pub fn shares(flights: &[Flight], windows: &[Window], reference: Option<&Row>, j
 }
 
 /// Σ (y − ŷ)² of each block and channel.
-fn block_sums(measured: &[[f64; 6]], predicted: &[[f64; 6]], blocks: &Blocks) -> Vec<[f64; 6]> {
-    let mut sums = vec![[0.0; 6]; blocks.len()];
+fn block_sums(measured: &[PerChannel<f64>], predicted: &[PerChannel<f64>], blocks: &Blocks) -> Vec<PerChannel<f64>> {
+    let mut sums = vec![PerChannel::splat(0.0); blocks.len()];
     for ((y, p), block) in measured.iter().zip(predicted).zip(&blocks.of_window) {
         for (sum, (y, p)) in sums[*block].iter_mut().zip(y.iter().zip(p)) {
             *sum += (y - p).powi(2);
@@ -181,24 +181,29 @@ fn block_sums(measured: &[[f64; 6]], predicted: &[[f64; 6]], blocks: &Blocks) ->
 }
 
 /// Σ (from − to) / Σ reference of each channel, and of all with `weights`.
-fn share_of(from: &[[f64; 6]], to: &[[f64; 6]], reference: &[[f64; 6]], weights: &[Option<f64>; 6]) -> ShareOf {
-    let changes: Vec<[f64; 6]> = from.iter().zip(to).map(|(from, to)| std::array::from_fn(|c| from[c] - to[c])).collect();
+fn share_of(
+    from: &[PerChannel<f64>],
+    to: &[PerChannel<f64>],
+    reference: &[PerChannel<f64>],
+    weights: &PerChannel<Option<f64>>,
+) -> ShareOf {
+    let changes: Vec<PerChannel<f64>> = from.iter().zip(to).map(|(from, to)| PerChannel::from_fn(|c| from[c] - to[c])).collect();
     ratios(&changes, reference, weights, BlockMean::interval)
 }
 
 /// Σ left / Σ reference of each channel, and of all with `weights`: never negative, nor is its interval.
-fn share_left(left: &[[f64; 6]], reference: &[[f64; 6]], weights: &[Option<f64>; 6]) -> ShareOf {
+fn share_left(left: &[PerChannel<f64>], reference: &[PerChannel<f64>], weights: &PerChannel<Option<f64>>) -> ShareOf {
     ratios(left, reference, weights, BlockMean::positive_interval)
 }
 
 /// Sums over sums, block by block.
 fn ratios(
-    parts: &[[f64; 6]],
-    reference: &[[f64; 6]],
-    weights: &[Option<f64>; 6],
+    parts: &[PerChannel<f64>],
+    reference: &[PerChannel<f64>],
+    weights: &PerChannel<Option<f64>>,
     interval: fn(&BlockMean) -> Option<[f64; 2]>,
 ) -> ShareOf {
-    let ratio = |value: &dyn Fn(&[f64; 6]) -> f64| {
+    let ratio = |value: &dyn Fn(&PerChannel<f64>) -> f64| {
         let sums: Vec<BlockSum> = (parts.iter().zip(reference))
             .map(|(part, reference)| BlockSum { samples: value(reference), sum: value(part) })
             .collect();
@@ -209,7 +214,7 @@ fn ratios(
     ShareOf::new(std::array::from_fn(|index| match (index, &known) {
         (6, None) => None,
         (6, Some(weights)) => ratio(&|sums| sums.iter().zip(weights).map(|(sum, weight)| sum * weight).sum()),
-        (channel, _) => ratio(&|sums| sums[channel]),
+        (channel, _) => ratio(&|sums| sums.values()[channel]),
     }))
 }
 
@@ -230,10 +235,11 @@ impl Shares {
 
     /// Notes the share of the floor, MSE_floor / MSE_ref = neither · (RMSE_floor / RMSE_hybrid)², from root mean square errors over the
     /// windows of the shares. It has no interval, and none for all channels together.
-    pub(super) fn set_floor(&mut self, hybrid: &PerChannel, floor: &PerChannel) {
+    pub(super) fn set_floor(&mut self, hybrid: &ChannelValues, floor: &ChannelValues) {
         let all = self.neither.all();
         self.floor = Some(ShareOf::new(std::array::from_fn(|index| {
-            let (hybrid, floor) = (hybrid.channels().get(index).copied()??, floor.channels().get(index).copied()??);
+            let channel = Channel::from_index(index)?;
+            let (hybrid, floor) = (hybrid.channels()[channel]?, floor.channels()[channel]?);
             let ratio = Some((floor / hybrid).powi(2)).filter(|ratio| ratio.is_finite())?;
             Some(Share { share: all[index]?.share * ratio, ci95: None })
         })));
@@ -324,8 +330,8 @@ mod tests {
     }
 
     /// Predictions that miss by `error(window, channel)`.
-    fn missing(measured: &[[f64; 6]], error: impl Fn(usize, usize) -> f64) -> Vec<[f64; 6]> {
-        let one = |(window, y): (usize, &[f64; 6])| std::array::from_fn(|channel| y[channel] - error(window, channel));
+    fn missing(measured: &[PerChannel<f64>], error: impl Fn(usize, Channel) -> f64) -> Vec<PerChannel<f64>> {
+        let one = |(window, y): (usize, &PerChannel<f64>)| PerChannel::from_fn(|channel| y[channel] - error(window, channel));
         measured.iter().enumerate().map(one).collect()
     }
 
@@ -352,7 +358,7 @@ mod tests {
         }
         assert_eq!((found.reference.as_str(), found.blocks), ("base", 10));
         // Without a reference: of the variance. A model that predicts the mean explains nothing, a perfect one everything.
-        let mean: [f64; 6] = std::array::from_fn(|channel| measured.iter().map(|y| y[channel]).sum::<f64>() / 200.0);
+        let mean: PerChannel<f64> = PerChannel::from_fn(|channel| measured.iter().map(|y| y[channel]).sum::<f64>() / 200.0);
         let found = of(&flights, None, &Stages { physics: vec![mean; 200], with_linear: None, hybrid: measured.clone() })?;
         assert!(close(found.physics.mean, 0.0) && close(found.network.wz_dot, 1.0) && found.of_network.is_none());
         assert_eq!(found.reference, MEAN);
@@ -382,7 +388,7 @@ mod tests {
         let constant = flights(|_, sample, channel| if channel == 2 { 0.1 } else { (sample % 5) as f64 })?;
         let measured = measured(&constant, &every_window(&constant))?;
         let mut hybrid = missing(&measured, |_, _| 0.5);
-        hybrid[7][0] = f64::NAN;
+        hybrid[7][Channel::VxDot] = f64::NAN;
         let stages = Stages { physics: missing(&measured, |_, _| 1.0), with_linear: None, hybrid };
         let found = of(&constant, None, &stages)?;
         assert!(found.network.vx_dot.is_none() && found.physics.vx_dot.is_some() && found.network.mean.is_none());
@@ -403,9 +409,9 @@ mod tests {
         let reference = Row { name: "base".into(), predicted: by(4.0) };
         let mut found = of(&flights, Some(&reference), &stages)?;
         assert!(!found.to_string().contains("floor"));
-        let mut floor = [Some(0.5); 6];
-        floor[5] = None;
-        found.set_floor(&PerChannel::new([Some(1.0); 6]), &PerChannel::new(floor));
+        let mut floor = PerChannel::splat(Some(0.5));
+        floor[Channel::WzDot] = None;
+        found.set_floor(&ChannelValues::new(PerChannel::splat(Some(1.0))), &ChannelValues::new(floor));
         // (0.5 / 4)², where the hybrid leaves (1 / 4)².
         let shares = found.floor.map(|floor| floor.all()).unwrap_or_default();
         assert!(close(found.neither.vx_dot, 1.0 / 16.0) && close(shares[0], 1.0 / 64.0) && close(shares[4], 1.0 / 64.0));
@@ -423,7 +429,7 @@ mod tests {
         fn shares_add_up_to_one_and_lie_in_their_intervals(errors in prop::collection::vec(prop::array::uniform4(0.01..3.0_f64), 200)) {
             let flights = flights(|flight, sample, channel| ((flight * 3 + sample * 7 + channel) % 13) as f64)?;
             let measured = measured(&flights, &every_window(&flights))?;
-            let by = |which: usize| missing(&measured, |window, channel| errors[window][which] * (1.0 + channel as f64));
+            let by = |which: usize| missing(&measured, |window, channel| errors[window][which] * (1.0 + channel.index() as f64));
             let reference = Row { name: "base".into(), predicted: by(0) };
             let stages = Stages { physics: by(1), with_linear: Some(by(2)), hybrid: by(3) };
             for reference in [None, Some(&reference)] {
@@ -457,12 +463,12 @@ mod tests {
                     // Parts left: uniform on 0 … 0.8 and, for the hybrid, on a quarter to three quarters of that; 0.4 and 0.2.
                     let model = reference * 0.8 * stream.uniform(3 * index + 1);
                     let hybrid = model * (0.25 + 0.5 * stream.uniform(3 * index + 2));
-                    [reference, model, hybrid].map(|value| [value; 6])
+                    [reference, model, hybrid].map(PerChannel::splat)
                 };
-                let all: Vec<[[f64; 6]; 3]> = (0..blocks).map(block).collect();
+                let all: Vec<[PerChannel<f64>; 3]> = (0..blocks).map(block).collect();
                 let [reference, model, hybrid] =
                     std::array::from_fn(|which| all.iter().map(|block| block[which]).collect::<Vec<_>>());
-                let weights = [Some(1.0); 6];
+                let weights = PerChannel::splat(Some(1.0));
                 let physics = share_left(&model, &reference, &weights).rest();
                 let found = [physics, share_of(&model, &hybrid, &reference, &weights), share_left(&hybrid, &reference, &weights)];
                 for ((count, found), truth) in covered.iter_mut().zip(found).zip([0.6, 0.2, 0.2]) {

@@ -2,7 +2,7 @@
 //!
 //! Only layout; every number comes from [`Comparison`].
 
-use super::channels::PerChannel;
+use super::channels::ChannelValues;
 use super::compare::{Comparison, ModelError, PartError};
 use super::digits::{Kind, significant};
 use super::regime::Regime;
@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// A measure with its title and where to find it.
-type Measure = (&'static str, &'static str, Kind, fn(&ModelError) -> PerChannel);
+type Measure = (&'static str, &'static str, Kind, fn(&ModelError) -> ChannelValues);
 
 /// The four measures in the order in which they are shown: short title, explanation, kind, value.
 pub const MEASURES: [Measure; 4] = [
@@ -305,6 +305,7 @@ mod tests {
     use crate::critique::compare::tests::{every_window, flights};
     use crate::critique::{Row, compare};
     use crate::error::Result;
+    use crate::flight::PerChannel;
     use proptest::prelude::*;
 
     #[test]
@@ -319,7 +320,7 @@ mod tests {
     fn the_table_names_units_and_marks_the_best() -> Result<()> {
         let flights = flights(|_, sample, _| (sample % 7) as f64)?;
         let windows = every_window(&flights);
-        let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![[value; 6]; windows.len()] };
+        let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![PerChannel::splat(value); windows.len()] };
         let text = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Part::All)?.to_string();
         assert!(text.starts_with("200 windows of all flights, those used for fitting included, every sample"), "{text}");
         assert!(text.contains("rad/s²") && text.contains("RMSE by manoeuvre") && text.contains("forward"), "{text}");
@@ -340,7 +341,7 @@ mod tests {
         // Which of the two is better changes from block to block (20 samples each).
         let flights = flights(|flight, sample, _| if (sample / 20 + flight) % 2 == 0 { 1.0 } else { -1.0 })?;
         let windows = every_window(&flights);
-        let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![[value; 6]; windows.len()] };
+        let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![PerChannel::splat(value); windows.len()] };
         let rows = [row("up", 0.5), row("down", -0.52)];
         let found = compare(&flights, &windows, &rows, Part::Test)?;
         let text = found.to_string();
@@ -350,7 +351,7 @@ mod tests {
         let few: Vec<_> = windows.iter().copied().filter(|window| window.flight == 0 || window.last == 7).collect();
         let short = |row: &Row| Row { predicted: vec![row.predicted[0]; few.len()], ..row.clone() };
         let found = compare(&flights, &few, &[short(&rows[0]), short(&rows[1])], Part::Test)?;
-        assert_eq!(found.models[0].by_manoeuvre["b"].rmse, PerChannel::default());
+        assert_eq!(found.models[0].by_manoeuvre["b"].rmse, ChannelValues::default());
         let text = found.to_string();
         let line = text.lines().find(|line| line.trim_start().starts_with("b "));
         assert!(line.is_some_and(|line| line.matches('–').count() == 2), "{text}");
@@ -363,7 +364,7 @@ mod tests {
         let windows: Vec<_> = every_window(&flights).into_iter().take(12).collect();
         let row = |number: usize| Row {
             name: format!("a model with a very long name, number {number}"),
-            predicted: vec![[number as f64 * 1234.5; 6]; windows.len()],
+            predicted: vec![PerChannel::splat(number as f64 * 1234.5); windows.len()],
         };
         let rows: Vec<Row> = (1..8).map(row).collect();
         let mut found = compare(&flights, &windows, &rows, Part::All)?;

@@ -4,10 +4,10 @@
 //! Totals use the correlations that the model keeps: where two coefficients are known well only together (thrust and its bias at a nearly
 //! constant collective), both move the prediction far and their sum does not. The uncertainty of the network's own weights is no part of it.
 
-use super::channels::PerChannel;
+use super::channels::ChannelValues;
 use super::digits::{Kind, aligned};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Column, Flight, PerChannel, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::sensitivity::{HALF_WIDTH, Movement};
 use crate::tape::Threads;
@@ -50,10 +50,10 @@ pub struct OfCoefficient {
     pub ci95: [f64; 2],
     /// Root mean square over the windows of the change of the hybrid's prediction when the coefficient moves by half the width of
     /// its interval, to first order; m/s² and rad/s².
-    pub movement: PerChannel,
+    pub movement: ChannelValues,
     /// The same of the model alone. Where it is larger, the network makes up for a wrong coefficient; where it is smaller, the
     /// network amplifies it or carries it into another channel.
-    pub movement_of_physics: PerChannel,
+    pub movement_of_physics: ChannelValues,
 }
 
 /// What the coefficients of one network's model do to its predictions.
@@ -74,14 +74,14 @@ pub struct Uncertainty {
     pub without_interval: Vec<String>,
     /// Standard deviation of the hybrid's prediction by reverse mode, root mean square over the windows of √(Σ m_i r_ij m_j) / 1.96 with
     /// movements m and correlations r; m/s² and rad/s².
-    pub sd: PerChannel,
+    pub sd: ChannelValues,
     /// The same of the model alone.
-    pub sd_of_physics: PerChannel,
+    pub sd_of_physics: ChannelValues,
     /// Standard deviation over hybrids with coefficients drawn anew, root mean square over the windows. It differs from `sd` by
     /// what is not linear, and by chance: about 13 % with 30 draws.
-    pub sd_resampled: PerChannel,
+    pub sd_resampled: ChannelValues,
     /// `sd` over the RMSE of the hybrid on the same windows.
-    pub share_of_rmse: PerChannel,
+    pub share_of_rmse: ChannelValues,
 }
 
 /// How far the hybrid's predictions at the windows move with the coefficients of its model.
@@ -111,17 +111,17 @@ pub fn uncertainty(
     };
     let errors = hybrid.predict(flights, &windows, threads)?;
     let errors = windows.iter().zip(errors).map(|(window, predicted)| {
-        std::array::from_fn(|channel| flights[window.flight].column(Column::TARGETS[channel])[window.last] - predicted[channel])
+        PerChannel::from_fn(|channel| flights[window.flight].column(channel.column())[window.last] - predicted[channel])
     });
     let rmse = root_mean_square(errors);
-    let of = |pick: fn(&Movement) -> [f64; 6]| -> Vec<[f64; 6]> {
+    let of = |pick: fn(&Movement) -> PerChannel<f64>| -> Vec<PerChannel<f64>> {
         movements.iter().map(|of_windows| root_mean_square(of_windows.iter().map(pick))).collect()
     };
     let (whole, physics) = (of(|movement| movement.hybrid), of(|movement| movement.physics));
     let correlations = hybrid.correlations(&estimates);
-    let total = |pick: fn(&Movement) -> [f64; 6]| -> [f64; 6] {
+    let total = |pick: fn(&Movement) -> PerChannel<f64>| -> PerChannel<f64> {
         root_mean_square((0..windows.len()).map(|window| {
-            std::array::from_fn(|channel| {
+            PerChannel::from_fn(|channel| {
                 let moved = DVector::from_fn(estimates.len(), |one, _| pick(&movements[one][window])[channel]);
                 // Rounded correlations may take a little too much away.
                 moved.dot(&(&correlations * &moved)).max(0.0).sqrt() / HALF_WIDTH
@@ -154,11 +154,11 @@ pub fn uncertainty(
         sd: per_channel(sd),
         sd_of_physics: per_channel(total(|movement| movement.physics)),
         sd_resampled: if resampled.is_empty() {
-            PerChannel::default()
+            ChannelValues::default()
         } else {
             per_channel(root_mean_square(resampled.into_iter()))
         },
-        share_of_rmse: per_channel(std::array::from_fn(|channel| sd[channel] / rmse[channel])),
+        share_of_rmse: per_channel(PerChannel::from_fn(|channel| sd[channel] / rmse[channel])),
     })
 }
 
@@ -168,13 +168,13 @@ fn evenly(windows: &[Window], most: usize) -> Vec<Window> {
     (0..count).filter_map(|index| windows.get(index * windows.len() / count).copied()).collect()
 }
 
-fn per_channel(values: [f64; 6]) -> PerChannel {
-    PerChannel::new(values.map(Some))
+fn per_channel(values: PerChannel<f64>) -> ChannelValues {
+    ChannelValues::new(values.map(Some))
 }
 
 /// √(Σ x² / n) of each channel.
-fn root_mean_square(values: impl Iterator<Item = [f64; 6]>) -> [f64; 6] {
-    let (mut sums, mut count) = ([0.0; 6], 0.0);
+fn root_mean_square(values: impl Iterator<Item = PerChannel<f64>>) -> PerChannel<f64> {
+    let (mut sums, mut count) = (PerChannel::splat(0.0), 0.0);
     for value in values {
         sums.iter_mut().zip(value).for_each(|(sum, value)| *sum += value * value);
         count += 1.0;
@@ -184,7 +184,7 @@ fn root_mean_square(values: impl Iterator<Item = [f64; 6]>) -> [f64; 6] {
 
 impl Uncertainty {
     /// The totals as rows: name, values, and whether they are a share.
-    pub fn totals(&self) -> Vec<(String, PerChannel, Kind)> {
+    pub fn totals(&self) -> Vec<(String, ChannelValues, Kind)> {
         let mut rows = vec![("all, standard deviation".to_owned(), self.sd, Kind::Error)];
         if self.draws > 0 {
             rows.push((format!("the same from {} draws", self.draws), self.sd_resampled, Kind::Error));
@@ -208,7 +208,7 @@ impl Uncertainty {
 /// Coefficient × channel, totals below.
 impl fmt::Display for Uncertainty {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let cells = |of: &PerChannel, kind: Kind| of.channels().map(|value| kind.text(value)).to_vec();
+        let cells = |of: &ChannelValues, kind: Kind| of.channels().into_iter().map(|value| kind.text(value)).collect();
         let own = self.coefficients.iter().map(|one| (format!("{}.{}", one.effect, one.name), cells(&one.movement, Kind::Error)));
         let totals = self.totals().into_iter().map(|(name, of, kind)| (name, cells(&of, kind)));
         writeln!(f, "Movement of `{}` when a coefficient moves by half its 95 % interval, root mean square", self.name)?;

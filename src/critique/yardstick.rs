@@ -6,11 +6,11 @@
 
 use super::Row;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Column, Flight, PerChannel, Window};
 use crate::hybrid::linear::{Linear, LinearConfig, Signals};
 
 /// v and ω, whose differences are the targets in the order of [`Column::TARGETS`].
-const VELOCITIES: [Column; 6] = [Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
+const VELOCITIES: PerChannel<Column> = PerChannel::new([Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz]);
 
 /// Causal backward difference (v_t − v_{t−1})/step of v and ω at the last row of each window: m/s², rad/s².
 ///
@@ -83,7 +83,7 @@ fn flight_of(flights: &[Flight], window: Window, rows: usize) -> Result<&Flight>
 pub fn ridge(flights: &[Flight], training: &[Window], windows: &[Window], config: &LinearConfig) -> Result<Row> {
     let targets = training.iter().map(|&window| {
         let flight = flight_of(flights, window, config.lags)?;
-        Ok(Column::TARGETS.map(|column| flight.column(column)[window.last]))
+        Ok(PerChannel::from_fn(|channel| flight.column(channel.column())[window.last]))
     });
     let linear = Linear::fit(flights, training, &targets.collect::<Result<Vec<_>>>()?, config)?;
     let signals: Vec<Signals> = flights.iter().map(|flight| Signals::new(flight, config)).collect::<Result<_>>()?;
@@ -97,6 +97,7 @@ pub fn ridge(flights: &[Flight], training: &[Window], windows: &[Window], config
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight::Channel;
     use crate::flight::Targets;
     use phyture_kernels::Tolerance;
 
@@ -108,8 +109,9 @@ mod tests {
         std::array::from_fn(|_| vec![0.0; samples])
     }
 
-    fn close(found: &[[f64; 6]], expected: impl Fn(usize, usize) -> f64, bound: f64) -> bool {
-        (0..found.len()).all(|row| (0..6).all(|channel| (found[row][channel] - expected(row, channel)).abs() <= bound))
+    fn close(found: &[PerChannel<f64>], expected: impl Fn(usize, Channel) -> f64, bound: f64) -> bool {
+        (0..found.len())
+            .all(|row| Channel::ALL.into_iter().all(|channel| (found[row][channel] - expected(row, channel)).abs() <= bound))
     }
 
     #[test]
@@ -118,7 +120,7 @@ mod tests {
         columns[Column::Wz as usize] = (0..50).map(|k| (0.01 * f64::from(k)).powi(2)).collect();
         let flights = [Flight::new("a", "a", 0.0, 0.01, columns, Targets::Recorded).unwrap()];
         let test = windows(0, 1..49);
-        let slope = |channel: usize, time_s: f64| if channel == 5 { 2.0 * time_s } else { 0.0 };
+        let slope = |channel: Channel, time_s: f64| if channel == Channel::WzDot { 2.0 * time_s } else { 0.0 };
         let causal = finite_difference(&flights, &test).unwrap();
         let bound = Tolerance::Close.relative_f64();
         assert!(close(&causal.predicted, |row, channel| slope(channel, 0.01 * (row as f64 + 0.5)), bound));

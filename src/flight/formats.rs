@@ -1,7 +1,6 @@
 //! The formats of logs that are read: one line each in [`FORMATS`], and a file that knows the format.
 //!
-//! Listing, messages and reading ask this list. What a file holds is the business of the format's own file; of a format that states units, axes
-//! and frames by itself, its description in the words of `dataset.toml` is here in force below the one of the data set.
+//! Listing, messages and reading ask this list. What a file holds is the business of the format's own file.
 
 use super::assemble::{Assembled, Cuts, assemble};
 use super::listing::Log;
@@ -29,16 +28,16 @@ pub(super) enum Reader {
     /// This function.
     Of(fn(&Log, &Schema, Cuts) -> Result<Assembled>),
     /// Nothing, as the program was built without this feature.
-    #[cfg_attr(all(feature = "parquet", feature = "ulog", feature = "dataflash"), allow(dead_code))]
+    #[cfg(not(feature = "parquet"))]
     LeftOut(&'static str),
 }
 
 /// A format of logs.
 pub(super) struct Format {
-    /// With its article, for messages.
+    /// What its file is, in words: "a CSV file".
     pub kind: &'static str,
     pub place: Place,
-    /// What holds for every log of the format where the data set's own description says nothing else, as a `dataset.toml`.
+    /// What the format states by itself, in the words of `dataset.toml`; in force below the one of the data set.
     pub description: Option<&'static str>,
     pub reader: Reader,
 }
@@ -50,19 +49,13 @@ pub(super) static FORMATS: &[Format] = &[
     super::parquet::PARQUET,
     #[cfg(not(feature = "parquet"))]
     Format::left_out("a Parquet file", "parquet", "parquet"),
-    #[cfg(feature = "ulog")]
     super::ulog::ULOG,
-    #[cfg(not(feature = "ulog"))]
-    Format::left_out("a PX4 log", "ulg", "ulog"),
-    #[cfg(feature = "dataflash")]
     super::dataflash::DATAFLASH,
-    #[cfg(not(feature = "dataflash"))]
-    Format::left_out("an ArduPilot log", "bin", "dataflash"),
     stanford::FORMAT,
 ];
 
 impl Format {
-    #[cfg_attr(all(feature = "parquet", feature = "ulog", feature = "dataflash"), allow(dead_code))]
+    #[cfg(not(feature = "parquet"))]
     const fn left_out(kind: &'static str, ending: &'static str, feature: &'static str) -> Self {
         Self { kind, place: Place::File(ending), description: None, reader: Reader::LeftOut(feature) }
     }
@@ -78,6 +71,7 @@ impl Format {
                 assemble(table, &log.name, &log.manoeuvre, schema, cuts)
             }
             Reader::Of(read) => read(log, schema, cuts),
+            #[cfg(not(feature = "parquet"))]
             Reader::LeftOut(feature) => {
                 Err(fault(&log.path, self.kind, format!("CSV; this program was built without the feature `{feature}`")))
             }

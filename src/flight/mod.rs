@@ -7,12 +7,13 @@
 mod assemble;
 pub mod attitude;
 mod bounds;
-#[cfg(any(feature = "ulog", feature = "dataflash"))]
+#[cfg(feature = "files")]
 mod bytes;
+mod channel;
 mod column;
 #[cfg(feature = "files")]
 mod convert;
-#[cfg(feature = "dataflash")]
+#[cfg(feature = "files")]
 mod dataflash;
 pub mod derived;
 #[cfg(feature = "files")]
@@ -26,7 +27,7 @@ pub mod guard;
 pub mod guess;
 #[cfg(feature = "files")]
 mod hypotheses;
-#[cfg(any(feature = "ulog", feature = "dataflash"))]
+#[cfg(feature = "files")]
 mod join;
 #[cfg(feature = "files")]
 mod late;
@@ -55,7 +56,7 @@ mod table;
 mod taint;
 #[cfg(feature = "files")]
 mod timing;
-#[cfg(feature = "ulog")]
+#[cfg(feature = "files")]
 mod ulog;
 #[cfg(feature = "files")]
 mod units;
@@ -66,6 +67,7 @@ pub mod windows;
 pub mod write;
 
 pub use attitude::Axes;
+pub use channel::{Channel, PerChannel};
 pub use column::Column;
 #[cfg(feature = "files")]
 pub(crate) use description::Description;
@@ -234,7 +236,7 @@ impl Flight {
 
     /// The six acceleration targets.
     pub fn accelerations(&self) -> Accelerations {
-        Column::TARGETS.map(|target| self.column(target).to_vec())
+        PerChannel::from_fn(|channel| self.column(channel.column()).to_vec())
     }
 
     /// The same flight with other accelerations.
@@ -242,10 +244,7 @@ impl Flight {
     /// # Errors
     /// [`Error::Log`] as [`Flight::new`].
     pub fn with_accelerations(&self, accelerations: &Accelerations) -> Result<Self> {
-        self.with_columns(|column| {
-            let channel = Column::TARGETS.iter().position(|target| *target == column)?;
-            Some(accelerations[channel].clone())
-        })
+        self.with_columns(|column| Some(accelerations[Channel::of_column(column)?].clone()))
     }
 
     /// The same flight with other values in the columns for which `other` has some.
@@ -299,7 +298,7 @@ pub struct Window {
 }
 
 /// Six acceleration columns in the order of [`Column::TARGETS`]: m/s², then rad/s².
-pub type Accelerations = [Vec<f64>; 6];
+pub type Accelerations = PerChannel<Vec<f64>>;
 
 /// The flights of one data set, sorted by manoeuvre and name.
 #[derive(Clone, Debug, Default)]

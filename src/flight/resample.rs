@@ -46,7 +46,7 @@ impl Resampler {
     }
 
     /// From samples at increasing `time_s` to times `step_s` apart that lie among them. `None` for fewer than four samples.
-    #[cfg(any(feature = "ulog", feature = "dataflash"))]
+    #[cfg(feature = "files")]
     pub fn onto(time_s: &[f64], new_s: Vec<f64>, step_s: f64) -> Option<Self> {
         let old_step_s = (time_s.last()? - time_s.first()?) / time_s.len().saturating_sub(1).max(1) as f64;
         Self::at(time_s, new_s, HALF_WIDTH_STEPS * step_s.max(old_step_s))

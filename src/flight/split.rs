@@ -98,6 +98,25 @@ impl Part {
 }
 
 /// A division of a data set into spans.
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::flight::split::Split;
+/// use phyture::sim::{Simulation, simulate};
+///
+/// let flights = simulate(&Simulation { minutes: 4.0, ..Simulation::baseline() })?.flights;
+/// let split = Split::for_search(&flights, 3);
+/// for kept in &split.test {
+///     println!("{}: {} rows that no search sees", flights[kept.flight].name, kept.end - kept.start);
+/// }
+/// assert!(!split.test.is_empty());
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Split {
     /// Calibration, scaling and training use these only.

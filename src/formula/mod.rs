@@ -48,6 +48,18 @@ pub fn functions() -> impl Iterator<Item = (&'static str, &'static str)> {
 }
 
 /// A parsed formula. Prints back with the fewest brackets, and is stored as that text.
+///
+/// # Examples
+/// ```
+/// use phyture::formula::Formula;
+///
+/// let formula = Formula::parse("vx * (abs(vx)) + lag(u1, 0.1)")?;
+/// assert_eq!(formula.to_string(), "vx * abs(vx) + lag(u1, 0.1)");
+/// assert_eq!(formula.names(), ["vx", "u1"]);
+/// let error = Formula::parse("vx * abs(vx").unwrap_err();
+/// println!("{error}");
+/// # Ok::<(), phyture::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Formula {
     /// Postfix: operands before their operation, each with the character it stands at.

@@ -7,7 +7,7 @@
 use super::inputs;
 use crate::blocks::{BLOCK_S, Blocks};
 use crate::error::{Error, Result};
-use crate::flight::{Flight, Window};
+use crate::flight::{Channel, Flight, PerChannel, Window};
 use crate::formula::Formula;
 use nalgebra::{Cholesky, DMatrix};
 use ndarray::{Array1, Array2};
@@ -117,7 +117,7 @@ pub struct Linear {
     /// `[6, lags · inputs + 1]` row-major: the last row of the history first, the intercept last.
     weights: Vec<f64>,
     /// λ chosen, one a channel.
-    penalty: [f64; 6],
+    penalty: PerChannel<f64>,
 }
 
 impl Linear {
@@ -127,7 +127,7 @@ impl Linear {
     /// [`Error::Shape`] if a window lies outside its flight, or targets and windows differ in number; [`Error::Config`] or
     /// [`Error::Formula`] for the inputs, or for more unknowns than windows; [`Error::Undetermined`] if the windows fill fewer than two
     /// 10-s blocks.
-    pub fn fit(flights: &[Flight], windows: &[Window], targets: &[[f64; 6]], config: &LinearConfig) -> Result<Self> {
+    pub fn fit(flights: &[Flight], windows: &[Window], targets: &[PerChannel<f64>], config: &LinearConfig) -> Result<Self> {
         config.check()?;
         let inside = |window: &Window| flights.get(window.flight).is_some_and(|flight| window.last < flight.len());
         if targets.len() != windows.len() || !windows.iter().all(inside) {
@@ -147,7 +147,8 @@ impl Linear {
         }
         let signals: Vec<Signals> = flights.iter().map(|flight| Signals::new(flight, config)).collect::<Result<_>>()?;
         let (mean, inverse_deviation) = moments(&signals, windows, config.inputs.len());
-        let mut linear = Self { config: config.clone(), mean, inverse_deviation, weights: Vec::new(), penalty: [0.0; 6] };
+        let mut linear =
+            Self { config: config.clone(), mean, inverse_deviation, weights: Vec::new(), penalty: PerChannel::splat(0.0) };
         let mut sums: Vec<Normal> = (0..FOLDS).map(|_| Normal::zero(features)).collect();
         let mut design = Array2::zeros((BATCH, features));
         for (fold, sum) in sums.iter_mut().enumerate() {
@@ -160,7 +161,7 @@ impl Linear {
                     let window = windows[index];
                     linear.features(|lag| signals[window.flight].row(window.last, lag), row.as_slice_mut().unwrap_or_default());
                 }
-                let values: Vec<[f64; 6]> = batch.iter().map(|&index| targets[index]).collect();
+                let values: Vec<[f64; Channel::COUNT]> = batch.iter().map(|&index| targets[index].into_array()).collect();
                 sum.add(&design, &Array2::from(values));
             }
         }
@@ -184,18 +185,18 @@ impl Linear {
     }
 
     /// The six values at `sample`; `row(lag)` is the row of inputs so many samples ago.
-    pub fn predict<'a>(&self, row: impl Fn(usize) -> &'a [f64]) -> [f64; 6] {
+    pub fn predict<'a>(&self, row: impl Fn(usize) -> &'a [f64]) -> PerChannel<f64> {
         let features = self.config.features();
         let mut values = vec![0.0; features];
         self.features(row, &mut values);
-        std::array::from_fn(|channel| {
-            let weights = &self.weights[channel * features..(channel + 1) * features];
+        PerChannel::from_fn(|channel| {
+            let weights = &self.weights[channel.index() * features..][..features];
             weights.iter().zip(&values).map(|(weight, value)| weight * value).sum()
         })
     }
 
     /// The six values at a sample of a flight. Before the flight's first row, its first row stands in.
-    pub fn at(&self, signals: &Signals, sample: usize) -> [f64; 6] {
+    pub fn at(&self, signals: &Signals, sample: usize) -> PerChannel<f64> {
         self.predict(|lag| signals.row(sample, lag))
     }
 
@@ -205,7 +206,7 @@ impl Linear {
     }
 
     /// λ chosen by cross-validation for each channel.
-    pub const fn penalty(&self) -> [f64; 6] {
+    pub const fn penalty(&self) -> PerChannel<f64> {
         self.penalty
     }
 
@@ -319,9 +320,9 @@ impl Normal {
 }
 
 /// Chooses λ of each channel by leaving out one fold at a time, then fits on all.
-fn solve(folds: &[Normal]) -> Result<(Array2<f64>, [f64; 6])> {
+fn solve(folds: &[Normal]) -> Result<(Array2<f64>, PerChannel<f64>)> {
     let features = folds.first().map_or(0, |fold| fold.gram.nrows());
-    let mut best = [(f64::INFINITY, f64::NAN); 6];
+    let mut best = PerChannel::splat((f64::INFINITY, f64::NAN));
     let mut total = Normal::zero(features);
     folds.iter().for_each(|fold| total.merge(fold));
     let training: Vec<Normal> = (0..folds.len())
@@ -376,23 +377,23 @@ mod tests {
     }
 
     /// A flight of noise whose targets are made by `target(columns, row, channel)` from the states and controls.
-    fn flight(samples: usize, seed: u64, mut target: impl FnMut(&[Vec<f64>; Column::COUNT], usize, usize) -> f64) -> Flight {
+    fn flight(samples: usize, seed: u64, mut target: impl FnMut(&[Vec<f64>; Column::COUNT], usize, Channel) -> f64) -> Flight {
         let mut noise = Noise(seed);
         let mut columns: [Vec<f64>; Column::COUNT] =
             std::array::from_fn(|column| (0..samples).map(|_| if column < 16 { noise.next() } else { 0.0 }).collect());
-        for channel in 0..6 {
+        for channel in Channel::ALL {
             let values = (0..samples).map(|row| target(&columns, row, channel)).collect();
-            columns[Column::TARGETS[channel] as usize] = values;
+            columns[channel.column() as usize] = values;
         }
         Flight::new("noise", "noise", 0.0, 0.01, columns, Targets::Recorded).unwrap()
     }
 
     fn fitted(flights: &[Flight], windows: &[Window], config: &LinearConfig) -> Result<Linear> {
-        let target = |window: &Window| Column::TARGETS.map(|column| flights[window.flight].column(column)[window.last]);
+        let target = |window: &Window| PerChannel::from_fn(|channel| flights[window.flight].column(channel.column())[window.last]);
         Linear::fit(flights, windows, &windows.iter().map(target).collect::<Vec<_>>(), config)
     }
 
-    fn predicted(linear: &Linear, flights: &[Flight], windows: &[Window]) -> Vec<[f64; 6]> {
+    fn predicted(linear: &Linear, flights: &[Flight], windows: &[Window]) -> Vec<PerChannel<f64>> {
         let signals: Vec<Signals> = flights.iter().map(|flight| Signals::new(flight, linear.config()).unwrap()).collect();
         windows.iter().map(|window| linear.at(&signals[window.flight], window.last)).collect()
     }
@@ -401,10 +402,11 @@ mod tests {
         rows.map(|last| Window { flight, last }).collect()
     }
 
-    fn close(found: &[[f64; 6]], expected: impl Fn(usize, usize) -> f64, bound: f64) -> bool {
-        let errors = found.iter().enumerate().flat_map(|(row, values)| {
-            values.iter().enumerate().map(move |(channel, value)| (row, channel, *value)).collect::<Vec<_>>()
-        });
+    fn close(found: &[PerChannel<f64>], expected: impl Fn(usize, Channel) -> f64, bound: f64) -> bool {
+        let errors = found
+            .iter()
+            .enumerate()
+            .flat_map(|(row, values)| values.pairs().map(move |(channel, value)| (row, channel, *value)).collect::<Vec<_>>());
         errors.into_iter().all(|(row, channel, value)| (value - expected(row, channel)).abs() <= bound)
     }
 
@@ -414,8 +416,8 @@ mod tests {
         /// Any linear law of the last three rows is found, and predicted on flights not seen.
         #[test]
         fn a_linear_law_of_the_history_is_found(seed in any::<u64>(), gain in -3.0..3.0_f64, offset in -10.0..10.0_f64) {
-            let law = |columns: &[Vec<f64>; Column::COUNT], row: usize, channel: usize| {
-                let u = &columns[Column::U1 as usize + channel % 4];
+            let law = |columns: &[Vec<f64>; Column::COUNT], row: usize, channel: Channel| {
+                let u = &columns[Column::U1 as usize + channel.index() % 4];
                 let w = &columns[Column::Wx as usize];
                 let at = |values: &[f64], lag: usize| row.checked_sub(lag).map_or(0.0, |row| values[row]);
                 offset + gain * at(u, 2) - 0.5 * at(w, 0) + 0.25 * at(w, 1)
@@ -425,7 +427,7 @@ mod tests {
             let ridge = fitted(&flights, &windows(0, 2..4000), &config).unwrap();
             let test = windows(1, 2..300);
             let found = predicted(&ridge, &flights, &test);
-            let truth = |index: usize, channel: usize| flights[1].column(Column::TARGETS[channel])[test[index].last];
+            let truth = |index: usize, channel: Channel| flights[1].column(channel.column())[test[index].last];
             // The smallest penalty tried, 1e-8, shrinks by that share: sums of order 10 stay within the scheme's tolerance.
             prop_assert!(close(&found, truth, 10.0 * Tolerance::Approximate.relative_f64()));
         }
@@ -433,7 +435,7 @@ mod tests {
 
     #[test]
     fn predictions_do_not_change_when_targets_and_later_rows_do() {
-        let law = |columns: &[Vec<f64>; Column::COUNT], row: usize, _: usize| columns[Column::Vx as usize][row];
+        let law = |columns: &[Vec<f64>; Column::COUNT], row: usize, _: Channel| columns[Column::Vx as usize][row];
         let flights = [flight(3000, 5, law)];
         let ridge = fitted(&flights, &windows(0, 10..3000), &LinearConfig::default()).unwrap();
         let cut: [Vec<f64>; Column::COUNT] = std::array::from_fn(|column| {
@@ -449,11 +451,11 @@ mod tests {
     fn noise_draws_a_larger_penalty_than_a_law() {
         let mut noise = Noise(99);
         let flights = [flight(6000, 7, |columns, row, channel| match channel {
-            0 => columns[Column::Vx as usize][row],
+            Channel::VxDot => columns[Column::Vx as usize][row],
             _ => noise.next(),
         })];
         let ridge = fitted(&flights, &windows(0, 10..6000), &LinearConfig::default()).unwrap();
-        let [law, others @ ..] = ridge.penalty();
+        let [law, others @ ..] = ridge.penalty().into_array();
         assert!(others.iter().all(|penalty| *penalty > 100.0 * law), "{:?}", ridge.penalty());
     }
 
@@ -464,7 +466,7 @@ mod tests {
             mean: vec![0.0; 4],
             inverse_deviation: vec![1.0; 4],
             weights: vec![0.0; weights],
-            penalty: [0.0; 6],
+            penalty: PerChannel::splat(0.0),
         };
         assert_eq!(linear(2, 54).check(), Ok(()));
         assert!(linear(2, 53).check().is_err_and(|message| message.contains("do not fit")));
@@ -483,7 +485,7 @@ mod tests {
         let flights = [Flight::new("a", "a", 0.0, 0.01, columns, Targets::Recorded).unwrap()];
         let ridge = fitted(&flights, &windows(0, 10..3000), &LinearConfig::default()).unwrap();
         let found = predicted(&ridge, &flights, &windows(0, 10..3000));
-        let truth = |index: usize, channel: usize| flights[0].column(Column::TARGETS[channel])[index + 10];
+        let truth = |index: usize, channel: Channel| flights[0].column(channel.column())[index + 10];
         assert!(close(&found, truth, 10.0 * Tolerance::Approximate.relative_f64()));
     }
 

@@ -22,7 +22,7 @@ pub use target::{NetworkTarget, network_target};
 
 use crate::blocks::Blocks;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Flight, PerChannel, Window};
 use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::nn::{Architecture, Network, OutputScale};
 use crate::physics::Model;
@@ -62,7 +62,7 @@ pub struct Description {
     /// Fixed scales from the training part.
     pub scaling: Scaling,
     /// Factor on what the network says, one a channel: 1 is the network as trained.
-    pub gate: [f64; 6],
+    pub gate: PerChannel<f64>,
     /// Sampling step of the training data, s.
     pub step_s: f64,
 }
@@ -101,8 +101,8 @@ impl Description {
         }
         let groups: [(&str, &[Scale], f64); 3] = [
             ("scaling.state", &scaling.state, LARGEST_INPUT),
-            ("scaling.physics", &scaling.physics, LARGEST_INPUT),
-            ("scaling.output", &scaling.output, LARGEST_OUTPUT),
+            ("scaling.physics", scaling.physics.values(), LARGEST_INPUT),
+            ("scaling.output", scaling.output.values(), LARGEST_OUTPUT),
         ];
         for (field, scales, largest) in groups {
             let possible = |scale: &&Scale| scale.mean.abs() <= largest && (largest.recip()..=largest).contains(&scale.deviation);
@@ -116,7 +116,7 @@ impl Description {
             return fault("step_s", step_s.to_string(), format!("{:e} s to {:e} s", STEPS_S.start(), STEPS_S.end()));
         }
         if !gate.iter().all(|factor| (0.0..=1.0).contains(factor)) {
-            return fault("gate", format!("{gate:?}"), "six factors between 0 and 1".into());
+            return fault("gate", format!("{:?}", gate.values()), "six factors between 0 and 1".into());
         }
         inputs::parse(inputs)?;
         match linear.as_ref().map_or(Ok(()), Linear::check) {
@@ -173,18 +173,18 @@ impl Hybrid {
     ///
     /// # Errors
     /// As [`Hybrid::predict`].
-    pub fn fit_gate(&mut self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<[f64; 6]> {
-        self.description.gate = [1.0; 6];
+    pub fn fit_gate(&mut self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<PerChannel<f64>> {
+        self.description.gate = PerChannel::splat(1.0);
         if !self.description.config.predicts_residual() || windows.is_empty() {
             return Ok(self.description.gate);
         }
         let sequences = sequence::sequences(flights, &self.description)?;
         let predicted = self.predict(flights, windows, threads)?;
         let blocks = Blocks::new(flights, windows).of_window;
-        let gate = std::array::from_fn(|channel| {
+        let gate = PerChannel::from_fn(|channel| {
             let pairs = windows.iter().zip(&predicted).map(|(window, predicted)| {
                 let baseline = sequences[window.flight].baseline(window.last)[channel];
-                let measured = flights[window.flight].column(Column::TARGETS[channel])[window.last];
+                let measured = flights[window.flight].column(channel.column())[window.last];
                 (measured - baseline, predicted[channel] - baseline)
             });
             gate(&pairs.collect::<Vec<_>>(), &blocks)
@@ -249,7 +249,7 @@ impl Hybrid {
     /// # Errors
     /// [`Error::Config`] if a flight's step is not the trained one or a window does not hold a full history; [`Error::Undetermined`] if a
     /// prediction is not finite; what evaluating the model gives.
-    pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<[f64; 6]>> {
+    pub fn predict(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<PerChannel<f64>>> {
         self.check_windows(flights, windows)?;
         self.complete_windows(flights, &sequence::sequences(flights, &self.description)?, windows, threads)
     }
@@ -278,7 +278,7 @@ impl Hybrid {
         sequences: &[sequence::Sequence],
         windows: &[Window],
         threads: Threads,
-    ) -> Result<Vec<[f64; 6]>> {
+    ) -> Result<Vec<PerChannel<f64>>> {
         let mut session = Session::infer(self.network.graph(), &[self.network.output()], threads)?;
         session.load(&self.parameters)?;
         let mut predicted = Vec::with_capacity(windows.len());
@@ -300,16 +300,18 @@ impl Hybrid {
     }
 
     /// The network's last row, on top of the baseline where it is a residual.
-    fn complete(&self, baseline: [f64; 6], output: &[f32]) -> [f64; 6] {
+    fn complete(&self, baseline: PerChannel<f64>, output: &[f32]) -> PerChannel<f64> {
         let residual = self.description.config.predicts_residual();
         let learned = self.learned(output);
-        std::array::from_fn(|channel| if residual { baseline[channel] + learned[channel] } else { learned[channel] })
+        PerChannel::from_fn(|channel| if residual { baseline[channel] + learned[channel] } else { learned[channel] })
     }
 
     /// The network's last row behind the gate, m/s² and rad/s².
-    fn learned(&self, output: &[f32]) -> [f64; 6] {
+    fn learned(&self, output: &[f32]) -> PerChannel<f64> {
         let last = &output[output.len().saturating_sub(6)..];
-        std::array::from_fn(|channel| last.get(channel).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel])
+        PerChannel::from_fn(|channel| {
+            last.get(channel.index()).copied().map_or(f64::NAN, f64::from) * self.description.gate[channel]
+        })
     }
 
     /// A predictor that takes one sample at a time.
@@ -335,15 +337,15 @@ fn numbers_of<'a>(file: &'a SafeTensors, parameter: &Parameter) -> Result<&'a [f
 ///
 /// # Errors
 /// [`Error::Undetermined`] naming flight, sample and channel.
-pub fn check_finite(flight: &Flight, sample: usize, predicted: &[f64; 6]) -> Result<()> {
-    let Some(channel) = predicted.iter().position(|value| !value.is_finite()) else { return Ok(()) };
+pub fn check_finite(flight: &Flight, sample: usize, predicted: &PerChannel<f64>) -> Result<()> {
+    let Some((channel, value)) = predicted.pairs().find(|(_, value)| !value.is_finite()) else { return Ok(()) };
     Err(Error::Undetermined(format!(
         "flight `{}`, sample {sample} ({:.2} s): the predicted `{}` is {}, not a finite number; look at the flight there, and at the \
          scales and weights of the network",
         flight.name,
         flight.time_s(sample),
-        Column::TARGETS[channel].name(),
-        predicted[channel]
+        channel.name(),
+        value
     )))
 }
 

@@ -6,7 +6,7 @@ use super::linear::{Linear, Signals};
 use super::sequence::{Sequence, sequences};
 use super::{Hybrid, inputs};
 use crate::error::Result;
-use crate::flight::{Flight, Window};
+use crate::flight::{Flight, PerChannel, Window};
 use crate::physics::Rollout;
 use crate::physics::rollout::{Addition, Each, Further, Program};
 use crate::tape::{Session, Threads};
@@ -96,7 +96,7 @@ impl<'a> Added<'a> {
     }
 
     /// What the linear history says, six numbers a lane; its inputs come after the network's.
-    fn filtered(&mut self, step: usize, inputs: &[Vec<f64>]) -> Option<Vec<[f64; 6]>> {
+    fn filtered(&mut self, step: usize, inputs: &[Vec<f64>]) -> Option<Vec<PerChannel<f64>>> {
         let linear = self.linear?;
         let (count, lags) = (inputs.len(), linear.config().lags);
         let one = |(lane, rows): (usize, &mut Vec<f64>)| {
@@ -114,9 +114,9 @@ impl Addition for Added<'_> {
     fn held(
         &mut self,
         step: usize,
-        physics: [&[f64]; 6],
+        physics: PerChannel<&[f64]>,
         inputs: &dyn Fn(usize) -> Vec<f64>,
-        held: &mut [Vec<f64>; 6],
+        held: &mut PerChannel<Vec<f64>>,
     ) -> Result<()> {
         let description = self.hybrid.description();
         let channels = description.inputs.len();
@@ -128,9 +128,9 @@ impl Addition for Added<'_> {
             for (channel, scale) in description.scaling.state.iter().enumerate() {
                 state[row * channels + channel] = scale.apply(inputs[channel][lane]) as f32;
             }
-            for (channel, scale) in description.scaling.physics.iter().enumerate() {
+            for (channel, scale) in description.scaling.physics.pairs() {
                 let linear = filtered.as_ref().map_or(0.0, |filtered| filtered[lane][channel]);
-                of_physics[row * 6 + channel] = scale.apply(physics[channel][lane] + linear) as f32;
+                of_physics[row * 6 + channel.index()] = scale.apply(physics[channel][lane] + linear) as f32;
                 held[channel][lane] = linear;
             }
         }

@@ -1,6 +1,6 @@
 //! Fixed affine scales, from the training part only: inputs to unit scale, and the network's outputs back to physical units.
 
-use crate::flight::Span;
+use crate::flight::{PerChannel, Span};
 use serde::{Deserialize, Serialize};
 
 /// Mean and standard deviation of one channel: scaled = (value − mean) / deviation.
@@ -36,10 +36,10 @@ pub struct Scaling {
     /// Of the state-control channels, in the order of the hybrid's inputs.
     pub state: Vec<Scale>,
     /// Of the baseline accelerations a^p.
-    pub physics: [Scale; 6],
+    pub physics: PerChannel<Scale>,
     /// Of what the network predicts (the residual, or the acceleration itself): r̂ = deviation ∘ net + mean. Fixed, so that
     /// the loss stays in physical units (paper eq. 13) while the last layer works at unit scale.
-    pub output: [Scale; 6],
+    pub output: PerChannel<Scale>,
 }
 
 #[cfg(test)]

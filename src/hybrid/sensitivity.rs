@@ -7,7 +7,7 @@
 use super::sequence::{Sequence, sequences};
 use super::{CHUNK, Description, Hybrid};
 use crate::error::Result;
-use crate::flight::{Accelerations, Flight, Window};
+use crate::flight::{Accelerations, Channel, Flight, PerChannel, Window};
 use crate::nn::{LossRule, Network};
 use crate::physics::{Estimate, Model, correlation_matrix};
 use crate::tape::ops::{LastRows, Linear};
@@ -25,9 +25,9 @@ pub const HALF_WIDTH: f64 = 1.959_963_984_540_054;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Movement {
     /// Of the model alone, ∂a^p/∂θ · h.
-    pub physics: [f64; 6],
+    pub physics: PerChannel<f64>,
     /// Of the whole hybrid, ∂â/∂θ · h.
-    pub hybrid: [f64; 6],
+    pub hybrid: PerChannel<f64>,
 }
 
 impl Hybrid {
@@ -104,9 +104,9 @@ impl Hybrid {
             let Some(sequence) = sequences.first() else { continue };
             for chunk in members.chunks(CHUNK) {
                 let last = |sample: usize| chunk.get(sample).map_or(0, |&index| windows[index].last);
-                for channel in 0..6 {
+                for channel in Channel::ALL {
                     parameters[weights..].fill(0.0);
-                    parameters[weights + channel] = 1.0;
+                    parameters[weights + channel.index()] = 1.0;
                     step(&mut session, &parameters, chunk.len(), sequence, &last)?;
                     // The session's gradient is that of the mean over the chunk.
                     let factor = description.gate[channel] * chunk.len() as f64;
@@ -139,10 +139,10 @@ impl Hybrid {
         draws: usize,
         seed: u64,
         threads: Threads,
-    ) -> Result<Vec<[f64; 6]>> {
+    ) -> Result<Vec<PerChannel<f64>>> {
         self.check_windows(flights, windows)?;
         // Mean and sum of squared deviations, updated draw by draw (Welford 1962).
-        let mut moments = vec![[(0.0, 0.0); 6]; windows.len()];
+        let mut moments = vec![PerChannel::splat((0.0, 0.0)); windows.len()];
         let root = square_root(self.correlations(estimates));
         for draw in 0..draws {
             let mut model = self.description.model.clone();
@@ -209,7 +209,7 @@ fn by_flight(windows: &[Window]) -> BTreeMap<usize, Vec<usize>> {
 /// The change of a^p over a flight when one coefficient moves by half the width of its interval.
 struct Change {
     /// Channels that change, each with one value a sample.
-    channels: Vec<(usize, Vec<f64>)>,
+    channels: Vec<(Channel, Vec<f64>)>,
 }
 
 impl Change {
@@ -219,7 +219,7 @@ impl Change {
             shift(&mut moved, estimate, sign * half_width(estimate));
             moved.predict(flight)
         };
-        let pairs = at(1.0)?.into_iter().zip(at(-1.0)?).enumerate();
+        let pairs = Channel::ALL.into_iter().zip(at(1.0)?.into_iter().zip(at(-1.0)?));
         let changed = pairs.map(|(channel, (up, down))| {
             (channel, up.into_iter().zip(down).map(|(up, down)| 0.5 * (up - down)).collect::<Vec<f64>>())
         });
@@ -229,8 +229,8 @@ impl Change {
     /// Σ gradient · change / σ over the history that ends at row `last`; `gradient` is `[H, 6]`, empty if none reaches the input.
     fn through(&self, gradient: &[f32], last: usize, description: &Description) -> f64 {
         let start = (last + 1).saturating_sub(gradient.len() / 6);
-        let of_channel = |(channel, values): &(usize, Vec<f64>)| {
-            let along = gradient.iter().skip(*channel).step_by(6).zip(values.iter().skip(start));
+        let of_channel = |(channel, values): &(Channel, Vec<f64>)| {
+            let along = gradient.iter().skip(channel.index()).step_by(6).zip(values.iter().skip(start));
             along.map(|(gradient, change)| f64::from(*gradient) * change).sum::<f64>()
                 / description.scaling.physics[*channel].deviation
         };

@@ -5,15 +5,15 @@ use super::inputs;
 use super::linear::{Linear, LinearConfig, Signals};
 use super::scaling::{Scale, Scaling};
 use crate::error::{Error, Result};
-use crate::flight::{Accelerations, Column, Flight, Span, Window};
+use crate::flight::{Accelerations, Flight, PerChannel, Span, Window};
 use crate::formula::Formula;
 use crate::nn::Architecture;
 use crate::physics::Model;
 
 /// What the network learns: the residual r = a − a^p, or the acceleration itself (the variants without residual learning).
 fn learned(flight: &Flight, baseline: &Accelerations, residual: bool) -> Accelerations {
-    std::array::from_fn(|channel| {
-        let measured = flight.column(Column::TARGETS[channel]);
+    PerChannel::from_fn(|channel| {
+        let measured = flight.column(channel.column());
         let offset = |sample: usize| if residual { baseline[channel][sample] } else { 0.0 };
         measured.iter().enumerate().map(|(sample, value)| value - offset(sample)).collect()
     })
@@ -62,18 +62,18 @@ impl Sequence {
             let row = |sample: usize| columns.iter().zip(scales).map(move |(column, scale)| scale.apply(column[sample]) as f32);
             (0..samples).flat_map(row).collect()
         };
-        let physical = [Scale { mean: 0.0, deviation: 1.0 }; 6];
+        let physical = PerChannel::splat(Scale { mean: 0.0, deviation: 1.0 });
         Self {
             state: rows(&raw.state, &scaling.state),
-            physics: rows(&raw.baseline, &scaling.physics),
-            learned: rows(&raw.learned, &physical),
+            physics: rows(raw.baseline.values(), scaling.physics.values()),
+            learned: rows(raw.learned.values(), physical.values()),
             baseline: raw.baseline,
         }
     }
 
     /// Baseline acceleration of a sample.
-    pub fn baseline(&self, sample: usize) -> [f64; 6] {
-        std::array::from_fn(|channel| self.baseline[channel][sample])
+    pub fn baseline(&self, sample: usize) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| self.baseline[channel][sample])
     }
 
     /// Copies the history that ends with row `last` into `state` `[H, D_S]` and `physics` `[H, 6]`.
@@ -133,8 +133,8 @@ pub fn scaling(
     };
     Ok(Scaling {
         state: (0..inputs.len()).map(|input| of(&|raw| &raw.state[input])).collect(),
-        physics: std::array::from_fn(|channel| of(&|raw| &raw.baseline[channel])),
-        output: std::array::from_fn(|channel| of(&|raw| &raw.learned[channel])),
+        physics: PerChannel::from_fn(|channel| of(&|raw| &raw.baseline[channel])),
+        output: PerChannel::from_fn(|channel| of(&|raw| &raw.learned[channel])),
     })
 }
 
@@ -147,7 +147,7 @@ pub fn linear(flights: &[Flight], spans: &[Span], model: &Model, config: &Linear
     let baselines: Vec<Accelerations> = flights.iter().map(|flight| model.predict(flight)).collect::<Result<_>>()?;
     let left_over: Vec<Accelerations> =
         flights.iter().zip(&baselines).map(|(flight, baseline)| learned(flight, baseline, true)).collect();
-    let target = |window: &Window| std::array::from_fn(|channel| left_over[window.flight][channel][window.last]);
+    let target = |window: &Window| PerChannel::from_fn(|channel| left_over[window.flight][channel][window.last]);
     Linear::fit(flights, &windows, &windows.iter().map(target).collect::<Vec<_>>(), config)
 }
 

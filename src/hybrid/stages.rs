@@ -3,7 +3,7 @@
 
 use super::{Hybrid, sequence};
 use crate::error::Result;
-use crate::flight::{Accelerations, Flight, Window};
+use crate::flight::{Accelerations, Flight, PerChannel, Window};
 use crate::tape::Threads;
 
 /// What a hybrid predicts as its parts are added one after the other; one entry a window, six channels in the order of
@@ -11,11 +11,11 @@ use crate::tape::Threads;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stages {
     /// The calibrated model alone, a^p.
-    pub physics: Vec<[f64; 6]>,
+    pub physics: Vec<PerChannel<f64>>,
     /// Model and linear history, if the hybrid has one that is added to its prediction.
-    pub with_linear: Option<Vec<[f64; 6]>>,
+    pub with_linear: Option<Vec<PerChannel<f64>>>,
     /// Everything: what [`Hybrid::predict`] gives.
-    pub hybrid: Vec<[f64; 6]>,
+    pub hybrid: Vec<PerChannel<f64>>,
 }
 
 impl Hybrid {
@@ -31,7 +31,7 @@ impl Hybrid {
         let description = self.description();
         let sequences = sequence::sequences(flights, description)?;
         let physics: Vec<Accelerations> = flights.iter().map(|flight| description.model.predict(flight)).collect::<Result<_>>()?;
-        let alone = |window: &Window| std::array::from_fn(|channel| physics[window.flight][channel][window.last]);
+        let alone = |window: &Window| PerChannel::from_fn(|channel| physics[window.flight][channel][window.last]);
         let added = description.linear.is_some() && description.config.predicts_residual();
         let with_linear = |window: &Window| sequences[window.flight].baseline(window.last);
         Ok(Stages {

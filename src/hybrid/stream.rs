@@ -4,6 +4,7 @@ use super::Hybrid;
 use super::inputs;
 use super::linear::Linear;
 use crate::error::{Error, Result};
+use crate::flight::PerChannel;
 use crate::formula::{Formula, StreamingFormula};
 use crate::physics::{StreamingModel, quantity_at};
 use crate::tape::{Session, Threads};
@@ -96,7 +97,7 @@ impl<'a> StreamingHybrid<'a> {
     ///
     /// # Errors
     /// [`Error::Undetermined`] if a value is not finite; [`Error::Shape`] if the hybrid reads columns of the log's own. The sample is then not taken.
-    pub fn push(&mut self, state: &[f64; 16]) -> Result<Option<[f64; 6]>> {
+    pub fn push(&mut self, state: &[f64; 16]) -> Result<Option<PerChannel<f64>>> {
         self.push_with(state, &[])
     }
 
@@ -104,7 +105,7 @@ impl<'a> StreamingHybrid<'a> {
     ///
     /// # Errors
     /// As [`StreamingHybrid::push`]; [`Error::Shape`] if their count differs.
-    pub fn push_with(&mut self, state: &[f64; 16], own: &[f64]) -> Result<Option<[f64; 6]>> {
+    pub fn push_with(&mut self, state: &[f64; 16], own: &[f64]) -> Result<Option<PerChannel<f64>>> {
         if own.len() != self.own.len() {
             let message = format!("{} values for the log's own columns, which are {:?}", own.len(), self.own);
             return Err(Error::Shape { operation: "streaming hybrid", message });
@@ -134,8 +135,8 @@ impl<'a> StreamingHybrid<'a> {
             sample.read(formula, &mut self.values);
             self.state[(rows - 1) * channels + input] = scale.apply(formula.push(&self.values)?) as f32;
         }
-        for (channel, scale) in description.scaling.physics.iter().enumerate() {
-            self.physics[(rows - 1) * 6 + channel] = scale.apply(baseline[channel]) as f32;
+        for (channel, scale) in description.scaling.physics.pairs() {
+            self.physics[(rows - 1) * 6 + channel.index()] = scale.apply(baseline[channel]) as f32;
         }
         self.samples += 1;
         if self.samples < rows {
@@ -148,7 +149,7 @@ impl<'a> StreamingHybrid<'a> {
                 physics_slab.copy_from_slice(physics);
             }
         };
-        let mut predicted = [f64::NAN; 6];
+        let mut predicted = PerChannel::splat(f64::NAN);
         self.session.predict(1, &fill, &mut |_, output| predicted = self.hybrid.complete(baseline, output))?;
         if predicted.iter().any(|value| !value.is_finite()) {
             return Err(Error::Undetermined(format!("sample {}: the prediction is not finite", self.samples - 1)));
@@ -171,7 +172,7 @@ impl StreamingLinear {
         Ok(Self { inputs, rows: std::collections::VecDeque::new(), lags: linear.config().lags, values: Vec::new() })
     }
 
-    fn push(&mut self, linear: &Linear, sample: &Sample) -> Result<[f64; 6]> {
+    fn push(&mut self, linear: &Linear, sample: &Sample) -> Result<PerChannel<f64>> {
         let mut row = if self.rows.len() == self.lags { self.rows.pop_back().unwrap_or_default() } else { Vec::new() };
         row.clear();
         for formula in &mut self.inputs {

@@ -7,7 +7,7 @@
 
 use super::Hybrid;
 use crate::error::{Error, Result};
-use crate::flight::{Column, DataSet, Flight, Span, windows::windows};
+use crate::flight::{Channel, Column, DataSet, Flight, Span, windows::windows};
 use crate::tape::Threads;
 
 /// Flights whose targets are what a hybrid says, at the samples that have a full history.
@@ -85,9 +85,10 @@ pub fn network_target(
         };
         // The model reads no target: what stands in these columns does not matter yet.
         let physics = description.model.predict(&make(columns.clone())?)?;
-        for (channel, (column, physics)) in Column::TARGETS.into_iter().zip(physics).enumerate() {
+        for (channel, physics) in Channel::ALL.into_iter().zip(physics) {
             let learned = stages.hybrid.iter().zip(&stages.physics).map(|(hybrid, physics)| hybrid[channel] - physics[channel]);
-            columns[column as usize] = physics.into_iter().zip(learned).map(|(physics, learned)| physics + learned).collect();
+            columns[channel.column() as usize] =
+                physics.into_iter().zip(learned).map(|(physics, learned)| physics + learned).collect();
         }
         target.set.flights.push(make(columns)?);
         target.originals.push(index);

@@ -182,7 +182,7 @@ fn run<T: Precision>(file: &SafeTensors, architecture: &Architecture, threads: T
     if file.tensors.keys().any(|name| name.starts_with("adam1.")) {
         let isa = InstructionSet::detect().unwrap_or(InstructionSet::PLAIN);
         let (mut first, mut second) = (vec![T::ZERO; parameters.len()], vec![T::ZERO; parameters.len()]);
-        adam::step(isa, &Adam::default(), 1, 1.0, session.gradients(), &mut parameters, &mut first, &mut second);
+        adam::step(isa, &Adam::default(), 1, 1.0, session.gradients(), &mut parameters, (&mut first, &mut second));
         for parameter in with_gradient {
             let name = format!("adam1.param.{}", parameter.name);
             let reference = tensor(file, &name, &parameter.file_lengths())?;

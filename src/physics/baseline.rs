@@ -6,6 +6,7 @@
 //! calibrated.
 
 use super::definition::{Definition, coefficient};
+use crate::flight::Channel;
 
 /// Name of the built-in list in a model file.
 pub const PAPER: &str = "paper";
@@ -17,7 +18,7 @@ const DEFINITIONS: [Definition; 9] = [
         meaning: "weight, written in body axes: R_in^b g",
         coefficients: &[],
         parameters: &[],
-        terms: &[(0, None, "g_x"), (1, None, "g_y"), (2, None, "g_z")],
+        terms: &[(Channel::VxDot, None, "g_x"), (Channel::VyDot, None, "g_y"), (Channel::VzDot, None, "g_z")],
         swaps: &[],
         notes: None,
     },
@@ -26,7 +27,11 @@ const DEFINITIONS: [Definition; 9] = [
         meaning: "velocity is written in turning axes: -w x v",
         coefficients: &[],
         parameters: &[],
-        terms: &[(0, None, "vy * wz - vz * wy"), (1, None, "vz * wx - vx * wz"), (2, None, "vx * wy - vy * wx")],
+        terms: &[
+            (Channel::VxDot, None, "vy * wz - vz * wy"),
+            (Channel::VyDot, None, "vz * wx - vx * wz"),
+            (Channel::VzDot, None, "vx * wy - vy * wx"),
+        ],
         swaps: &[],
         notes: None,
     },
@@ -36,9 +41,9 @@ const DEFINITIONS: [Definition; 9] = [
         coefficients: &[],
         parameters: &[],
         terms: &[
-            (3, None, "(iy - iz) / ix * wy * wz"),
-            (4, None, "(iz - ix) / iy * wz * wx"),
-            (5, None, "(ix - iy) / iz * wx * wy"),
+            (Channel::WxDot, None, "(iy - iz) / ix * wy * wz"),
+            (Channel::WyDot, None, "(iz - ix) / iy * wz * wx"),
+            (Channel::WzDot, None, "(ix - iy) / iz * wx * wy"),
         ],
         swaps: &[],
         notes: None,
@@ -52,7 +57,11 @@ const DEFINITIONS: [Definition; 9] = [
             coefficient("a_z", "1/s", "along body down (heave)").negative("drag that pushes"),
         ],
         parameters: &[],
-        terms: &[(0, Some("a_x"), "air_vx"), (1, Some("a_y"), "air_vy"), (2, Some("a_z"), "air_vz")],
+        terms: &[
+            (Channel::VxDot, Some("a_x"), "air_vx"),
+            (Channel::VyDot, Some("a_y"), "air_vy"),
+            (Channel::VzDot, Some("a_z"), "air_vz"),
+        ],
         swaps: &[],
         notes: None,
     },
@@ -61,7 +70,7 @@ const DEFINITIONS: [Definition; 9] = [
         meaning: "rotor thrust along body z, in proportion to the collective: C1 u4",
         coefficients: &[coefficient("c_z", "m/s²", "thrust over mass at full collective")],
         parameters: &[],
-        terms: &[(2, Some("c_z"), "u4")],
+        terms: &[(Channel::VzDot, Some("c_z"), "u4")],
         swaps: &[],
         notes: None,
     },
@@ -70,7 +79,7 @@ const DEFINITIONS: [Definition; 9] = [
         meaning: "thrust at zero collective, and what else is constant: D1",
         coefficients: &[coefficient("d_z", "m/s²", "constant along body down")],
         parameters: &[],
-        terms: &[(2, Some("d_z"), "1")],
+        terms: &[(Channel::VzDot, Some("d_z"), "1")],
         swaps: &[],
         notes: None,
     },
@@ -83,7 +92,7 @@ const DEFINITIONS: [Definition; 9] = [
             coefficient("b_z", "1/s", "yaw").negative("anti-damping"),
         ],
         parameters: &[],
-        terms: &[(3, Some("b_x"), "wx"), (4, Some("b_y"), "wy"), (5, Some("b_z"), "wz")],
+        terms: &[(Channel::WxDot, Some("b_x"), "wx"), (Channel::WyDot, Some("b_y"), "wy"), (Channel::WzDot, Some("b_z"), "wz")],
         swaps: &[],
         notes: None,
     },
@@ -96,7 +105,7 @@ const DEFINITIONS: [Definition; 9] = [
             coefficient("c_z", "rad/s²", "full tail"),
         ],
         parameters: &[],
-        terms: &[(3, Some("c_x"), "u1"), (4, Some("c_y"), "u2"), (5, Some("c_z"), "u3")],
+        terms: &[(Channel::WxDot, Some("c_x"), "u1"), (Channel::WyDot, Some("c_y"), "u2"), (Channel::WzDot, Some("c_z"), "u3")],
         swaps: &[],
         notes: None,
     },
@@ -109,7 +118,7 @@ const DEFINITIONS: [Definition; 9] = [
             coefficient("d_z", "rad/s²", "yaw"),
         ],
         parameters: &[],
-        terms: &[(3, Some("d_x"), "1"), (4, Some("d_y"), "1"), (5, Some("d_z"), "1")],
+        terms: &[(Channel::WxDot, Some("d_x"), "1"), (Channel::WyDot, Some("d_y"), "1"), (Channel::WzDot, Some("d_z"), "1")],
         swaps: &[],
         notes: None,
     },

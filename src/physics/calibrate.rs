@@ -16,7 +16,7 @@ use super::model::Model;
 use super::sign_doubt::{SignDoubt, SignFinding};
 use super::signal::{Stage, signal_named};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::formula::Formula;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
@@ -157,6 +157,28 @@ impl std::fmt::Display for Calibration {
 ///
 /// # Errors
 /// [`Error::Undetermined`] naming the numbers and why the data do not determine them; otherwise as [`Model::predict`].
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::flight::split::Split;
+/// use phyture::physics::{Model, calibrate};
+/// use phyture::sim::{INERTIA_KG_M2, MASS_KG, ROTOR_RADIUS_M, Simulation, simulate};
+///
+/// let set = simulate(&Simulation { minutes: 6.0, ..Simulation::baseline() })?;
+/// let model = Model::paper("helicopter", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+/// let (model, calibration) = calibrate(&model, &set.flights, &Split::for_search(&set.flights, 1).training)?;
+/// for estimate in &calibration.coefficients {
+///     let [low, high] = estimate.ci95.expect("six minutes hold blocks enough");
+///     println!("{} = {:.3} [{low:.3}, {high:.3}] {}", estimate.name, estimate.value, estimate.unit);
+/// }
+/// assert!(model.effects.iter().flat_map(|effect| &effect.coefficients).all(|number| number.ci95.is_some()));
+/// # Ok(())
+/// # }
+/// ```
 pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
     model.check()?;
     if let Some(span) = spans.iter().find(|span| span.flight >= flights.len()) {
@@ -321,9 +343,9 @@ impl Pass {
         let value = |&(effect, index): &Free, flight: usize| {
             model.effects[effect].number(index).map_or(0.0, |number| number.in_flight(&rows.flights[flight].name))
         };
-        let mut squares = vec![0.0; Column::TARGETS.len()];
+        let mut squares = PerChannel::splat(0.0);
         for cluster in &mut self.clusters {
-            for (channel, factor) in cluster.factors.iter_mut().enumerate() {
+            for (channel, factor) in Channel::ALL.into_iter().zip(&mut cluster.factors) {
                 let free = self.layout.channels[channel].iter().map(|&column| value(&self.layout.free[column], cluster.flight));
                 let own = self.layout.own_channels[channel].iter().map(|&column| value(&self.layout.own[column], cluster.flight));
                 let values = DVector::from_iterator(factor.width() - 1, free.chain(own));
@@ -422,7 +444,7 @@ impl Pass {
             let all = hold(&layout.free);
             let shape = by_flight::Shape {
                 free: layout.free.len(),
-                channels: &layout.channels,
+                channels: layout.channels.values(),
                 own: &layout.own_columns(model),
                 hold: all.as_ref(),
             };

@@ -6,15 +6,15 @@ use super::effect::Term;
 use super::evaluate::{Bound, Visit};
 use super::model::Model;
 use crate::error::Result;
-use crate::flight::{Column, Flight, derived::Derived};
+use crate::flight::{Channel, Column, Flight, PerChannel, derived::Derived};
 use crate::formula::{Formula, Node};
 use std::collections::HashMap;
 
 /// A column by which a number of a model acts on one acceleration, or what acts whatever the numbers are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Regressor {
-    /// Index into [`Column::TARGETS`].
-    pub channel: usize,
+    /// The acceleration it belongs to.
+    pub channel: Channel,
     /// Index of the effect in the model.
     pub effect: usize,
     /// Index of the number in the effect, coefficients first, then parameters; `None` is a fixed 1.
@@ -47,14 +47,14 @@ impl Model {
     ///
     /// # Errors
     /// As [`Model::predict`], where it does not depend on a flight.
-    pub fn acts(&self, effect: usize) -> Result<[bool; 6]> {
+    pub fn acts(&self, effect: usize) -> Result<PerChannel<bool>> {
         let mut composer = Composer::new();
         let mut with = self.clone();
         with.effects[effect].enabled = true;
         let mut without = self.clone();
         without.effects[effect].enabled = false;
         let (with, without) = (composer.add(&with, None, false)?.channels, composer.add(&without, None, false)?.channels);
-        Ok(std::array::from_fn(|channel| with[channel] != without[channel]))
+        Ok(PerChannel::from_fn(|channel| with[channel] != without[channel]))
     }
 }
 
@@ -113,7 +113,7 @@ impl Columns {
     ///
     /// # Errors
     /// As [`Columns::regressors`].
-    pub fn predictions(&mut self, model: &Model) -> Result<[Node; 6]> {
+    pub fn predictions(&mut self, model: &Model) -> Result<PerChannel<Node>> {
         model.check()?;
         Ok(self.composer.add(model, None, false)?.channels)
     }
@@ -130,7 +130,7 @@ impl Columns {
         without.effects[effect].enabled = false;
         let without = self.composer.add(&without, None, true)?;
         let mut found = Vec::new();
-        for channel in (0..whole.channels.len()).filter(|&channel| whole.channels[channel] != without.channels[channel]) {
+        for channel in Channel::ALL.into_iter().filter(|&channel| whole.channels[channel] != without.channels[channel]) {
             let mut node = self.composer.graph.difference(without.channels[channel], whole.channels[channel]);
             for own in regressors.iter().filter(|own| own.effect == effect && own.channel == channel) {
                 let symbol = own.number.and_then(|number| whole.numbers.iter().find(|known| known.0 == (effect, number)));

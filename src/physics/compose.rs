@@ -8,15 +8,15 @@ use super::effect::{Coefficient, Effect, Swap};
 use super::model::Model;
 use super::signal::{Plain, SIGNALS, Stage, changeable, signal_named, stage_of};
 use crate::error::Result;
-use crate::flight::Column;
+use crate::flight::{Channel, Column, PerChannel};
 use crate::formula::{Formula, Graph, Node};
 use std::collections::{BTreeMap, HashMap};
 
 /// One summand of a predicted acceleration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Summand {
-    /// Index into [`Column::TARGETS`].
-    pub channel: usize,
+    /// The acceleration it adds to.
+    pub channel: Channel,
     /// Index of the effect that brings it.
     pub effect: usize,
     /// Its value, coefficient included.
@@ -32,7 +32,7 @@ pub(super) struct Composed {
     /// In the order of the sums.
     pub summands: Vec<Summand>,
     /// Predicted accelerations.
-    pub channels: [Node; 6],
+    pub channels: PerChannel<Node>,
     /// The numbers with their symbols.
     pub numbers: Vec<(Free, Node)>,
 }
@@ -75,7 +75,7 @@ impl Composer {
         };
         let summands = chain.build()?;
         let numbers = std::mem::take(&mut chain.numbers).into_iter().collect();
-        let channels = std::array::from_fn(|channel| sum(&mut self.graph, &summands, channel));
+        let channels = PerChannel::from_fn(|channel| sum(&mut self.graph, &summands, channel));
         Ok(Composed { summands, channels, numbers })
     }
 
@@ -97,7 +97,7 @@ impl Composer {
 }
 
 /// The terms of one channel, added up in order.
-fn sum(graph: &mut Graph, summands: &[Summand], channel: usize) -> Node {
+fn sum(graph: &mut Graph, summands: &[Summand], channel: Channel) -> Node {
     let zero = graph.number(0.0);
     summands.iter().filter(|summand| summand.channel == channel).fold(zero, |sum, summand| graph.sum(sum, summand.node))
 }
@@ -113,7 +113,7 @@ struct Chain<'a> {
     /// What it stands for in the formulas of one effect, where that differs.
     within: HashMap<(usize, String), Node>,
     /// The accelerations so far, for the formulas that read them.
-    predicted: Option<[Node; 6]>,
+    predicted: Option<PerChannel<Node>>,
     numbers: BTreeMap<Free, Node>,
 }
 
@@ -350,7 +350,7 @@ impl Chain<'_> {
     }
 
     /// The signals that are sums of terms, before any effect changes them.
-    fn rotor_signals(&mut self) -> Result<Vec<(&'static str, usize, Node)>> {
+    fn rotor_signals(&mut self) -> Result<Vec<(&'static str, Channel, Node)>> {
         let mut plain = Vec::new();
         for signal in &SIGNALS {
             let Plain::Terms(kinds, channel) = signal.plain else { continue };
@@ -366,7 +366,7 @@ impl Chain<'_> {
     }
 
     /// The terms behind a signal: indices of effect and term.
-    fn carried(&self, kinds: &[&str], channel: usize) -> Vec<(usize, usize)> {
+    fn carried(&self, kinds: &[&str], channel: Channel) -> Vec<(usize, usize)> {
         let of = |(index, effect): (usize, &Effect)| {
             let terms = effect.terms.iter().enumerate().filter(|(_, term)| term.channel == channel);
             terms.map(|(term, _)| (index, term)).collect::<Vec<_>>()
@@ -376,7 +376,7 @@ impl Chain<'_> {
 
     /// All summands in the order of the sums: the terms in the order of the model, a changed signal in the place of its first term, and
     /// last the effects that read the sum of the others, in the order of the catalogue.
-    fn summands(&mut self, plain: &[(&'static str, usize, Node)]) -> Result<Vec<Summand>> {
+    fn summands(&mut self, plain: &[(&'static str, Channel, Node)]) -> Result<Vec<Summand>> {
         let mut inside: HashMap<(usize, usize), Option<Summand>> = HashMap::new();
         let mut carried: Vec<Summand> = Vec::new();
         for &(name, channel, before) in plain {
@@ -417,7 +417,7 @@ impl Chain<'_> {
         readers.sort_by_key(|&index| rank(&model.effects[index]));
         for index in readers {
             let graph = &mut self.composer.graph;
-            self.predicted = Some(std::array::from_fn(|channel| sum(graph, &summands, channel)));
+            self.predicted = Some(PerChannel::from_fn(|channel| sum(graph, &summands, channel)));
             let own: Vec<Summand> = (0..model.effects[index].terms.len())
                 .map(|term| {
                     Ok(Summand { channel: model.effects[index].terms[term].channel, effect: index, node: self.term(index, term)? })

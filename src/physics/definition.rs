@@ -3,7 +3,7 @@
 
 use super::effect::{Coefficient, Effect, Parameter, Swap, Term};
 use super::sign::Sign;
-use crate::flight::GRAVITY_M_S2;
+use crate::flight::{Channel, GRAVITY_M_S2};
 use crate::formula::Formula;
 
 /// Air density of the standard atmosphere at about 200 m, kg/m³: for the induced velocity in hover.
@@ -258,7 +258,7 @@ pub struct Definition {
     /// Numbers inside the formulas.
     pub parameters: &'static [ParameterDefinition],
     /// Channel (order of `Column::TARGETS`), coefficient (`None` is a fixed 1), regressor.
-    pub terms: &'static [(usize, Option<&'static str>, &'static str)],
+    pub terms: &'static [(Channel, Option<&'static str>, &'static str)],
     /// Changes to signals.
     pub swaps: &'static [SwapDefinition],
     /// Set for the effects of the catalogue; the baseline has none.

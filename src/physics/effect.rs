@@ -2,7 +2,7 @@
 //! in `compose`.
 
 use crate::error::{Error, Result};
-use crate::flight::Column;
+use crate::flight::Channel;
 use crate::flight::names::matching;
 use crate::formula::{Formula, Shared, shared};
 use std::collections::BTreeMap;
@@ -17,8 +17,8 @@ pub const FORMULA_COEFFICIENT: &str = "coefficient";
 /// One summand of one predicted acceleration: `coefficient * regressor`.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Term {
-    /// Index into [`Column::TARGETS`] of the acceleration it adds to.
-    pub channel: usize,
+    /// The acceleration it adds to.
+    pub channel: Channel,
     /// Name of the coefficient; `None` stands for a fixed 1, known from first principles. Terms that name the same coefficient
     /// of an effect share it, also across channels.
     pub coefficient: Option<String>,
@@ -131,8 +131,8 @@ impl Effect {
     ///
     /// # Errors
     /// [`Error::Formula`] if the text is no formula.
-    pub fn formula(name: impl Into<String>, channel: usize, formula: &str, value: f64) -> Result<Self> {
-        let unit = Column::TARGETS.get(channel).map_or("1", |column| column.unit());
+    pub fn formula(name: impl Into<String>, channel: Channel, formula: &str, value: f64) -> Result<Self> {
+        let unit = channel.unit();
         let term = Term { channel, coefficient: Some(FORMULA_COEFFICIENT.into()), regressor: Formula::parse(formula)? };
         Ok(Self { terms: vec![term], ..Self::own(name.into(), unit, value) })
     }
@@ -261,7 +261,7 @@ impl fmt::Display for Effect {
         let (terms, swaps) = formulas.split_at(self.terms.len());
         let mut gap = "";
         for (term, regressor) in self.terms.iter().zip(terms) {
-            let channel = Column::TARGETS.get(term.channel).map_or("?", |column| column.name());
+            let channel = term.channel.name();
             write!(f, "{gap}{channel} += ")?;
             match term.coefficient.as_deref().and_then(|name| self.coefficient(name)) {
                 Some(Coefficient { value, unit, .. }) => write!(f, "{value} {unit} * ({regressor})")?,

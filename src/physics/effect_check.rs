@@ -9,7 +9,7 @@ use crate::flight::Column;
 use crate::formula::Formula;
 
 impl Effect {
-    /// Checks that the effect is whole: channels exist, terms name coefficients it has, every coefficient is used, values are
+    /// Checks that the effect is whole: terms name coefficients it has, every coefficient is used, values are
     /// finite, and no regressor reads an acceleration.
     ///
     /// # Errors
@@ -20,9 +20,6 @@ impl Effect {
             Err(Error::Config { place: place.into(), field, found, expected: expected.into() })
         };
         for term in &self.terms {
-            if term.channel >= Column::TARGETS.len() {
-                return fault("channel", term.channel.to_string(), "0 to 5, an index of the six accelerations");
-            }
             if let Some(name) = term.coefficient.as_deref().filter(|name| self.coefficient(name).is_none()) {
                 return fault(name, "used by a term but not listed".into(), "a coefficient of the effect");
             }

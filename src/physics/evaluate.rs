@@ -7,7 +7,7 @@ use super::compose::{Composed, Composer};
 use super::model::Model;
 use crate::error::{Error, Result};
 use crate::flight::derived::Derived;
-use crate::flight::{Accelerations, Column, Flight};
+use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel};
 use crate::formula::{Formula, Machine, Node, Value};
 use std::ops::Range;
 
@@ -187,9 +187,9 @@ fn check_flight(model: &Model, composer: &Composer, composed: &Composed, flight:
 }
 
 /// A value of a model that is no number, as an error that says where.
-pub(super) fn not_finite(model: &Model, flight: &Flight, (effect, channel): (usize, usize), sample: usize) -> Error {
+pub(super) fn not_finite(model: &Model, flight: &Flight, (effect, channel): (usize, Channel), sample: usize) -> Error {
     let effect = model.effects.get(effect).map_or("?", |effect| effect.name.as_str());
-    let channel = Column::TARGETS.get(channel).map_or("?", |column| column.name());
+    let channel = channel.name();
     Error::Undetermined(format!(
         "effect `{effect}` is not a finite number for `{channel}` in flight `{}` at t = {:.3} s; guard its formula, for example \
          `max(height, 0.1)`",
@@ -215,7 +215,7 @@ pub(super) fn composed_for(model: &Model, flight: &Flight) -> Result<(Composer, 
 fn predict(model: &Model, flight: &Flight) -> Result<Accelerations> {
     let (composer, composed) = composed_for(model, flight)?;
     let nodes: Vec<Node> = composed.channels.iter().copied().chain(composed.summands.iter().map(|summand| summand.node)).collect();
-    let mut predicted: Accelerations = std::array::from_fn(|_| vec![0.0; flight.len()]);
+    let mut predicted: Accelerations = PerChannel::from_fn(|_| vec![0.0; flight.len()]);
     Bound::new(&composer, &nodes, flight.step_s, Some(flight))?.run(flight, flight.len(), &mut |range, block| {
         for (channel, values) in predicted.iter_mut().enumerate() {
             values[range.clone()].copy_from_slice(block.column(channel));
@@ -253,8 +253,8 @@ impl Model {
     ///
     /// # Errors
     /// As [`Model::predict`]; [`Error::Undetermined`] if the spans hold no row.
-    pub fn rmse(&self, flights: &[Flight], spans: &[crate::flight::Span]) -> Result<[f64; 6]> {
-        let mut squares = [0.0; 6];
+    pub fn rmse(&self, flights: &[Flight], spans: &[crate::flight::Span]) -> Result<PerChannel<f64>> {
+        let mut squares = PerChannel::splat(0.0);
         let mut rows = 0;
         for (index, flight) in flights.iter().enumerate() {
             let mut spans = spans.iter().filter(|span| span.flight == index).peekable();
@@ -294,7 +294,7 @@ impl StreamingModel {
         model.check()?;
         let mut composer = Composer::new();
         let composed = composer.add(model, None, false)?;
-        let bound = Bound::new(&composer, &composed.channels, step_s, None)?;
+        let bound = Bound::new(&composer, composed.channels.values(), step_s, None)?;
         Ok(Self { bound, step_s, start_s: 0.0, samples: 0, values: Vec::new() })
     }
 
@@ -315,7 +315,7 @@ impl StreamingModel {
     ///
     /// # Errors
     /// [`Error::Shape`] if the model reads further columns.
-    pub fn push(&mut self, state: &[f64; 16]) -> Result<[f64; 6]> {
+    pub fn push(&mut self, state: &[f64; 16]) -> Result<PerChannel<f64>> {
         self.push_with(state, &[])
     }
 
@@ -323,7 +323,7 @@ impl StreamingModel {
     ///
     /// # Errors
     /// [`Error::Shape`] if their count differs.
-    pub fn push_with(&mut self, state: &[f64; 16], extra: &[f64]) -> Result<[f64; 6]> {
+    pub fn push_with(&mut self, state: &[f64; 16], extra: &[f64]) -> Result<PerChannel<f64>> {
         let Bound { sources, extras, machine } = &mut self.bound;
         if extra.len() != extras.len() {
             let message = format!("{} further values for the columns {extras:?}", extra.len());
@@ -342,6 +342,6 @@ impl StreamingModel {
         }
         let values = &self.values;
         machine.advance(1, &|input| &values[input..=input]);
-        Ok(std::array::from_fn(|channel| machine.root(channel)[0]))
+        Ok(PerChannel::from_fn(|channel| machine.root(channel.index())[0]))
     }
 }

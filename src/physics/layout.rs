@@ -9,7 +9,7 @@ use super::evaluate::not_finite;
 use super::least_squares::{Cluster, Factor, Failure, Problem};
 use super::model::Model;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight};
+use crate::flight::{Channel, Flight, PerChannel};
 use crate::formula::Node;
 
 /// Which number stands behind which column of which channel: first those common to all flights, then those of a flight, and
@@ -18,17 +18,17 @@ pub(super) struct Layout {
     /// Numbers common to all flights.
     pub free: Vec<Free>,
     /// For each channel, its columns as indices into `free`.
-    pub channels: Vec<Vec<usize>>,
+    pub channels: PerChannel<Vec<usize>>,
     /// Coefficients that belong to a flight.
     pub own: Vec<Free>,
     /// For each channel, its further columns as indices into `own`.
-    pub own_channels: Vec<Vec<usize>>,
+    pub own_channels: PerChannel<Vec<usize>>,
     regressors: Vec<Regressor>,
 }
 
 impl Layout {
     pub(super) fn of(model: &Model, regressors: Vec<Regressor>) -> Self {
-        let none = || vec![Vec::new(); Column::TARGETS.len()];
+        let none = || PerChannel::splat(Vec::new());
         let mut layout = Self { free: Vec::new(), channels: none(), own: Vec::new(), own_channels: none(), regressors };
         for regressor in &layout.regressors {
             let Some(number) = regressor.number else { continue };
@@ -86,7 +86,7 @@ impl Layout {
         // A coefficient of a flight that is not from the catalogue: one of its unit.
         by_flight::Own {
             deviations: self.own.iter().map(|place| deviation(place).unwrap_or(1.0)).collect(),
-            channels: self.own_channels.clone(),
+            channels: self.own_channels.values().to_vec(),
         }
     }
 
@@ -102,8 +102,8 @@ impl Layout {
     }
 
     /// Columns of each channel without the regressand.
-    fn widths(&self) -> impl Iterator<Item = usize> + '_ {
-        self.channels.iter().zip(&self.own_channels).map(|(free, own)| free.len() + own.len())
+    fn widths(&self) -> PerChannel<usize> {
+        PerChannel::from_fn(|channel| self.channels[channel].len() + self.own_channels[channel].len())
     }
 
     /// Reduces the chosen rows of one flight to clusters of about equal length.
@@ -116,19 +116,19 @@ impl Layout {
     ) -> Result<Vec<Cluster>> {
         let nodes: Vec<Node> = self.regressors.iter().map(|regressor| regressor.node).collect();
         let targets: Vec<Option<usize>> = self.regressors.iter().map(|regressor| self.column(regressor)).collect();
-        let empty = Cluster { flight: index, factors: self.widths().map(|columns| Factor::new(columns + 1)).collect() };
+        let empty = Cluster { flight: index, factors: self.widths().into_iter().map(|columns| Factor::new(columns + 1)).collect() };
         let mut reduced = vec![empty; clusters];
         let rows: usize = ranges.iter().map(|range| range.1 - range.0).sum();
         let mut seen = 0;
         let mut pieces: Vec<(usize, usize)> = ranges.to_vec();
         pieces.reverse();
         // One matrix a channel: its regressors, then the measured acceleration minus what is fixed.
-        let mut matrices: Vec<Vec<Vec<f64>>> = self.widths().map(|columns| vec![Vec::new(); columns + 1]).collect();
+        let mut matrices: PerChannel<Vec<Vec<f64>>> = self.widths().map(|columns| vec![Vec::new(); columns + 1]);
         columns.evaluate(&nodes, flight, ranges.last().map_or(0, |range| range.1), &mut |range, values| {
-            for (matrix, target) in matrices.iter_mut().zip(Column::TARGETS) {
+            for (channel, matrix) in matrices.pairs_mut() {
                 matrix.iter_mut().for_each(|column| column.clear());
                 let (measured, columns) = matrix.split_last_mut().expect("the regressand is there");
-                measured.extend_from_slice(&flight.column(target)[range.clone()]);
+                measured.extend_from_slice(&flight.column(channel.column())[range.clone()]);
                 columns.iter_mut().for_each(|column| column.resize(range.len(), 0.0));
             }
             for (place, (regressor, target)) in self.regressors.iter().zip(&targets).enumerate() {
@@ -170,7 +170,7 @@ impl Layout {
 
     /// Groups of channels that share coefficients, each with its coefficients.
     pub(super) fn problems(&self) -> Vec<(Vec<Free>, Problem)> {
-        let mut group: Vec<usize> = (0..self.channels.len()).collect();
+        let mut group: Vec<usize> = (0..Channel::COUNT).collect();
         for (left, left_columns) in self.channels.iter().enumerate() {
             for (right, right_columns) in self.channels.iter().enumerate().skip(left + 1) {
                 if left_columns.iter().any(|column| right_columns.contains(column)) {
@@ -180,9 +180,9 @@ impl Layout {
             }
         }
         let mut problems = Vec::new();
-        for root in 0..self.channels.len() {
-            let channels: Vec<usize> =
-                (0..self.channels.len()).filter(|&channel| group[channel] == root && !self.channels[channel].is_empty()).collect();
+        for root in 0..Channel::COUNT {
+            let is_in = |channel: &Channel| group[channel.index()] == root && !self.channels[*channel].is_empty();
+            let channels: Vec<Channel> = Channel::ALL.into_iter().filter(is_in).collect();
             let mut members: Vec<usize> = channels.iter().flat_map(|&channel| self.channels[channel].iter().copied()).collect();
             members.sort_unstable();
             members.dedup();
@@ -191,7 +191,7 @@ impl Layout {
             }
             let place = |column: &usize| members.binary_search(column).unwrap_or_default();
             let channels =
-                channels.into_iter().map(|channel| (channel, self.channels[channel].iter().map(place).collect())).collect();
+                channels.into_iter().map(|channel| (channel.index(), self.channels[channel].iter().map(place).collect())).collect();
             problems.push((
                 members.iter().map(|&member| self.free[member]).collect(),
                 Problem { coefficients: members.len(), channels },

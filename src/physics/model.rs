@@ -41,6 +41,18 @@ pub struct ModelData {
 }
 
 /// A first-principles model of an unmanned helicopter: predicted acceleration = sum of the terms of its enabled effects.
+///
+/// # Examples
+/// ```
+/// use phyture::flight::Channel;
+/// use phyture::physics::{Effect, Model};
+///
+/// let mut model = Model::paper("helicopter", 8.1, [0.18, 0.34, 0.28], 0.78);
+/// model.effects.push(Effect::formula("tail_in_wake", Channel::WyDot, "exp(-((vx - 7) / 2)^2)", 1.5)?);
+/// let added = model.effect("tail_in_wake").expect("it was just added");
+/// assert_eq!(added.to_string(), "wy_dot += 1.5 rad/s² per unit * (exp(-((vx - 7) / 2)^2))");
+/// # Ok::<(), phyture::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Model {
     /// Name of the aircraft or of the model.

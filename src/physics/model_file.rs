@@ -11,7 +11,7 @@ use super::signal::{SIGNALS, changeable, signal_named};
 use super::toml_section::{Section, line_of, number};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
-use crate::flight::Column;
+use crate::flight::Channel;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -426,9 +426,9 @@ fn numbers(effect: &Effect) -> Vec<&str> {
 }
 
 /// The index of an acceleration by name.
-fn channel_named(section: &Section<'_>, channel: &str) -> Result<usize> {
-    let names = Column::TARGETS.map(Column::name);
-    names.iter().position(|name| *name == channel).ok_or_else(|| {
+fn channel_named(section: &Section<'_>, channel: &str) -> Result<Channel> {
+    let names = Channel::ALL.map(Channel::name);
+    Channel::from_name(channel).ok_or_else(|| {
         let found = format!("`{channel}`{}", did_you_mean(channel, names));
         section.fault("channel", found, format!("one of `{}`", names.join("`, `")))
     })
@@ -468,7 +468,7 @@ fn write_effect(text: &mut String, effect: &Effect) {
     };
     if effect.kind == FORMULA_KIND {
         if let Some(term) = effect.terms.first() {
-            line("channel", quoted(Column::TARGETS.get(term.channel).map_or("", |column| column.name())));
+            line("channel", quoted(term.channel.name()));
             line("formula", quoted(&term.regressor.to_string()));
         } else if let Some((signal, formula)) = effect.own_change() {
             line("changes", quoted(signal));

@@ -2,7 +2,7 @@
 //! how a model is put together from them is in `compose`.
 
 use super::effect::Effect;
-use crate::flight::Column;
+use crate::flight::{Channel, Column};
 
 /// How far along the way from the sticks to the accelerations a signal lies: a formula that changes one may read those of its own stage
 /// and of earlier ones.
@@ -30,11 +30,11 @@ pub enum Plain {
     /// The length of the velocity against the air, or one of its angles.
     OfAir,
     /// The sum of the terms of these effects in one acceleration, to which the signal adds as a whole.
-    Terms(&'static [&'static str], usize),
+    Terms(&'static [&'static str], Channel),
     /// 1.
     One,
     /// The predicted acceleration of this index, of all effects up to the one that reads it.
-    Predicted(usize),
+    Predicted(Channel),
 }
 
 /// One row of the table.
@@ -86,17 +86,17 @@ pub const SIGNALS: [Signal; 35] = [
     signal("airspeed", "m/s", Stage::Air, Plain::OfAir, "length of the velocity against the air"),
     signal("alpha", "rad", Stage::Air, Plain::OfAir, "angle of attack"),
     signal("beta", "rad", Stage::Air, Plain::OfAir, "sideslip"),
-    signal("thrust", "m/s²", Stage::Rotor, Plain::Terms(THRUST, 2), "specific force of the main rotor along body z, up negative"),
-    signal("rotor_roll", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, 3), "roll that the tilted disc makes"),
-    signal("rotor_pitch", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, 4), "pitch that the tilted disc makes"),
-    signal("tail_thrust", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, 5), "thrust of the tail rotor, as the yaw that it makes"),
+    signal("thrust", "m/s²", Stage::Rotor, Plain::Terms(THRUST, Channel::VzDot), "specific force of the main rotor along body z, up negative"),
+    signal("rotor_roll", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, Channel::WxDot), "roll that the tilted disc makes"),
+    signal("rotor_pitch", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, Channel::WyDot), "pitch that the tilted disc makes"),
+    signal("tail_thrust", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, Channel::WzDot), "thrust of the tail rotor, as the yaw that it makes"),
     signal("rotor_speed", "1", Stage::Rotor, Plain::One, "speed of the main rotor over its nominal one"),
-    signal("predicted_vx", "m/s²", Stage::Outcome, Plain::Predicted(0), "predicted acceleration along the nose"),
-    signal("predicted_vy", "m/s²", Stage::Outcome, Plain::Predicted(1), "predicted acceleration to starboard"),
-    signal("predicted_vz", "m/s²", Stage::Outcome, Plain::Predicted(2), "predicted acceleration along body down"),
-    signal("predicted_wx", "rad/s²", Stage::Outcome, Plain::Predicted(3), "predicted roll acceleration"),
-    signal("predicted_wy", "rad/s²", Stage::Outcome, Plain::Predicted(4), "predicted pitch acceleration"),
-    signal("predicted_wz", "rad/s²", Stage::Outcome, Plain::Predicted(5), "predicted yaw acceleration"),
+    signal("predicted_vx", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VxDot), "predicted acceleration along the nose"),
+    signal("predicted_vy", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VyDot), "predicted acceleration to starboard"),
+    signal("predicted_vz", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VzDot), "predicted acceleration along body down"),
+    signal("predicted_wx", "rad/s²", Stage::Outcome, Plain::Predicted(Channel::WxDot), "predicted roll acceleration"),
+    signal("predicted_wy", "rad/s²", Stage::Outcome, Plain::Predicted(Channel::WyDot), "predicted pitch acceleration"),
+    signal("predicted_wz", "rad/s²", Stage::Outcome, Plain::Predicted(Channel::WzDot), "predicted yaw acceleration"),
     signal("height", "m", Stage::Motion, Plain::Quantity("height"), "height above ground"),
 ];
 
@@ -144,8 +144,8 @@ mod tests {
             match signal.plain {
                 Plain::Quantity(name) => assert!(standard_names().contains(&name), "{name}"),
                 Plain::Signal(name) => assert!(stage_of(name) < signal.stage, "{name}"),
-                Plain::Terms(effects, channel) => {
-                    assert!(channel < 6 && effects.iter().all(|kind| catalogue::definition(kind).is_some()))
+                Plain::Terms(effects, _) => {
+                    assert!(effects.iter().all(|kind| catalogue::definition(kind).is_some()))
                 }
                 Plain::OfAir | Plain::One | Plain::Predicted(_) => {}
             }

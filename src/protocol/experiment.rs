@@ -11,7 +11,7 @@ use crate::critique::{Row, centred_difference, finite_difference, ridge};
 use crate::error::{Error, Result};
 use crate::flight::split::{Part, Split};
 use crate::flight::windows::windows;
-use crate::flight::{Column, Flight, Span, Window};
+use crate::flight::{Column, Flight, PerChannel, Span, Window};
 use crate::hybrid::linear::LinearConfig;
 use crate::hybrid::{Hybrid, Scale};
 use crate::nn::Init;
@@ -114,7 +114,7 @@ impl<'a> Experiment<'a> {
             }
             None => None,
         };
-        let predict = |flights: &[Flight], windows: &[Window]| -> Result<Vec<[f64; 6]>> {
+        let predict = |flights: &[Flight], windows: &[Window]| -> Result<Vec<PerChannel<f64>>> {
             let predicted = match (&hybrid, predictor) {
                 (Some(hybrid), _) => hybrid.predict(flights, windows, self.threads)?,
                 (None, Predictor::BackwardDifference) => finite_difference(flights, windows)?.predicted,
@@ -314,13 +314,13 @@ impl<'a> Experiment<'a> {
         all
     }
 
-    fn trace(&self, flight: usize, shown: &[Window], predicted: &[[f64; 6]]) -> Trace {
+    fn trace(&self, flight: usize, shown: &[Window], predicted: &[PerChannel<f64>]) -> Trace {
         let log = &self.flights[flight];
         Trace {
             flight: log.name.clone(),
             time_s: shown.iter().map(|window| log.time_s(window.last)).collect(),
-            measured: Column::TARGETS.map(|column| shown.iter().map(|window| log.column(column)[window.last]).collect()),
-            predicted: std::array::from_fn(|channel| predicted.iter().map(|values| values[channel]).collect()),
+            measured: PerChannel::from_fn(|channel| shown.iter().map(|window| log.column(channel.column())[window.last]).collect()),
+            predicted: PerChannel::from_fn(|channel| predicted.iter().map(|values| values[channel]).collect()),
         }
     }
 }
@@ -340,8 +340,8 @@ fn confirming(split: &Split) -> Split {
     Split { training, validation: Vec::new(), test, tested: Part::Test }
 }
 
-fn physics_at(model: &Model, flights: &[Flight], windows: &[Window]) -> Result<Vec<[f64; 6]>> {
+fn physics_at(model: &Model, flights: &[Flight], windows: &[Window]) -> Result<Vec<PerChannel<f64>>> {
     let columns = flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
-    let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
+    let at = |window: &Window| PerChannel::from_fn(|channel| columns[window.flight][channel][window.last]);
     Ok(windows.iter().map(at).collect())
 }

@@ -3,8 +3,8 @@
 
 use super::plan::Run;
 use crate::blocks::{BLOCK_S, Blocks};
-use crate::critique::PerChannel;
-use crate::flight::{Column, Flight, Window};
+use crate::critique::ChannelValues;
+use crate::flight::{Channel, Flight, PerChannel, Window};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ pub enum Condition {
     ControlNoise,
 }
 
-/// One ten-second segment of a test flight. Channels are in the order of [`Column::TARGETS`], m/s² and rad/s².
+/// One ten-second segment of a test flight. Channels are in the order of [`Channel::ALL`](crate::flight::Channel::ALL), m/s² and rad/s².
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Flight.
@@ -32,11 +32,11 @@ pub struct Segment {
     /// Windows judged in it.
     pub windows: usize,
     /// Σ e².
-    pub squares: [f64; 6],
+    pub squares: PerChannel<f64>,
     /// Σ |e|.
-    pub absolutes: [f64; 6],
+    pub absolutes: PerChannel<f64>,
     /// max |e|.
-    pub largest: [f64; 6],
+    pub largest: PerChannel<f64>,
 }
 
 /// Measured and predicted over one stretch of flight, for a figure.
@@ -47,9 +47,9 @@ pub struct Trace {
     /// Time of the log, s.
     pub time_s: Vec<f64>,
     /// By channel, m/s² and rad/s².
-    pub measured: [Vec<f64>; 6],
+    pub measured: PerChannel<Vec<f64>>,
     /// By channel, m/s² and rad/s².
-    pub predicted: [Vec<f64>; 6],
+    pub predicted: PerChannel<Vec<f64>>,
 }
 
 /// The end of a run.
@@ -72,23 +72,23 @@ pub struct Outcome {
 }
 
 /// Errors of `predicted`, which are finite, by segment, in the order of flight and time.
-pub(super) fn segments(flights: &[Flight], windows: &[Window], predicted: &[[f64; 6]]) -> Vec<Segment> {
+pub(super) fn segments(flights: &[Flight], windows: &[Window], predicted: &[PerChannel<f64>]) -> Vec<Segment> {
     let blocks = Blocks::new(flights, windows);
     let empty = |&(flight, block): &(usize, usize)| Segment {
         flight: flights[flight].name.clone(),
         manoeuvre: flights[flight].manoeuvre.clone(),
         start_s: block as f64 * BLOCK_S,
         windows: 0,
-        squares: [0.0; 6],
-        absolutes: [0.0; 6],
-        largest: [0.0; 6],
+        squares: PerChannel::splat(0.0),
+        absolutes: PerChannel::splat(0.0),
+        largest: PerChannel::splat(0.0),
     };
     let mut segments: Vec<Segment> = blocks.keys.iter().map(empty).collect();
     for ((window, predicted), block) in windows.iter().zip(predicted).zip(&blocks.of_window) {
         let segment = &mut segments[*block];
         segment.windows += 1;
-        for (channel, column) in Column::TARGETS.into_iter().enumerate() {
-            let error = (flights[window.flight].column(column)[window.last] - predicted[channel]).abs();
+        for channel in Channel::ALL {
+            let error = (flights[window.flight].column(channel.column())[window.last] - predicted[channel]).abs();
             segment.squares[channel] += error * error;
             segment.absolutes[channel] += error;
             segment.largest[channel] = segment.largest[channel].max(error);
@@ -101,9 +101,9 @@ pub(super) fn segments(flights: &[Flight], windows: &[Window], predicted: &[[f64
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sums {
     windows: usize,
-    squares: [f64; 6],
-    absolutes: [f64; 6],
-    largest: [f64; 6],
+    squares: PerChannel<f64>,
+    absolutes: PerChannel<f64>,
+    largest: PerChannel<f64>,
 }
 
 impl Sums {
@@ -111,7 +111,7 @@ impl Sums {
     pub fn of<'a>(segments: impl IntoIterator<Item = &'a Segment>) -> Self {
         segments.into_iter().fold(Self::default(), |mut sums, segment| {
             sums.windows += segment.windows;
-            for channel in 0..6 {
+            for channel in Channel::ALL {
                 sums.squares[channel] += segment.squares[channel];
                 sums.absolutes[channel] += segment.absolutes[channel];
                 sums.largest[channel] = sums.largest[channel].max(segment.largest[channel]);
@@ -126,23 +126,23 @@ impl Sums {
     }
 
     /// Root mean square error.
-    pub fn rmse(&self) -> PerChannel {
+    pub fn rmse(&self) -> ChannelValues {
         self.means(|sums, channel| sums.squares[channel], f64::sqrt)
     }
 
     /// Mean absolute error.
-    pub fn mae(&self) -> PerChannel {
+    pub fn mae(&self) -> ChannelValues {
         self.means(|sums, channel| sums.absolutes[channel], |mean| mean)
     }
 
     /// Largest absolute error.
-    pub fn max_abs(&self) -> PerChannel {
-        PerChannel::new(self.largest.map(|value| (self.windows > 0).then_some(value)))
+    pub fn max_abs(&self) -> ChannelValues {
+        ChannelValues::new(self.largest.map(|value| (self.windows > 0).then_some(value)))
     }
 
-    fn means(&self, sum: impl Fn(&Self, usize) -> f64, finish: fn(f64) -> f64) -> PerChannel {
-        let one = |channel: usize| (self.windows > 0).then(|| finish(sum(self, channel) / self.windows as f64));
-        PerChannel::new(std::array::from_fn(one))
+    fn means(&self, sum: impl Fn(&Self, Channel) -> f64, finish: fn(f64) -> f64) -> ChannelValues {
+        let one = |channel: Channel| (self.windows > 0).then(|| finish(sum(self, channel) / self.windows as f64));
+        ChannelValues::new(PerChannel::from_fn(one))
     }
 }
 
@@ -151,8 +151,8 @@ mod tests {
     use super::*;
     use crate::critique::{Row, compare};
     use crate::error::Result;
-    use crate::flight::Targets;
     use crate::flight::split::Part;
+    use crate::flight::{Column, Targets};
     use phyture_kernels::Tolerance;
     use proptest::prelude::*;
 
@@ -169,7 +169,7 @@ mod tests {
         fn sums_over_segments_are_the_measures_of_the_whole(values in prop::collection::vec(-5.0..5.0_f64, 2..200), stride in 1_usize..7) {
             let flights = [flight("a", &values)?, flight("b", &values[..values.len() / 2 + 1])?];
             let all: Vec<Window> = (0..2).flat_map(|flight| (0..flights[flight].len()).step_by(stride).map(move |last| Window { flight, last })).collect();
-            let predicted = vec![[0.25; 6]; all.len()];
+            let predicted = vec![PerChannel::splat(0.25); all.len()];
             let found = segments(&flights, &all, &predicted);
             let sums = Sums::of(&found);
             let expected = compare(&flights, &all, &[Row { name: "m".into(), predicted }], Part::All)?;
@@ -191,7 +191,7 @@ mod tests {
 
     #[test]
     fn nothing_has_no_error() {
-        assert_eq!(Sums::of(&[]).rmse(), PerChannel::default());
-        assert_eq!(Sums::of(&[]).max_abs(), PerChannel::default());
+        assert_eq!(Sums::of(&[]).rmse(), ChannelValues::default());
+        assert_eq!(Sums::of(&[]).max_abs(), ChannelValues::default());
     }
 }

@@ -8,8 +8,9 @@ use super::paper::{self, Printed};
 use super::plan::{
     ABLATION, COMPARISON, Division, FUSION, Plan, ROBUST, ROBUST_YARDSTICKS, Run, SWEEP, TREATMENTS, TableId, Treatment,
 };
-use crate::critique::PerChannel;
+use crate::critique::ChannelValues;
 use crate::error::Result;
+use crate::flight::{Channel, PerChannel};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -97,7 +98,7 @@ pub struct Finished {
 }
 
 /// One measure of the sums of errors.
-type Measure = (&'static str, fn(&Sums) -> PerChannel);
+type Measure = (&'static str, fn(&Sums) -> ChannelValues);
 const RMSE: Measure = ("RMSE", Sums::rmse);
 
 impl Finished {
@@ -175,7 +176,7 @@ impl Finished {
     fn row(&self, method: &Method, treatment: Treatment, condition: Condition, measure: Measure) -> TableRow {
         let outcomes = self.seeds(method.id, treatment);
         let of = |outcome: &&Outcome| outcome.conditions.get(&condition).map(|segments| measure.1(&Sums::of(segments)));
-        let found: Vec<PerChannel> = outcomes.iter().filter_map(of).collect();
+        let found: Vec<ChannelValues> = outcomes.iter().filter_map(of).collect();
         let planned = self.plan.runs_of(method.id, Division::Benchmark, treatment).len();
         let effects = outcomes.first().filter(|_| method.predictor.amended()).map(|outcome| &outcome.effects);
         row(method, measure.0, &found, planned, effects)
@@ -215,14 +216,14 @@ impl Finished {
     fn folds(&self) -> [Table; 2] {
         let pooled = |segments: &[Vec<Segment>]| Sums::of(segments.iter().flatten()).rmse();
         let averaged = |segments: &[Vec<Segment>]| {
-            let errors: Vec<PerChannel> = segments.iter().map(|fold| Sums::of(fold).rmse()).collect();
-            let mean = |channel: usize| {
+            let errors: Vec<ChannelValues> = segments.iter().map(|fold| Sums::of(fold).rmse()).collect();
+            let mean = |channel: Channel| {
                 let values: Option<Vec<f64>> = errors.iter().map(|error| error.channels()[channel]).collect();
                 values.filter(|values| !values.is_empty()).map(|values| values.iter().sum::<f64>() / values.len() as f64)
             };
-            PerChannel::new(std::array::from_fn(mean))
+            ChannelValues::new(PerChannel::from_fn(mean))
         };
-        let table = |id: &str, title: &str, combine: &dyn Fn(&[Vec<Segment>]) -> PerChannel, printed: bool| {
+        let table = |id: &str, title: &str, combine: &dyn Fn(&[Vec<Segment>]) -> ChannelValues, printed: bool| {
             let rows = self.plan.wanted(COMPARISON).filter_map(method).map(|method| {
                 let (found, planned) = self.over_folds(method, combine);
                 let mut row = row(method, "RMSE", &found, planned, None);
@@ -239,7 +240,7 @@ impl Finished {
     }
 
     /// One figure a seed of which all folds are done, and the seeds planned.
-    fn over_folds(&self, method: &Method, combine: &dyn Fn(&[Vec<Segment>]) -> PerChannel) -> (Vec<PerChannel>, usize) {
+    fn over_folds(&self, method: &Method, combine: &dyn Fn(&[Vec<Segment>]) -> ChannelValues) -> (Vec<ChannelValues>, usize) {
         let folds: Vec<Vec<Run>> =
             (0..self.plan.folds.len()).map(|fold| self.plan.runs_of(method.id, Division::Fold(fold), Treatment::Plain)).collect();
         let planned = folds.first().map_or(0, Vec::len);
@@ -281,10 +282,10 @@ impl Finished {
 
     /// Mean RMSE over the seeds of every method of Table 1 on every part of the test flights that `part` names (Figure 6 and the errors by
     /// manoeuvre). Parts are in the order of their names, methods in the order of the table.
-    pub fn by_part(&self, part: impl Fn(&Segment) -> String) -> BTreeMap<String, Vec<(&'static Method, PerChannel)>> {
-        let mut parts: BTreeMap<String, Vec<(&'static Method, PerChannel)>> = BTreeMap::new();
+    pub fn by_part(&self, part: impl Fn(&Segment) -> String) -> BTreeMap<String, Vec<(&'static Method, ChannelValues)>> {
+        let mut parts: BTreeMap<String, Vec<(&'static Method, ChannelValues)>> = BTreeMap::new();
         for method in self.plan.wanted(COMPARISON).filter_map(method) {
-            let mut errors: BTreeMap<String, Vec<PerChannel>> = BTreeMap::new();
+            let mut errors: BTreeMap<String, Vec<ChannelValues>> = BTreeMap::new();
             for outcome in self.seeds(method.id, Treatment::Plain) {
                 let mut groups: BTreeMap<String, Vec<&Segment>> = BTreeMap::new();
                 for segment in outcome.conditions.get(&Condition::Clean).into_iter().flatten() {
@@ -296,7 +297,7 @@ impl Finished {
             }
             for (name, errors) in errors {
                 let [channels @ .., _] = cells(&errors).map(|cell| cell.map(|cell| cell.mean));
-                parts.entry(name).or_default().push((method, PerChannel::new(channels)));
+                parts.entry(name).or_default().push((method, ChannelValues::new(channels.into())));
             }
         }
         parts
@@ -304,15 +305,15 @@ impl Finished {
 }
 
 /// Six channels and their mean, over seeds.
-fn cells(found: &[PerChannel]) -> [Option<Cell>; 7] {
+fn cells(found: &[ChannelValues]) -> [Option<Cell>; 7] {
     std::array::from_fn(|column| {
-        let value = |errors: &PerChannel| if column < 6 { errors.channels()[column] } else { errors.mean };
+        let value = |errors: &ChannelValues| Channel::from_index(column).map_or(errors.mean, |channel| errors.channels()[channel]);
         let values: Option<Vec<f64>> = found.iter().map(value).collect();
         Cell::of(&values?)
     })
 }
 
-fn row(method: &Method, measure: &'static str, found: &[PerChannel], planned: usize, effects: Option<&Vec<String>>) -> TableRow {
+fn row(method: &Method, measure: &'static str, found: &[ChannelValues], planned: usize, effects: Option<&Vec<String>>) -> TableRow {
     let added =
         effects.map(|effects| if effects.is_empty() { "added: nothing".into() } else { format!("added: {}", effects.join(", ")) });
     let note = [method.note.map(str::to_owned), added].into_iter().flatten().collect::<Vec<_>>().join("; ");
@@ -343,9 +344,9 @@ mod tests {
             manoeuvre: flight.into(),
             start_s: 0.0,
             windows,
-            squares: [error * error * windows as f64; 6],
-            absolutes: [error * windows as f64; 6],
-            largest: [error; 6],
+            squares: PerChannel::splat(error * error * windows as f64),
+            absolutes: PerChannel::splat(error * windows as f64),
+            largest: PerChannel::splat(error),
         };
         let segments = vec![segment("a", 1, error), segment("b", 3, 2.0 * error)];
         Outcome {

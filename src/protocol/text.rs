@@ -3,7 +3,7 @@
 use super::outcome::Segment;
 use super::plan::Treatment;
 use super::table::{Cell, Finished, Table, TableRow};
-use crate::critique::PerChannel;
+use crate::critique::ChannelValues;
 use crate::disk::write_atomically;
 use crate::error::{Error, Result};
 use crate::flight::Column;
@@ -144,7 +144,7 @@ fn parts_csv(first: &str, finished: &Finished, part: impl Fn(&Segment) -> String
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     for (part, methods) in finished.by_part(part) {
         for (method, error) in methods {
-            let PerChannel { mean, .. } = error;
+            let ChannelValues { mean, .. } = error;
             let figures: Vec<String> = error.channels().into_iter().chain([mean]).map(number).collect();
             let _ = writeln!(text, "{part},{},{}", method.id, figures.join(","));
         }

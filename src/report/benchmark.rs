@@ -3,9 +3,9 @@
 
 use super::figures::{self, LineData};
 use super::page::{Cell, Map, MapCell, Page, Part, Section, Table};
-use crate::critique::PerChannel;
+use crate::critique::ChannelValues;
 use crate::critique::digits::{DIGITS, significant};
-use crate::flight::Column;
+use crate::flight::{Channel, Column};
 use crate::protocol::table::{self, Finished, TableRow};
 use crate::protocol::text::{basis, cell, is_best, row_name};
 use crate::protocol::{Method, Segment};
@@ -14,7 +14,7 @@ use crate::protocol::{Method, Segment};
 const SHOWN: [&str; 4] = ["phyture", "phyture_amended", "cnn_lstm", "physical_baseline"];
 
 /// A method's errors on one part of the flights.
-type Errors = Vec<(&'static Method, PerChannel)>;
+type Errors = Vec<(&'static Method, ChannelValues)>;
 
 /// The page of what is finished.
 pub fn benchmark_page(finished: &Finished) -> Page {
@@ -97,14 +97,14 @@ fn segments_figure(finished: &Finished, part: impl Fn(&Segment) -> String) -> fi
     let parts = finished.by_part(part);
     let methods: Vec<_> = parts.values().next().into_iter().flatten().map(|(method, _)| *method).collect();
     let line = |id: &str| {
-        let values = |channel: usize| {
+        let values = |channel: Channel| {
             let of = |errors: &Errors| {
                 let found = errors.iter().find(|(method, _)| method.id == id);
                 found.and_then(|(_, error)| error.channels()[channel]).unwrap_or(f64::NAN)
             };
             parts.values().map(of).collect::<Vec<f64>>()
         };
-        (0..6).map(values).collect::<Vec<_>>()
+        Channel::ALL.into_iter().map(values).collect::<Vec<_>>()
     };
     let number: Vec<f64> = (1..=parts.len()).map(|number| number as f64).collect();
     let mut order: Vec<&Method> = methods.into_iter().filter(|method| SHOWN.contains(&method.id)).collect();
@@ -122,11 +122,11 @@ fn traces(finished: &Finished) -> Option<Section> {
     let (_, first) = traces.first()?;
     let mut order: Vec<_> = traces.iter().filter(|(method, _)| SHOWN.contains(&method.id)).collect();
     order.sort_by_key(|(method, _)| rank(method));
-    let measured = LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.to_vec() };
+    let measured = LineData { name: "measured".into(), x: first.time_s.clone(), y: first.measured.values().to_vec() };
     let predicted = order.into_iter().map(|(method, trace)| LineData {
         name: method.name.into(),
         x: trace.time_s.clone(),
-        y: trace.predicted.to_vec(),
+        y: trace.predicted.values().to_vec(),
     });
     let lines: Vec<LineData> = [measured].into_iter().chain(predicted).collect();
     let panels: Vec<(String, String)> = channels().collect();

@@ -31,7 +31,11 @@ for (const table of document.querySelectorAll("table")) {
   });
 }
 
-const pressed = (key, act) => {
+// A button in the item of a list: the item itself has to stay one.
+const pressed = (item, act) => {
+  const key = document.createElement("span");
+  key.append(...item.childNodes);
+  item.append(key);
   key.setAttribute("role", "button");
   key.setAttribute("aria-pressed", "true");
   key.tabIndex = 0;

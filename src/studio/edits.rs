@@ -6,7 +6,7 @@ use super::trace::{Move, moved_model};
 use super::{Studio, fault, held};
 use crate::critique::diagnose::{Diagnosis, searched};
 use crate::error::{Error, Result};
-use crate::flight::Column;
+use crate::flight::Channel;
 use crate::physics::{Effect, Model, calibrate, catalogue, signal_named};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -21,8 +21,8 @@ const DRAFT: &str = "formula_being_written";
 #[derive(Clone, Debug, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Owner {
-    /// The acceleration of this index.
-    Channel(usize),
+    /// An acceleration.
+    Channel(Channel),
     /// The signal of this name.
     Signal(String),
 }
@@ -95,6 +95,7 @@ impl Studio {
             // What cannot be judged, such as a formula that is no number in some flight, is no step.
             self.judge.path(&self.set, &self.split, &path)?;
             held(&self.history).push(state);
+            self.keep();
         }
         self.steps()
     }
@@ -169,7 +170,7 @@ impl Studio {
         };
         model.effects.retain(|known| known.name != name);
         model.effects.push(Effect { enabled: true, ..effect });
-        if !model.acts(model.effects.len() - 1)?.contains(&true) {
+        if !model.acts(model.effects.len() - 1)?.values().contains(&true) {
             return Err(fault(
                 "effect",
                 format!("`{name}`, which changes nothing here"),
@@ -245,8 +246,7 @@ fn own_effect(model: &Model, name: &str, owner: &Owner, formula: &str) -> Result
         return Err(fault("name", format!("`{name}`, the name of an effect"), "a name that no effect has"));
     }
     let effect = match owner {
-        Owner::Channel(channel) if *channel < Column::TARGETS.len() => Effect::formula(name, *channel, formula, 0.0)?,
-        Owner::Channel(channel) => return Err(fault("channel", channel.to_string(), "0 to 5")),
+        Owner::Channel(channel) => Effect::formula(name, *channel, formula, 0.0)?,
         Owner::Signal(signal) if signal_named(signal).is_some() => Effect::change(name, signal, formula, 0.0)?,
         Owner::Signal(signal) => return Err(fault("signal", format!("`{signal}`"), "a signal of the model")),
     };

@@ -1,13 +1,15 @@
 //! The states that the model went through, as a list with a place in it: undo and redo move the place, a step after an undo replaces what came
 //! after. States never change.
 
-use super::{Studio, held};
+use super::{LeftText, Progress, Studio, held};
 use crate::critique::diagnose::Diagnosis;
-use crate::critique::{Intervals, PerChannel};
+use crate::critique::{ChannelValues, Intervals};
 use crate::error::Result;
 use crate::physics::{Calibration, Model};
 use serde::Serialize;
+use std::collections::BTreeSet;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 /// A model, and how it came about.
 #[derive(Clone)]
@@ -29,15 +31,31 @@ impl State {
 }
 
 /// All states, and which is shown.
+#[derive(Clone)]
 pub(super) struct History {
     states: Vec<Arc<State>>,
     at: usize,
     next: u64,
+    /// States that a save holds, or is the sum of.
+    safe: BTreeSet<u64>,
 }
 
 impl History {
     pub fn new(first: State) -> Self {
-        Self { states: vec![Arc::new(first)], at: 0, next: 1 }
+        // What a studio opens with is read, or calibrated anew.
+        let safe = [first.id].into();
+        Self { states: vec![Arc::new(first)], at: 0, next: 1, safe }
+    }
+
+    /// All states, the place of the present one, and whether any of them would be lost.
+    pub fn unsaved(&self) -> (Vec<Arc<State>>, usize, bool) {
+        (self.states.clone(), self.at, self.states.iter().any(|state| !self.safe.contains(&state.id)))
+    }
+
+    /// A state was saved, and with it what led to it.
+    pub fn is_saved(&mut self, id: u64) {
+        let end = self.states.iter().position(|state| state.id == id).map_or(0, |at| at + 1);
+        self.safe.extend(self.states[..end].iter().map(|state| state.id));
     }
 
     pub fn now(&self) -> Arc<State> {
@@ -72,7 +90,7 @@ impl History {
         to.is_some()
     }
 
-    fn go_to(&mut self, id: u64) -> bool {
+    pub fn go_to(&mut self, id: u64) -> bool {
         let to = self.states.iter().position(|state| state.id == id);
         self.at = to.unwrap_or(self.at);
         to.is_some()
@@ -87,7 +105,7 @@ pub struct StepText {
     /// What was done.
     pub did: String,
     /// Root mean square error on what judges, m/s² and rad/s²; absent for states that were undone.
-    pub rmse: Option<PerChannel>,
+    pub rmse: Option<ChannelValues>,
     /// Its 95 % interval.
     pub ci95: Option<Intervals>,
     /// Whether its numbers come from a calibration of this very model.
@@ -111,6 +129,25 @@ pub struct Steps {
     pub file: Option<String>,
     /// Whether that file is another than the one that was read or written here last.
     pub file_changed: bool,
+    /// The file in which unsaved steps lie until they are saved.
+    pub kept: Option<String>,
+    /// Why unsaved steps are not kept on disk.
+    pub unkept: Option<String>,
+    /// Unsaved steps that earlier studios left.
+    pub left: Vec<LeftText>,
+    /// As [`Pulse::revision`].
+    pub revision: u64,
+}
+
+/// What a page asks for every other second.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Pulse {
+    /// Grows with every change of the history or of what is saved.
+    pub revision: u64,
+    /// Whether the model's file is another than the one that was read or written here last.
+    pub file_changed: bool,
+    /// How far a search is.
+    pub search: Progress,
 }
 
 impl Studio {
@@ -119,6 +156,8 @@ impl Studio {
     /// # Errors
     /// As [`Model::predict`].
     pub fn steps(&self) -> Result<Steps> {
+        // Before the rest: a change meanwhile is then seen by the next pulse.
+        let revision = self.revision.load(Ordering::Relaxed);
         let (path, all, at) = {
             let history = held(&self.history);
             (history.path(), history.states.clone(), history.at)
@@ -131,16 +170,31 @@ impl Studio {
             ci95: errors.of.get(index).map(|found| found.1),
             calibrated: state.calibration.is_some(),
         };
+        let (kept, unkept, left) = {
+            let drafts = held(&self.drafts);
+            (drafts.file(), drafts.fault(), drafts.left())
+        };
         let file = held(&self.file);
+        let file_changed = file.is_changed();
         Ok(Steps {
             steps: all.iter().enumerate().map(text).collect(),
             at,
             judged_on: errors.basis,
             own_from_first_half: errors.halves,
-            saved: file.holds(&all[at].model),
+            saved: file.holds(&all[at].model) && !file_changed,
             file: file.name(),
-            file_changed: file.is_changed(),
+            file_changed,
+            kept,
+            unkept,
+            left,
+            revision,
         })
+    }
+
+    /// Whether a page still shows what is.
+    pub fn pulse(&self) -> Pulse {
+        let file_changed = held(&self.file).is_changed();
+        Pulse { revision: self.revision.load(Ordering::Relaxed), file_changed, search: self.progress() }
     }
 
     /// One step back; nothing at the first.
@@ -149,6 +203,7 @@ impl Studio {
     /// As [`Studio::steps`].
     pub fn undo(&self) -> Result<Steps> {
         held(&self.history).step(-1);
+        self.keep();
         self.steps()
     }
 
@@ -158,6 +213,7 @@ impl Studio {
     /// As [`Studio::steps`].
     pub fn redo(&self) -> Result<Steps> {
         held(&self.history).step(1);
+        self.keep();
         self.steps()
     }
 
@@ -167,6 +223,7 @@ impl Studio {
     /// As [`Studio::steps`].
     pub fn go_to(&self, id: u64) -> Result<Steps> {
         held(&self.history).go_to(id);
+        self.keep();
         self.steps()
     }
 }

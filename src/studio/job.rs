@@ -9,7 +9,7 @@ use crate::workflow::{SearchTask, convention_fault};
 use serde::Serialize;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// How far it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -57,6 +57,15 @@ pub(super) struct Job {
     ended: Option<(f64, Result<Heard>)>,
 }
 
+/// A search that ended well.
+pub(super) struct Known {
+    pub state: Arc<State>,
+    pub diagnosis: Arc<Diagnosis>,
+    pub model: Arc<Model>,
+    pub seconds: f64,
+    pub ended: Instant,
+}
+
 /// What a search found, and the model with it.
 type Heard = (Arc<Diagnosis>, Arc<Model>);
 
@@ -85,6 +94,7 @@ impl Studio {
                 if let Some(job) = held(&studio.job).as_mut() {
                     job.ended = Some((begun.elapsed().as_secs_f64(), outcome));
                 }
+                studio.keep();
             };
             let started = std::thread::Builder::new().name("search".into()).spawn(run);
             started.map_err(|error| Error::Undetermined(format!("the search cannot be started: {error}")))?;
@@ -123,15 +133,13 @@ impl Studio {
             state_did: None,
         };
         let Some(job) = job.as_ref() else { return nothing };
-        let (progress, error, diagnosis) = match &job.ended {
-            None if job.watch.is_stopped() => (Progress::Stopping, None, None),
-            None => (Progress::Running, None, None),
-            Some((_, Ok((diagnosis, _)))) => (Progress::Done, None, Some(Diagnosis::clone(diagnosis))),
-            Some((_, Err(Error::Interrupted { .. }))) => (Progress::Stopped, None, None),
-            Some((_, Err(error))) => (Progress::Failed, Some(error.to_string()), None),
+        let (error, diagnosis) = match &job.ended {
+            None | Some((_, Err(Error::Interrupted { .. }))) => (None, None),
+            Some((_, Ok((diagnosis, _)))) => (None, Some(Diagnosis::clone(diagnosis))),
+            Some((_, Err(error))) => (Some(error.to_string()), None),
         };
         JobText {
-            progress,
+            progress: job.progress(),
             stage: job.watch.stage(),
             seconds: job.ended.as_ref().map_or_else(|| job.begun.elapsed().as_secs_f64(), |ended| ended.0),
             error,
@@ -144,5 +152,43 @@ impl Studio {
     /// What the last search found, and the model with it.
     pub(super) fn outcome(&self) -> Option<Heard> {
         held(&self.job).as_ref().and_then(|job| Some(job.ended.as_ref()?.1.as_ref().ok()?.clone()))
+    }
+
+    /// How far the search is.
+    pub(super) fn progress(&self) -> Progress {
+        held(&self.job).as_ref().map_or(Progress::Idle, Job::progress)
+    }
+
+    /// The last search, if it ended well.
+    pub(super) fn heard(&self) -> Option<Known> {
+        let job = held(&self.job);
+        let job = job.as_ref()?;
+        let (seconds, Ok((diagnosis, model))) = job.ended.as_ref()? else { return None };
+        let ended = job.begun + Duration::try_from_secs_f64(*seconds).unwrap_or_default();
+        let (state, diagnosis, model) = (Arc::clone(&job.state), Arc::clone(diagnosis), Arc::clone(model));
+        Some(Known { state, diagnosis, model, seconds: *seconds, ended })
+    }
+
+    /// Takes what an earlier studio found for a search of this one, unless this one has searched itself.
+    pub(super) fn hear(&self, state: Arc<State>, seconds: f64, diagnosis: Diagnosis, model: Model) {
+        let mut job = held(&self.job);
+        if job.is_none() {
+            let ended = Some((seconds, Ok((Arc::new(diagnosis), Arc::new(model)))));
+            let now = Instant::now();
+            let begun = Duration::try_from_secs_f64(seconds).ok().and_then(|took| now.checked_sub(took)).unwrap_or(now);
+            *job = Some(Job { watch: Watch::default(), begun, state, ended });
+        }
+    }
+}
+
+impl Job {
+    fn progress(&self) -> Progress {
+        match &self.ended {
+            None if self.watch.is_stopped() => Progress::Stopping,
+            None => Progress::Running,
+            Some((_, Ok(_))) => Progress::Done,
+            Some((_, Err(Error::Interrupted { .. }))) => Progress::Stopped,
+            Some((_, Err(_))) => Progress::Failed,
+        }
     }
 }

@@ -3,7 +3,7 @@
 
 use super::held;
 use super::history::State;
-use crate::critique::{Intervals, PerChannel, Row};
+use crate::critique::{ChannelValues, Intervals, Row};
 use crate::error::Result;
 use crate::flight::split::{Part, Split};
 use crate::flight::windows::windows;
@@ -39,7 +39,7 @@ pub enum PartWanted {
 type Key = (u64, PartWanted, bool);
 
 /// An error by channel with its interval.
-type Errors = (PerChannel, Intervals);
+type Errors = (ChannelValues, Intervals);
 
 /// The errors of a state, what they were judged on, and whether that is second halves.
 type Known = (Errors, String, bool);

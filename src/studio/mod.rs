@@ -6,6 +6,7 @@
 //! machine; nothing else here knows of one.
 
 mod describe;
+mod draft;
 mod edits;
 mod history;
 mod job;
@@ -17,8 +18,9 @@ mod trace;
 mod views;
 
 pub use describe::{ChannelText, EffectText, FlightText, ModelText, NumberText, Overview};
+pub use draft::LeftText;
 pub use edits::{Edit, FormulaCheck, Owner};
-pub use history::{StepText, Steps};
+pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
 pub use save::Saved;
@@ -35,6 +37,7 @@ use history::{History, State};
 use job::Job;
 use judge::Judge;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What a studio opens with.
@@ -69,6 +72,10 @@ pub struct Studio {
     dependences: Mutex<views::Dependences>,
     tables: Mutex<surfaces::Tables>,
     file: Mutex<save::ModelFile>,
+    /// Taken before the locks of history and search, where both are needed.
+    drafts: Mutex<draft::Drafts>,
+    /// Grows with every change that a page has to show.
+    revision: AtomicU64,
 }
 
 /// The content of a lock. A panic while it was held left whole states behind: they are replaced as wholes.
@@ -99,6 +106,7 @@ impl Studio {
             false => State::first("model as it was opened", model),
         };
         let judge = Judge::new(&set, &split);
+        let drafts = Mutex::new(draft::Drafts::beside(file.as_deref(), &data, &set.source.sha256));
         let file = Mutex::new(save::ModelFile::of(file));
         Ok(Self {
             set,
@@ -114,6 +122,8 @@ impl Studio {
             dependences: Mutex::default(),
             tables: Mutex::default(),
             file,
+            drafts,
+            revision: AtomicU64::default(),
         })
     }
 

@@ -8,6 +8,7 @@ use crate::physics::{Entry, Model};
 use crate::workflow::{append_to_ledger, provenance};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// The file of the model, and what was last read from it or written to it.
 pub(super) struct ModelFile {
@@ -63,7 +64,8 @@ impl Studio {
         let mut file = held(&self.file);
         let read: Vec<&Path> = file.path.iter().filter(|_| overwrite).map(PathBuf::as_path).collect();
         let target = Target::file(&path, if overwrite { Existing::Replace } else { Existing::Keep }, &read)?;
-        let mut model = self.now().model.clone();
+        let now = self.now();
+        let mut model = now.model.clone();
         model.note_source(&self.set.source, self.seed);
         let spans = crate::critique::diagnose::searched(&self.split);
         let seconds: f64 = spans.iter().map(|span| (span.end - span.start) as f64 * self.set.flights[span.flight].step_s).sum();
@@ -73,6 +75,10 @@ impl Studio {
         model.write(ready)?;
         let ledger = self.note_found(&model, &path.with_extension("ledger.jsonl"))?;
         *file = ModelFile::of(Some(path.clone()));
+        drop(file);
+        held(&self.history).is_saved(now.id);
+        held(&self.drafts).saved = Some(Instant::now());
+        self.keep();
         Ok(Saved { file: path.display().to_string(), kept: kept.map(|kept| kept.display().to_string()), ledger })
     }
 

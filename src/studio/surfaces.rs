@@ -1,13 +1,13 @@
 //! The residual of one channel over two variables at once: where one of them alone hides what happens.
 
 use super::judge::PartWanted;
-use super::{Studio, fault, held};
+use super::{Studio, held};
 use crate::blocks::BLOCK_S;
 use crate::critique::diagnose::{Met, met};
 use crate::critique::residual_views::{Surface, informative_pair, surface};
 use crate::critique::unknown::{ROWS_MAX, ResidualTable};
 use crate::error::Result;
-use crate::flight::{Accelerations, Column};
+use crate::flight::{Accelerations, Channel, Column};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub struct SurfaceWanted {
     #[serde(default)]
     pub part: PartWanted,
     /// Index of the acceleration.
-    pub channel: usize,
+    pub channel: Channel,
     /// Both variables; without them the pair that tells most.
     #[serde(default)]
     pub variables: Option<[String; 2]>,
@@ -45,12 +45,9 @@ impl Studio {
     /// The residual of a channel over two variables, as means over tenths of a second or longer.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] without such a channel, [`crate::Error::Undetermined`] for a variable that is not recorded or does not vary; as
+    /// [`crate::Error::Undetermined`] for a variable that is not recorded or does not vary; as
     /// [`Studio::map`].
     pub fn surface(&self, wanted: &SurfaceWanted) -> Result<SurfaceText> {
-        if wanted.channel >= Column::TARGETS.len() {
-            return Err(fault("channel", wanted.channel.to_string(), "0 to 5"));
-        }
         let table = self.table(wanted.part)?;
         // Lagged sticks are for the search; a person reads what was recorded.
         let names: Vec<String> = table.names.iter().filter(|name| !name.starts_with("lag(")).cloned().collect();

@@ -4,7 +4,7 @@
 use super::history::State;
 use super::{Studio, fault};
 use crate::error::Result;
-use crate::flight::{Accelerations, Column, Flight};
+use crate::flight::{Accelerations, Channel, Column, Flight};
 use crate::physics::Model;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub struct TraceWanted {
     /// Index of the flight.
     pub flight: usize,
     /// Index of the acceleration.
-    pub channel: usize,
+    pub channel: Channel,
     /// From this time on, s; the whole flight without.
     #[serde(default)]
     pub from_s: Option<f64>,
@@ -80,14 +80,13 @@ impl Studio {
     /// Lines of one channel over a stretch of a flight.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] where flight, channel, width, state or number are not there; as [`Model::predict`].
+    /// [`crate::Error::Config`] where flight, width, state or number are not there; as [`Model::predict`].
     pub fn trace(&self, wanted: &TraceWanted) -> Result<Trace> {
         let flights = &self.set.flights;
         let flight = flights.get(wanted.flight).ok_or_else(|| {
             fault("flight", wanted.flight.to_string(), format!("an index below {}, the number of flights", flights.len()))
         })?;
         let channel = wanted.channel;
-        let target = *Column::TARGETS.get(channel).ok_or_else(|| fault("channel", channel.to_string(), "0 to 5"))?;
         if !(16..=MOST_PIXELS).contains(&wanted.pixels) {
             return Err(fault("pixels", wanted.pixels.to_string(), format!("16 to {MOST_PIXELS}")));
         }
@@ -98,7 +97,7 @@ impl Studio {
         };
         let other = wanted.against.map(|id| self.predicted(&*self.state(Some(id))?, wanted.flight, flight)).transpose()?;
         let range = samples(flight, wanted.from_s, wanted.to_s);
-        let measured = &flight.column(target)[range.clone()];
+        let measured = &flight.column(channel.column())[range.clone()];
         let line = |of: &Accelerations| of[channel][range.clone()].to_vec();
         let residual = |line: &[f64]| measured.iter().zip(line).map(|(measured, value)| measured - value).collect::<Vec<f64>>();
         let predicted = line(&predicted);

@@ -1,13 +1,13 @@
 //! Where the error lies: by manoeuvre or regime and channel, the ten seconds to look at in each, and the residual over recorded variables.
 
 use super::judge::{PartWanted, row};
-use super::{Studio, fault, held};
+use super::{Studio, held};
 use crate::critique::compare::{ModelError, PartError};
 use crate::critique::locate::{Bin, Dependence, Variable, dependences, stretches_in};
 use crate::critique::predictions::deviation;
-use crate::critique::{PerChannel, Regime, Row};
+use crate::critique::{ChannelValues, Regime, Row};
 use crate::error::Result;
-use crate::flight::{Column, Window};
+use crate::flight::{Channel, PerChannel, Window};
 use crate::report::colour::shade;
 use crate::workflow::Judged;
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ pub struct ErrorMap {
     /// All samples.
     pub whole: MapRow,
     /// Standard deviation of what was measured, by channel: a relative error of 1 is as bad as predicting the mean.
-    pub deviation: PerChannel,
+    pub deviation: ChannelValues,
     /// What was judged, in words.
     pub basis: String,
     /// What so few blocks can say, if they are few.
@@ -84,7 +84,7 @@ pub struct PlaceWanted {
     pub name: Option<String>,
     /// Index of the acceleration; all without.
     #[serde(default)]
-    pub channel: Option<usize>,
+    pub channel: Option<Channel>,
     /// The median in place of the worst.
     #[serde(default)]
     pub typical: bool,
@@ -153,13 +153,10 @@ impl Studio {
     /// The worst or a typical ten seconds of a cell; `None` where nothing is judged.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] without such a channel; as [`Studio::map`].
+    /// As [`Studio::map`].
     pub fn place(&self, wanted: &PlaceWanted) -> Result<Option<Place>> {
-        if let Some(channel) = wanted.channel.filter(|channel| *channel >= Column::TARGETS.len()) {
-            return Err(fault("channel", channel.to_string(), "0 to 5"));
-        }
         let judged = self.judge.state(&self.set, &self.split, &self.now(), wanted.part)?;
-        let channels = std::array::from_fn(|channel| wanted.channel.is_none_or(|only| only == channel));
+        let channels = PerChannel::from_fn(|channel| wanted.channel.is_none_or(|only| only == channel));
         let (windows, row) = self.within(&judged, wanted.by, wanted.name.as_deref());
         let Some(found) = stretches_in(&self.set.flights, &windows, &row, channels)? else { return Ok(None) };
         let stretch = if wanted.typical { found.typical } else { found.worst };
@@ -187,15 +184,12 @@ impl Studio {
     /// The residual of a channel over every recorded variable.
     ///
     /// # Errors
-    /// [`crate::Error::Config`] without such a channel; as [`Studio::map`].
-    pub fn dependence(&self, part: PartWanted, channel: usize) -> Result<DependenceText> {
-        if channel >= Column::TARGETS.len() {
-            return Err(fault("channel", channel.to_string(), "0 to 5"));
-        }
+    /// As [`Studio::map`].
+    pub fn dependence(&self, part: PartWanted, channel: Channel) -> Result<DependenceText> {
         let now = self.now();
         let judged = self.judge.state(&self.set, &self.split, &now, part)?;
         let found = self.dependences(&judged, (now.id, part))?;
-        let text = |(variable, channels): &(Variable, [Dependence; 6])| {
+        let text = |(variable, channels): &(Variable, PerChannel<Dependence>)| {
             let Dependence { bins, share } = channels[channel].clone();
             VariableText { name: variable.name(), unit: variable.unit(), share, bins }
         };
@@ -209,7 +203,7 @@ impl Studio {
 pub(super) type Dependences = Vec<((u64, PartWanted), Arc<Vec<OverVariable>>)>;
 
 /// The residuals of the six channels over a variable.
-type OverVariable = (Variable, [Dependence; 6]);
+type OverVariable = (Variable, PerChannel<Dependence>);
 
 /// States whose residuals over variables are kept.
 const KEPT: usize = 6;
@@ -238,12 +232,12 @@ fn whole(model: &ModelError, blocks: usize) -> PartError {
     PartError { rmse: model.rmse, rmse_ci95: model.rmse_ci95, n: model.windows, blocks }
 }
 
-fn map_row(name: &str, rule: Option<&'static str>, part: &PartError, deviation: &PerChannel) -> MapRow {
+fn map_row(name: &str, rule: Option<&'static str>, part: &PartError, deviation: &ChannelValues) -> MapRow {
     let (rmse, ci95, deviation) = (part.rmse.channels(), part.rmse_ci95.channels(), deviation.channels());
-    let cell = |channel: usize| {
+    let cell = |channel: Channel| {
         let relative = rmse[channel].zip(deviation[channel]).map(|(rmse, deviation)| rmse / deviation);
         let (paper, ink) = shade(relative.unwrap_or(0.0));
         MapCell { rmse: rmse[channel], ci95: ci95[channel], relative, paper, ink }
     };
-    MapRow { name: name.into(), rule, n: part.n, blocks: part.blocks, cells: (0..Column::TARGETS.len()).map(cell).collect() }
+    MapRow { name: name.into(), rule, n: part.n, blocks: part.blocks, cells: Channel::ALL.into_iter().map(cell).collect() }
 }

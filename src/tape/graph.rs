@@ -64,6 +64,26 @@ impl<T> Clone for Node<T> {
 /// A recorded computation of one sample.
 ///
 /// A clone takes over the handles recorded so far. What is recorded later on either of the two is its own.
+///
+/// # Examples
+/// A loss (x − 3)² and its value at x = 5.
+/// ```
+/// use phyture::tape::ops::SquaredError;
+/// use phyture::tape::{Graph, Session, Threads};
+///
+/// let mut graph = Graph::<f64>::default();
+/// let x = graph.input("x", &[1, 1])?;
+/// let target = graph.input("target", &[1, 1])?;
+/// let loss = graph.apply(SquaredError { scale: 1.0 }, &[x, target])?;
+/// let mut session = Session::infer(&graph, &[loss], Threads(1))?;
+/// session.load(&[])?;
+/// let fill = |_: usize, inputs: &mut [&mut [f64]]| {
+///     inputs[0].fill(5.0);
+///     inputs[1].fill(3.0);
+/// };
+/// session.predict(1, &fill, &mut |_, y| assert_eq!(y, [4.0]))?;
+/// # Ok::<(), phyture::tape::Error>(())
+/// ```
 pub struct Graph<T> {
     pub(crate) nodes: Vec<Node<T>>,
     parameters: Vec<Parameter>,

@@ -548,7 +548,7 @@ mod tests {
         let (mut whole, mut blocks) = ([start.clone(), start.clone(), start.clone()], [start.clone(), start.clone(), start]);
         let adam = Adam::default();
         let [parameters, first, second] = whole.each_mut().map(|values| &mut values[..]);
-        phyture_kernels::adam::step(session.isa(), &adam, 7, 1.0, session.gradients(), parameters, first, second);
+        phyture_kernels::adam::step(session.isa(), &adam, 7, 1.0, session.gradients(), parameters, (first, second));
         let [parameters, first, second] = blocks.each_mut().map(|values| &mut values[..]);
         session.adam(&adam, 7, parameters, first, second)?;
         assert_eq!(whole.map(|values| bits(&values)), blocks.clone().map(|values| bits(&values)));

@@ -6,7 +6,7 @@ use crate::blocks::Blocks;
 use crate::error::Result;
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
-use crate::flight::{Flight, Window};
+use crate::flight::{Flight, PerChannel, Window};
 use crate::hybrid::{Description, Hybrid, sequence};
 use crate::physics::Model;
 use crate::tape::Threads;
@@ -40,7 +40,7 @@ impl Job {
             inputs: config.inputs.clone(),
             scaling: sequence::scaling(flights, spans, model, &config.inputs, linear.as_ref(), &config.network)?,
             linear,
-            gate: [1.0; 6],
+            gate: PerChannel::splat(1.0),
             step_s: flights.first().map_or(0.01, |flight| flight.step_s),
         };
         let sequences = sequence::sequences(flights, &description)?;

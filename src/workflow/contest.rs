@@ -8,7 +8,7 @@ use crate::critique::{Comparison, Row, compare, finite_difference, floor, ridge}
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
-use crate::flight::{Accelerations, DataSet, Flight, Window};
+use crate::flight::{Accelerations, DataSet, Flight, PerChannel, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::linear::LinearConfig;
 use crate::physics::Model;
@@ -170,7 +170,7 @@ impl Contest<'_> {
         let judged_flights: BTreeSet<usize> = windows.iter().map(|window| window.flight).collect();
         for ((name, _), model) in self.models.iter().zip(models) {
             let columns = predicted(model, &set.flights, &judged_flights)?;
-            let at = |window: &Window| std::array::from_fn(|channel| columns[window.flight][channel][window.last]);
+            let at = |window: &Window| PerChannel::from_fn(|channel| columns[window.flight][channel][window.last]);
             rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
         }
         Ok(rows)

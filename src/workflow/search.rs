@@ -128,7 +128,7 @@ struct LedgerLine<'a> {
     selection_frequency: f64,
     indistinguishable: &'a [String],
     p_value: f64,
-    rmse_locked: Option<crate::critique::PerChannel>,
+    rmse_locked: Option<crate::critique::ChannelValues>,
     data_sha256: &'a str,
     version: &'a str,
 }

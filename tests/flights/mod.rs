@@ -1,6 +1,6 @@
 //! Made-up flights for the tests: smooth random columns with known numbers behind them, from a seed.
 
-use phyture::flight::{Column, Flight, Targets};
+use phyture::flight::{Channel, Column, Flight, PerChannel, Targets};
 use phyture::{Error, Result};
 
 /// Sampling step of the made-up flights, s.
@@ -60,8 +60,8 @@ pub fn random(seed: u64, samples: usize) -> Result<Flight> {
 }
 
 /// The same flight with other targets.
-pub fn with_targets(flight: &Flight, targets: &[Vec<f64>; 6]) -> Result<Flight> {
-    let columns = Column::ALL.map(|column| match Column::TARGETS.iter().position(|target| *target == column) {
+pub fn with_targets(flight: &Flight, targets: &PerChannel<Vec<f64>>) -> Result<Flight> {
+    let columns = Column::ALL.map(|column| match Channel::of_column(column) {
         Some(channel) => targets[channel].clone(),
         None => flight.column(column).to_vec(),
     });

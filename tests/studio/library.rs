@@ -1,6 +1,7 @@
 //! The studio without a server: the way of a person from the error to the effect and back.
 
 use crate::support::{HIDDEN, blank, folder, studio};
+use phyture::flight::Channel;
 use phyture::physics::Model;
 use phyture::studio::{By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, Steps, Studio, SurfaceWanted, TraceWanted};
 use phyture::{Error, Result};
@@ -22,7 +23,7 @@ fn diagnosed(studio: &Arc<Studio>) -> Result<()> {
     Ok(())
 }
 
-fn wanted(flight: usize, channel: usize, pixels: usize) -> TraceWanted {
+fn wanted(flight: usize, channel: Channel, pixels: usize) -> TraceWanted {
     TraceWanted { flight, channel, from_s: None, to_s: None, pixels, against: None, moved: None }
 }
 
@@ -81,8 +82,12 @@ fn a_number_moved_by_hand_moves_the_lines_and_a_calibration_brings_it_back() -> 
     let number = effect.numbers.iter().find(|number| number.name == "c_z").ok_or_else(|| Error::Undetermined("none".into()))?;
     assert!(number.slider[0] < number.value && number.value < number.slider[1]);
     let moved = Move { effect: effect.name.clone(), number: number.name.clone(), value: 0.5 * number.value };
-    let still = studio.trace(&wanted(0, 5, 400))?;
-    let other = studio.trace(&TraceWanted { moved: Some(moved.clone()), against: Some(first.steps[0].id), ..wanted(0, 5, 400) })?;
+    let still = studio.trace(&wanted(0, Channel::WzDot, 400))?;
+    let other = studio.trace(&TraceWanted {
+        moved: Some(moved.clone()),
+        against: Some(first.steps[0].id),
+        ..wanted(0, Channel::WzDot, 400)
+    })?;
     assert!(other.rmse > still.rmse, "half of the tail stick is wrong");
     assert_eq!(other.against_rmse.map(f64::to_bits), Some(still.rmse.to_bits()));
     let after = studio.edit(&Edit::Move(moved))?;
@@ -98,7 +103,7 @@ fn a_number_moved_by_hand_moves_the_lines_and_a_calibration_brings_it_back() -> 
 #[test]
 fn a_formula_of_ones_own_is_told_the_character_that_is_wrong() -> Result<()> {
     let studio = studio(None)?;
-    let channel = Owner::Channel(5);
+    let channel = Owner::Channel(Channel::WzDot);
     let check = |formula: &str| studio.check_formula(&channel, formula);
     let wrong = check("airspeed * vq");
     assert_eq!(wrong.at, Some(11));
@@ -128,7 +133,7 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
         part: PartWanted::Judged,
         by: By::Manoeuvre,
         name: Some(map.rows[0].name.clone()),
-        channel: Some(5),
+        channel: Some(Channel::WzDot),
         typical: false,
     };
     let place = studio.place(&worst)?.ok_or_else(|| Error::Undetermined("no place".into()))?;
@@ -136,9 +141,9 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
     assert!((5.0..=10.0).contains(&(place.to_s - place.from_s)));
     let typical = studio.place(&PlaceWanted { typical: true, ..worst })?;
     assert!(typical.is_some_and(|typical| typical.error <= place.error));
-    let depends = studio.dependence(PartWanted::Judged, 5)?;
+    let depends = studio.dependence(PartWanted::Judged, Channel::WzDot)?;
     assert_eq!(depends.variables.first().map(|variable| variable.name), Some("vy"), "the side wind on the fin");
-    let over = |variables| studio.surface(&SurfaceWanted { part: PartWanted::Judged, channel: 5, variables });
+    let over = |variables| studio.surface(&SurfaceWanted { part: PartWanted::Judged, channel: Channel::WzDot, variables });
     let surface = over(Some(["vy".into(), "airspeed".into()]))?.surface.ok_or_else(|| Error::Undetermined("no surface".into()))?;
     assert!(surface.share > depends.variables[0].share, "two tell more than one: {}", surface.share);
     assert!(over(Some(["vy".into(), "no_such".into()])).is_err());
@@ -146,12 +151,12 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
     let all = studio.map(PartWanted::All, By::Regime)?;
     assert!(all.whole.n > map.whole.n && all.rows.iter().all(|row| row.rule.is_some()));
     // Peaks stay where little is drawn.
-    let coarse = studio.trace(&wanted(place.flight, 5, 50))?;
-    let fine = studio.trace(&wanted(place.flight, 5, 4000))?;
+    let coarse = studio.trace(&wanted(place.flight, Channel::WzDot, 50))?;
+    let fine = studio.trace(&wanted(place.flight, Channel::WzDot, 4000))?;
     let most = |values: &[f32]| values.iter().copied().fold(f32::NEG_INFINITY, f32::max);
     assert!(coarse.t.len() == 100 && fine.samples_per_point.to_bits() == 1_f64.to_bits());
     assert_eq!(most(&coarse.measured).to_bits(), most(&fine.measured).to_bits());
-    for refused in [studio.trace(&wanted(99, 0, 400)), studio.trace(&wanted(0, 6, 400)), studio.trace(&wanted(0, 0, 1))] {
+    for refused in [studio.trace(&wanted(99, Channel::VxDot, 400)), studio.trace(&wanted(0, Channel::VxDot, 1))] {
         assert!(matches!(refused, Err(Error::Config { .. })));
     }
     Ok(())

@@ -1,9 +1,12 @@
 //! The studio: as a library, over a real socket, and in a real browser where there is one.
 #![cfg(feature = "studio")]
 
+mod access;
 mod browser;
 mod http;
 mod library;
+mod mishaps;
 mod server;
 mod support;
+mod unsaved;
 mod webdriver;

@@ -87,6 +87,21 @@ impl Browser {
         self.post("/execute/sync", &json!({ "script": format!("return {expression}"), "args": [] }))
     }
 
+    /// Runs a script on the page.
+    pub fn run(&self, script: &str) -> Result<()> {
+        self.post("/execute/sync", &json!({ "script": script, "args": [] })).map(drop)
+    }
+
+    /// What a script hands to its last argument, a function.
+    pub fn answer(&self, script: &str) -> Result<Value> {
+        self.post("/execute/async", &json!({ "script": script, "args": [] }))
+    }
+
+    /// A command of the browser's own protocol.
+    pub fn cdp(&self, command: &str, parameters: &Value) -> Result<Value> {
+        self.post("/goog/cdp/execute", &json!({ "cmd": command, "params": parameters }))
+    }
+
     /// Waits until an expression of the page is true.
     pub fn wait(&self, expression: &str) -> Result<()> {
         let begun = Instant::now();
@@ -137,6 +152,26 @@ impl Browser {
             [at(from), json!({ "type": "pointerDown", "button": 0 }), at(to), json!({ "type": "pointerUp", "button": 0 })];
         let body = json!({ "actions": [{ "type": "pointer", "id": "mouse", "parameters": { "pointerType": "mouse" }, "actions": actions }] });
         self.post("/actions", &body).map(drop)
+    }
+
+    /// Opens a further tab and goes there; the tab that was left.
+    pub fn new_tab(&self) -> Result<String> {
+        let path = format!("/session/{}/window", self.session);
+        let before = self.call("GET", &path, &Value::Null)?;
+        let opened = self.post("/window/new", &json!({ "type": "tab" }))?;
+        self.post("/window", &json!({ "handle": opened["handle"] }))?;
+        Ok(before.as_str().unwrap_or_default().to_owned())
+    }
+
+    /// Closes this tab and goes to another.
+    pub fn close_tab(&self, other: &str) -> Result<()> {
+        self.call("DELETE", &format!("/session/{}/window", self.session), &Value::Null)?;
+        self.to_tab(other)
+    }
+
+    /// Goes to a tab.
+    pub fn to_tab(&self, tab: &str) -> Result<()> {
+        self.post("/window", &json!({ "handle": tab })).map(drop)
     }
 
     /// Messages of the console that are worse than a remark.

@@ -5,7 +5,7 @@
 //! dq = ds·k/√d_k,  dk = dsᵀ·q/√d_k,  dv = (m∘p/(1 − rate))ᵀ·do           (ds is the gradient of q·kᵀ/√d_k)
 //! ```
 
-use super::{KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
+use super::{Inputs, KEYS, Product, QUERIES, Shape, TransposedProduct, block_of_queries, lanes, pair_of_rows, panels, take};
 use crate::dropout::{Keep, Mask, MaskLanes};
 use crate::elementary::power_of_two;
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
@@ -35,17 +35,13 @@ pub struct Gradients<'a, T> {
 /// As [`forward`](super::forward).
 pub fn backward<T: Real>(
     isa: InstructionSet,
-    heads: usize,
-    q: Rows<'_, T>,
-    k: Rows<'_, T>,
-    v: Rows<'_, T>,
-    dropout: Option<Mask>,
-    o: Rows<'_, T>,
-    log_sum_exp: &[T],
+    inputs: Inputs<'_, T>,
+    (o, log_sum_exp): (Rows<'_, T>, &[T]),
     d_o: Rows<'_, T>,
     gradients: Gradients<'_, T>,
     scratch: &mut [T],
 ) {
+    let Inputs { heads, q, k, v, dropout } = inputs;
     let shape = Shape::of(heads, &q, &k, &v, &o, log_sum_exp);
     crate::strided::same_shape(&q, &o);
     crate::strided::same_shape(&o, &d_o);

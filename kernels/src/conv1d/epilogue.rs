@@ -178,7 +178,7 @@ mod tests {
             for isa in InstructionSet::available() {
                 let mut scratch = vec![f64::NAN; scratch_len(geometry, inputs, outputs)];
                 let (mut y, mut dz) = (Matrix::<f64>::poisoned(seed, (after, outputs)), Matrix::<f64>::poisoned(seed, (after, outputs)));
-                forward(isa, geometry, x.view(), Weight::Plain(&weight), None, epilogue, y.view_mut(), &mut scratch);
+                forward(isa, geometry, x.view(), (Weight::Plain(&weight), None), epilogue, y.view_mut(), &mut scratch);
                 assert_near("y", &y.to_vec(), &y_expected, Tolerance::Close);
                 backward_epilogue(isa, epilogue, y.view(), dy.view(), dz.view_mut());
                 assert_near("dz", &dz.to_vec(), &dz_expected, Tolerance::Close);
@@ -198,8 +198,7 @@ mod tests {
                 isa,
                 geometry,
                 Rows::packed(&x, 64, 1),
-                Weight::Plain(&[0.0]),
-                None,
+                (Weight::Plain(&[0.0]), None),
                 epilogue,
                 RowsMut::packed(&mut y, 64, 1),
                 &mut scratch,

@@ -62,6 +62,22 @@ const RARE_SHARE: f64 = 0.01;
 /// rotor keeps small; and free coefficients of gravity and −ω × v, expected to be 1 (paper eq. 14). Intervals are 95 %, from blocks of
 /// 10 s. A fault is named only where another convention explains the log better by a wide margin; a modelling error alone
 /// does not make one.
+///
+/// # Examples
+/// ```
+/// # #[cfg(not(feature = "sim"))]
+/// # fn main() {}
+/// # #[cfg(feature = "sim")]
+/// # fn main() -> phyture::Result<()> {
+/// use phyture::critique::check::check;
+/// use phyture::sim::{Simulation, simulate};
+///
+/// let report = check(&simulate(&Simulation { minutes: 4.0, ..Simulation::baseline() })?, None);
+/// println!("{report}");
+/// assert!(!report.fault, "{}", report.summary);
+/// # Ok(())
+/// # }
+/// ```
 pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let gathered = Gathered::new(data);
     let (delay, control_delay) = gathered.together.timing.control_delay(model.map(|model| model.data.control_delay_s));

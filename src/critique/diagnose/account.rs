@@ -13,11 +13,11 @@ use super::report::{Bar, Diagnosis, Locked, Status, Step, Verdict, Worth};
 use super::selection::selection;
 use super::sentences;
 use crate::blocks::{BlockMean, BlockSum};
-use crate::critique::channels::PerChannel;
+use crate::critique::channels::ChannelValues;
 use crate::critique::shares::Share;
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
-use crate::flight::{Column, Flight};
+use crate::flight::{Channel, Flight, PerChannel};
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
@@ -43,7 +43,7 @@ pub fn weigh(diagnosis: &mut Diagnosis, flights: &[Flight], after: &Model, split
     Ok(())
 }
 
-fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, before: &PerChannel) -> Result<Vec<Worth>> {
+fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, before: &ChannelValues) -> Result<Vec<Worth>> {
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
     let correlation = 2.0 * CORRELATION_S / step_s;
     let all = Model { effects: after.effects.iter().filter(|effect| effect.enabled).cloned().collect(), ..after.clone() };
@@ -68,7 +68,7 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
         let numbers = refitted.clone().unwrap_or_else(|| there.unchanged(absent));
         let halves = there.first_halves(&kept, absent).ok_or_else(undetermined)?;
         let errors = there.errors_under(&kept, &halves, &numbers);
-        let errors: Errors = std::array::from_fn(|channel| judged.iter().map(|&block| errors[channel][block]).collect());
+        let errors: Errors = PerChannel::from_fn(|channel| judged.iter().map(|&block| errors[channel][block]).collect());
         Ok::<_, Error>((errors, refitted.is_some()))
     };
     let (with, with_refitted) = errors(&[])?;
@@ -85,8 +85,8 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
 }
 
 /// Squared error of each block before anything was added: of the model without all that was found, brought to the sum that was measured.
-fn whole_error(bare: &Errors, before: &PerChannel, rows: f64) -> Errors {
-    std::array::from_fn(|channel| {
+fn whole_error(bare: &Errors, before: &ChannelValues, rows: f64) -> Errors {
+    PerChannel::from_fn(|channel| {
         let measured = before.channels()[channel].map_or(0.0, |rmse| rmse * rmse * rows);
         let sum: f64 = bare[channel].iter().sum();
         let scale = if sum > 0.0 { measured / sum } else { 0.0 };
@@ -98,15 +98,15 @@ fn whole_error(bare: &Errors, before: &PerChannel, rows: f64) -> Errors {
 /// both block by block, so that a hard block does not count as scatter twice.
 fn held_against(with: &Errors, without: &Errors, before: &Errors) -> (BTreeMap<String, Share>, BTreeMap<String, f64>) {
     let (mut shares, mut rises) = (BTreeMap::new(), BTreeMap::new());
-    for (channel, column) in Column::TARGETS.into_iter().enumerate() {
+    for channel in Channel::ALL {
         let (with, without) = (&with[channel], &without[channel]);
         let differences = with.iter().zip(without).zip(&before[channel]);
         let sums = differences.map(|((with, without), before)| BlockSum { samples: *before, sum: without - with });
         let Some(mean) = BlockMean::ratio(sums).filter(|mean| mean.mean != 0.0) else { continue };
-        shares.insert(column.name().to_owned(), Share { share: mean.mean, ci95: mean.interval() });
+        shares.insert(channel.name().to_owned(), Share { share: mean.mean, ci95: mean.interval() });
         let left: f64 = with.iter().sum();
         if left > 0.0 {
-            rises.insert(column.name().to_owned(), without.iter().sum::<f64>() / left - 1.0);
+            rises.insert(channel.name().to_owned(), without.iter().sum::<f64>() / left - 1.0);
         }
     }
     (shares, rises)
@@ -196,8 +196,8 @@ mod tests {
     use super::super::gram::tests::{model, noise};
     use super::super::{Options, amend, calibrated};
     use super::*;
-    use crate::flight::Span;
     use crate::flight::split::Part;
+    use crate::flight::{Column, Span};
     use crate::physics::{Effect, catalogue};
 
     fn split(flights: &[Flight], locked: usize) -> Split {
@@ -216,11 +216,11 @@ mod tests {
         let mut flights = noise(3, &[6000; 8]);
         for flight in &mut flights {
             let mut accelerations = model().predict(flight)?;
-            for (channel, values) in accelerations.iter_mut().enumerate() {
-                let noise = flight.column(Column::TARGETS[channel]);
+            for (channel, values) in accelerations.pairs_mut() {
+                let noise = flight.column(channel.column());
                 let sticks = flight.column(Column::U1).iter().zip(flight.column(Column::U2));
                 for ((value, noise), (one, other)) in values.iter_mut().zip(noise).zip(sticks) {
-                    *value += 0.1 * noise + if channel == 0 { one + 0.5 * other } else { 0.0 };
+                    *value += 0.1 * noise + if channel == Channel::VxDot { one + 0.5 * other } else { 0.0 };
                 }
             }
             *flight = flight.with_accelerations(&accelerations)?;
@@ -229,7 +229,7 @@ mod tests {
     }
 
     fn formula(name: &str, formula: &str) -> Result<Effect> {
-        Effect::formula(name, 0, formula, 0.0)
+        Effect::formula(name, Channel::VxDot, formula, 0.0)
     }
 
     #[test]
@@ -245,13 +245,13 @@ mod tests {
         let after = calibrated(&after, &flights, &split)?;
         let names = ["one", "double", "other"];
         let mse = before.rmse(&flights, &split.test)?.map(Some);
-        let found = worth(&flights, &after, &names, &split, &PerChannel::new(mse))?;
+        let found = worth(&flights, &after, &names, &split, &ChannelValues::new(mse))?;
         assert_eq!(found[0].effect, "other", "{found:?}");
         let share = found[0].share.get("vx_dot").copied().ok_or_else(|| Error::Undetermined("no share".into()))?;
         // What u2 removes: its quarter of the variance beside that of u1 and a hundredth of noise; all as large as each other.
         let without = with(&with(&model(), &formula("one", "u1")?), &formula("double", "2 * u1 + 0.001 * u3")?);
         let without = calibrated(&without, &flights, &split)?;
-        let square = |model: &Model| Ok::<_, Error>(model.rmse(&flights, &split.test)?[0].powi(2));
+        let square = |model: &Model| Ok::<_, Error>(model.rmse(&flights, &split.test)?[Channel::VxDot].powi(2));
         let expected = (square(&without)? - square(&after)?) / square(&before)?;
         assert!((share.share - expected).abs() < 1e-6 && expected > 0.1, "{share:?} {expected}");
         assert!(share.ci95.is_some_and(|[low, high]| low < expected && expected < high && low > 0.5 * expected), "{share:?}");
@@ -286,7 +286,8 @@ mod tests {
         }
         let locked = whole.locked.clone().unwrap_or_default();
         assert_eq!(locked.waterfall.len(), 3, "a bar for the model and one for each effect");
-        let [first, last] = [before.rmse(&flights, &split.test)?[0], amended.model.rmse(&flights, &split.test)?[0]];
+        let [first, last] =
+            [before.rmse(&flights, &split.test)?[Channel::VxDot], amended.model.rmse(&flights, &split.test)?[Channel::VxDot]];
         let found = [locked.rmse_before.vx_dot, locked.rmse_after.vx_dot].map(|rmse| rmse.unwrap_or(f64::NAN));
         assert!((found[0] - first).abs() < 1e-9 && (found[1] - last).abs() < 1e-9, "{found:?} {first} {last}");
         assert_eq!((whole.verdict, whole.is_confirmed()), (Verdict::EffectsMissing, true));

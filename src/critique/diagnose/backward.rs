@@ -13,7 +13,7 @@ use super::search::Search;
 use super::selection::selection;
 use super::significance::Flips;
 use crate::error::Result;
-use crate::flight::Span;
+use crate::flight::{Channel, PerChannel, Span};
 use crate::physics::{Effect, Model, off_zero};
 use std::collections::BTreeMap;
 
@@ -200,7 +200,7 @@ impl Road<'_> {
                     if batch.iter().any(|&place| point.has_locals(place)) { point.folds(&self.engine, &without) } else { None };
                 let errors =
                     point.held_out(&self.engine, new_folds.as_ref().unwrap_or(&folds), &without).ok_or_else(undetermined)?;
-                let lost: f64 = gains_of(&errors, &base, &[true; 6]).iter().sum();
+                let lost: f64 = gains_of(&errors, &base, &PerChannel::splat(true)).iter().sum();
                 let each: f64 = needless[..count].iter().map(|entry| entry.1.gain().max(0.0)).sum();
                 if count == 1 || lost <= each + SLACK {
                     doubtful = needless[count..].iter().filter(|entry| entry.1.mends.is_none()).map(|entry| entry.0).collect();
@@ -248,15 +248,15 @@ impl Road<'_> {
         };
         let effect = &point.model.effects[point.optional[place]];
         let channels = point.channels(place);
-        let gains = gains_of(&errors, base, &[true; 6]);
+        let gains = gains_of(&errors, base, &PerChannel::splat(true));
         let sum = |errors: &[f64]| errors.iter().sum::<f64>();
-        let fall = |channel: usize| (channel, 1.0 - sum(&base[channel]) / sum(&errors[channel]));
+        let fall = |channel: Channel| (channel, 1.0 - sum(&base[channel]) / sum(&errors[channel]));
         let by_flight = effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some());
         let p_value = match by_flight {
             true => self.flips.p_value_of_sums(&by_flight_of(&self.engine, &gains)),
             false => self.flips.p_value_of_sums(&gains),
         };
-        let falls = (0..6).filter(|&channel| channels[channel]).map(fall).collect();
+        let falls = Channel::ALL.into_iter().filter(|&channel| channels[channel]).map(fall).collect();
         let rests_on = decisive_flight(&self.engine, &gains);
         let name = effect.name.clone();
         Some(Judged { effect: name, falls, p_value, gains, looseness: f64::INFINITY, rests_on, by_flight, mends: None })

@@ -5,10 +5,10 @@ use super::own::{Halves, Judgement, judged_errors};
 use super::report::{Bar, Kept, Locked};
 use super::resample::{RESAMPLES, draw, quantile};
 use crate::blocks::{BlockMean, BlockSum};
-use crate::critique::channels::{Intervals, PerChannel};
+use crate::critique::channels::{ChannelValues, Intervals};
 use crate::critique::shares::Share;
 use crate::error::Result;
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
@@ -32,11 +32,12 @@ pub(super) fn confirm(
     let judged = judged_errors(flights, &models, &halves, block_s, correlation)?;
     let Some(Judgement { counts, errors }) = judged else { return Ok(None) };
     let rows = counts.iter().sum::<usize>() as f64;
-    let rmse = |errors: &[Vec<f64>; 6]| {
-        PerChannel::new(std::array::from_fn(|channel| Some((errors[channel].iter().sum::<f64>() / rows).sqrt())))
+    let rmse = |errors: &PerChannel<Vec<f64>>| {
+        ChannelValues::new(PerChannel::from_fn(|channel| Some((errors[channel].iter().sum::<f64>() / rows).sqrt())))
     };
     let (Some(first), Some(last)) = (errors.first(), errors.last()) else { return Ok(None) };
-    let mse_fall = (0..6)
+    let mse_fall = Channel::ALL
+        .into_iter()
         .filter(|&channel| first[channel] != last[channel])
         .map(|channel| {
             let (before, after) = (&first[channel], &last[channel]);
@@ -48,7 +49,7 @@ pub(super) fn confirm(
             let whole = fall(&mut (0..before.len()));
             let mut worlds: Vec<f64> = (0..RESAMPLES).map(|world| fall(&mut draw(before.len(), 0, world).into_iter())).collect();
             worlds.sort_by(f64::total_cmp);
-            let name = Column::TARGETS.get(channel).map_or("?", |column| column.name()).to_owned();
+            let name = channel.name().to_owned();
             (name, [whole, quantile(&worlds, 0.025), quantile(&worlds, 0.975)])
         })
         .collect();
@@ -69,9 +70,10 @@ pub(super) fn confirm(
 }
 
 /// A bar for each model.
-fn waterfall(rungs: &[Rung], errors: &[Errors], counts: &[usize], rmse: &dyn Fn(&Errors) -> PerChannel) -> Vec<Bar> {
+fn waterfall(rungs: &[Rung], errors: &[Errors], counts: &[usize], rmse: &dyn Fn(&Errors) -> ChannelValues) -> Vec<Bar> {
     let pairs: Vec<[&Errors; 2]> = errors.windows(2).map(|pair| [&pair[0], &pair[1]]).collect();
-    let differing = |[before, after]: &[&Errors; 2]| (0..6).filter(|&channel| before[channel] != after[channel]).count();
+    let differing =
+        |[before, after]: &[&Errors; 2]| Channel::ALL.into_iter().filter(|&channel| before[channel] != after[channel]).count();
     let comparisons: usize = pairs.iter().map(differing).sum();
     let bar = |((added, _), own): (&Rung, &Errors)| Bar {
         added: added.clone(),
@@ -88,22 +90,22 @@ fn waterfall(rungs: &[Rung], errors: &[Errors], counts: &[usize], rmse: &dyn Fn(
 
 /// The interval of each root mean square error, from the blocks' sums of squares and their rows.
 fn intervals(errors: &Errors, counts: &[usize]) -> Intervals {
-    let of = |channel: usize| {
+    let of = |channel: Channel| {
         let blocks = errors[channel].iter().zip(counts);
         BlockMean::new(blocks.map(|(sum, rows)| BlockSum { samples: *rows as f64, sum: *sum }))?.root_interval()
     };
-    Intervals::new(std::array::from_fn(of))
+    Intervals::new(PerChannel::from_fn(of))
 }
 
 /// Channels whose error is larger than before by more than chance, block against block; one of so many comparisons.
 fn rises([before, after]: [&Errors; 2], comparisons: usize) -> BTreeMap<String, Share> {
-    let of = |channel: usize| {
+    let of = |channel: Channel| {
         let pairs = before[channel].iter().zip(&after[channel]);
         let mean = BlockMean::ratio(pairs.map(|(before, after)| BlockSum { samples: *before, sum: after - before }))?;
         let rise = Share { share: mean.mean, ci95: mean.interval_of(comparisons) };
-        rise.ci95.is_some_and(|[low, _]| low > ROUNDING).then(|| (Column::TARGETS[channel].name().to_owned(), rise))
+        rise.ci95.is_some_and(|[low, _]| low > ROUNDING).then(|| (channel.name().to_owned(), rise))
     };
-    (0..6).filter_map(of).collect()
+    Channel::ALL.into_iter().filter_map(of).collect()
 }
 
 /// What spans are made of: whole flights, the last part of each, or pieces from anywhere.
@@ -129,8 +131,9 @@ mod tests {
 
     #[test]
     fn a_rise_beyond_chance_is_noted_and_one_within_is_not() {
-        let blocks =
-            |values: [f64; 4]| -> Errors { std::array::from_fn(|channel| if channel == 2 { values.into() } else { vec![1.0; 4] }) };
+        let blocks = |values: [f64; 4]| -> Errors {
+            PerChannel::from_fn(|channel| if channel == Channel::VzDot { values.into() } else { vec![1.0; 4] })
+        };
         let before = blocks([1.0, 1.1, 0.9, 1.0]);
         let found = rises([&before, &blocks([1.2, 1.31, 1.1, 1.19])], 6);
         assert!(found.len() == 1 && (found["vz_dot"].share - 0.2).abs() < 1e-12, "{found:?}");
@@ -165,7 +168,10 @@ mod tests {
         let models: Vec<Rung> = models.into_iter().flatten().map(|model| (Vec::new(), model)).collect();
         let found = confirm(&flights, &models, &whole(&flights), "test", 5.0, 100.0)?;
         let rmse = found.map(|found| [found.rmse_before, found.rmse_after].map(|rmse| rmse.channels()));
-        assert!(models.len() == 2 && rmse.is_some_and(|[before, after]| before == after && before[0] == Some(0.0)), "{rmse:?}");
+        assert!(
+            models.len() == 2 && rmse.is_some_and(|[before, after]| before == after && before[Channel::VxDot] == Some(0.0)),
+            "{rmse:?}"
+        );
         Ok(())
     }
 }

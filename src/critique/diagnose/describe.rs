@@ -11,7 +11,7 @@ use super::resample::{RESAMPLES, draw};
 use super::scored::Scored;
 use super::search::Search;
 use super::sentences;
-use crate::flight::Column;
+use crate::flight::{Channel, Column, PerChannel};
 use crate::physics::{Coefficient, Definition, Effect, Parameter, catalogue};
 use std::collections::BTreeMap;
 
@@ -51,8 +51,8 @@ impl Search<'_> {
             model: model.clone(),
             channels: judged.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).map(|(&channel, _)| channel).collect(),
             confusable: definition.and_then(|definition| definition.notes).map_or(&[][..], |notes| notes.confusable_with),
-            mse_before: [0.0; 6],
-            removed: [0.0; 6],
+            mse_before: PerChannel::splat(0.0),
+            removed: PerChannel::splat(0.0),
         })
     }
 
@@ -72,12 +72,12 @@ impl Search<'_> {
             () => Status::NotSignificant,
         };
         let best = judged.falls.iter().max_by(|left, right| left.1.total_cmp(right.1));
-        let too_little = || best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(channel_name(channel), fall));
+        let too_little = || best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(channel.name(), fall));
         let notes = catalogue::definition(&judged.effect).and_then(|definition| definition.notes);
         CandidateReport {
             effect: judged.effect.clone(),
             status,
-            held_out_mse_fall: judged.falls.iter().map(|(&channel, &fall)| (channel_name(channel).to_owned(), fall)).collect(),
+            held_out_mse_fall: judged.falls.iter().map(|(&channel, &fall)| (channel.name().to_owned(), fall)).collect(),
             p_value: Some(judged.p_value),
             detection_limit_mse_fall: None,
             reason: match status {
@@ -91,7 +91,6 @@ impl Search<'_> {
     }
 
     pub(super) fn reports(&self, open: &[&Candidate], scored: &[Scored<'_>]) -> Vec<CandidateReport> {
-        let name = |channel: usize| channel_name(channel).to_owned();
         let mut reports: Vec<CandidateReport> = open
             .iter()
             .map(|candidate| match scored.iter().find(|scored| scored.candidate.id == candidate.id) {
@@ -101,7 +100,7 @@ impl Search<'_> {
                     CandidateReport {
                         effect: candidate.id.clone(),
                         status,
-                        held_out_mse_fall: scored.falls.iter().map(|(&channel, &fall)| (name(channel), fall)).collect(),
+                        held_out_mse_fall: scored.falls.iter().map(|(&channel, &fall)| (channel.name().to_owned(), fall)).collect(),
                         p_value: Some(scored.p_value),
                         detection_limit_mse_fall: scored.detection.filter(|_| scored.excited),
                         reason: scored.reason(self.largest_p, &self.engine.held),
@@ -128,12 +127,8 @@ impl Search<'_> {
     }
 }
 
-fn channel_name(channel: usize) -> &'static str {
-    Column::TARGETS.get(channel).map_or("?", |column| column.name())
-}
-
 /// What there is to tell of an accepted effect as it stands in a model.
-fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, falls: &BTreeMap<usize, f64>) -> Step {
+fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, falls: &BTreeMap<Channel, f64>) -> Step {
     let number = |coefficient: &Coefficient| {
         let known = definition.and_then(|definition| definition.coefficient(&coefficient.name));
         let rms = coefficient
@@ -165,8 +160,8 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
     Step {
         effect: effect.name.clone(),
         meaning: effect.meaning.clone(),
-        channels: worthy.map(|(&channel, _)| channel_name(channel).to_owned()).collect(),
-        held_out_mse_fall: falls.iter().map(|(&channel, &fall)| (channel_name(channel).to_owned(), fall)).collect(),
+        channels: worthy.map(|(&channel, _)| channel.name().to_owned()).collect(),
+        held_out_mse_fall: falls.iter().map(|(&channel, &fall)| (channel.name().to_owned(), fall)).collect(),
         coefficients: effect.coefficients.iter().map(number).collect(),
         parameters: effect.parameters.iter().map(value).collect(),
         would_tell_apart: definition
@@ -198,7 +193,7 @@ pub(super) fn taken_back(found: &Found) -> CandidateReport {
 }
 
 /// What is said of an effect that was accepted and is needless beside the later ones, with the shares that it still removes by channel.
-pub(super) fn dropped(found: &Found, falls: &[f64; 6]) -> CandidateReport {
+pub(super) fn dropped(found: &Found, falls: &PerChannel<f64>) -> CandidateReport {
     let acts = |name: &str| found.step.held_out_mse_fall.contains_key(name);
     let still = Column::TARGETS.into_iter().zip(falls).map(|(column, fall)| (column.name(), *fall));
     CandidateReport {

@@ -1,6 +1,7 @@
 //! Which columns a set of models needs, and how each model is made of them. Equal columns are one.
 
 use crate::error::Result;
+use crate::flight::PerChannel;
 use crate::formula::Node;
 use crate::physics::{Columns, Model, Regressor, Wanted};
 use std::collections::HashMap;
@@ -16,9 +17,9 @@ pub(super) struct Design {
     pub labels: Vec<String>,
     known: HashMap<Node, usize>,
     /// For each channel the columns in it, in order of first use.
-    pub channels: [Vec<usize>; 6],
+    pub channels: PerChannel<Vec<usize>>,
     /// For each of these the only model that has it, by the order in which models were added; `None` where several do, or the first.
-    pub owners: [Vec<Option<usize>>; 6],
+    pub owners: PerChannel<Vec<Option<usize>>>,
     models: usize,
 }
 
@@ -44,7 +45,7 @@ pub(super) struct ChannelLayout {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     pub free: Vec<Free>,
-    pub channels: [ChannelLayout; 6],
+    pub channels: PerChannel<ChannelLayout>,
 }
 
 impl Design {
@@ -141,16 +142,17 @@ impl Design {
 mod tests {
     use super::super::gram::tests::model;
     use super::*;
+    use crate::flight::Channel;
     use crate::physics::{Effect, catalogue};
 
     #[test]
     fn equal_formulas_are_one_column_and_one_coefficient_in_two_channels_is_one() -> Result<()> {
         let mut model = model();
-        model.effects.push(Effect::formula("again", 0, "vx", 0.0)?);
+        model.effects.push(Effect::formula("again", Channel::VxDot, "vx", 0.0)?);
         let mut design = Design::default();
         let layout = design.model(&model)?;
         // Two coefficients on one column: the model's own drag and the copy.
-        let columns: Vec<_> = layout.channels[0].free.iter().map(|entry| entry.1.clone()).collect();
+        let columns: Vec<_> = layout.channels[Channel::VxDot].free.iter().map(|entry| entry.1.clone()).collect();
         assert_eq!(columns.len(), 2);
         assert_eq!(columns[0], columns[1]);
         let free: usize = model.effects.iter().map(|effect| effect.coefficients.len()).sum();
@@ -178,7 +180,7 @@ mod tests {
             let mut larger = model();
             larger.effects.push(match catalogue::definition(kind) {
                 Some(definition) => definition.effect(4.58, 0.8),
-                None => Effect::formula("more", 3, "u4 * wz", 0.0)?,
+                None => Effect::formula("more", Channel::WxDot, "u4 * wz", 0.0)?,
             });
             let pieces = design.enlarged(&larger, &base)?;
             let (pieces, whole) = (design.add(&larger, &pieces), design.model(&larger)?);

@@ -4,7 +4,7 @@ use super::design::{Design, Free, Layout};
 use super::fit::{Component, Prior, Reduced, Solution, components};
 use super::gram::{Block, BlockGram, grams};
 use crate::error::{Error, Result};
-use crate::flight::{Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::physics::{Model, Regressor, Wanted, calibrate, catalogue};
 use phyture_kernels::random::permutation;
 use std::ops::Range;
@@ -32,7 +32,7 @@ pub(super) struct Engine<'a> {
 }
 
 /// Squared errors by channel and block.
-pub(super) type Errors = [Vec<f64>; 6];
+pub(super) type Errors = PerChannel<Vec<f64>>;
 
 /// A model on the blocks.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ pub(super) struct Trial {
     /// For each channel the squared error of each block under coefficients of other folds.
     pub errors: Errors,
     /// Channels that the model changes against the one it is compared with.
-    pub changed: [bool; 6],
+    pub changed: PerChannel<bool>,
     /// Whether a coefficient of the last effect is on a bound.
     pub at_bound: bool,
 }
@@ -107,9 +107,9 @@ impl Engine<'_> {
     }
 
     /// Mean squared error of each channel.
-    pub fn mse(&self, trial: &Trial) -> [f64; 6] {
+    pub fn mse(&self, trial: &Trial) -> PerChannel<f64> {
         let rows = self.rows().max(1) as f64;
-        std::array::from_fn(|channel| trial.errors[channel].iter().sum::<f64>() / rows)
+        PerChannel::from_fn(|channel| trial.errors[channel].iter().sum::<f64>() / rows)
     }
 
     /// Tries a model and others that have its effects and one more, or one less, or other numbers inside.
@@ -143,12 +143,14 @@ impl Engine<'_> {
         let nothing = Trial {
             model: model.clone(),
             layout: Layout::default(),
-            errors: std::array::from_fn(|_| vec![f64::NAN; self.blocks.len()]),
-            changed: [true; 6],
+            errors: PerChannel::from_fn(|_| vec![f64::NAN; self.blocks.len()]),
+            changed: PerChannel::splat(true),
             at_bound: false,
         };
         // Twice: channels that share coefficients are weighted by an error that is known only then.
-        let Some(first) = self.fit(model, layout, &nothing, &[1.0; 6], grams) else { return Err(self.undetermined(model)) };
+        let Some(first) = self.fit(model, layout, &nothing, &PerChannel::splat(1.0), grams) else {
+            return Err(self.undetermined(model));
+        };
         let weights = self.weights(&first);
         Ok(self.fit(model, layout, &nothing, &weights, grams).unwrap_or(first))
     }
@@ -178,7 +180,7 @@ impl Engine<'_> {
     }
 
     /// Weight of each channel: the inverse of its mean squared error.
-    pub fn weights(&self, trial: &Trial) -> [f64; 6] {
+    pub fn weights(&self, trial: &Trial) -> PerChannel<f64> {
         self.mse(trial).map(|mse| 1.0 / mse.max(f64::MIN_POSITIVE))
     }
 
@@ -187,20 +189,20 @@ impl Engine<'_> {
     }
 
     /// Fits the channels in which a layout differs from that of `base`, and those that share coefficients with them.
-    fn fit(&self, model: &Model, layout: &Layout, base: &Trial, weights: &[f64; 6], grams: &[BlockGram]) -> Option<Trial> {
-        let named = |layout: &Layout, channel: usize| {
+    fn fit(&self, model: &Model, layout: &Layout, base: &Trial, weights: &PerChannel<f64>, grams: &[BlockGram]) -> Option<Trial> {
+        let named = |layout: &Layout, channel: Channel| {
             let columns = &layout.channels[channel];
             let free: Vec<_> = columns.free.iter().map(|(free, columns)| (layout.free[*free], columns.clone())).collect();
             (free, columns.fixed.clone())
         };
-        let differs: [bool; 6] = std::array::from_fn(|channel| {
+        let differs: PerChannel<bool> = PerChannel::from_fn(|channel| {
             base.errors[channel].iter().any(|error| error.is_nan()) || named(layout, channel) != named(&base.layout, channel)
         });
         let mut trial = Trial {
             model: model.clone(),
             layout: layout.clone(),
             errors: base.errors.clone(),
-            changed: [false; 6],
+            changed: PerChannel::splat(false),
             at_bound: false,
         };
         let priors = priors(model, layout, &self.held);
@@ -222,10 +224,10 @@ impl Engine<'_> {
 
     pub fn component<'b>(
         &'b self,
-        channels: &[usize],
+        channels: &[Channel],
         members: &[usize],
         reduced: &'b [Reduced],
-        weights: &[f64; 6],
+        weights: &PerChannel<f64>,
         priors: &[Prior],
     ) -> Component<'b> {
         let single = channels.len() == 1;

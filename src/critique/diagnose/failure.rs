@@ -2,7 +2,7 @@
 
 use super::report::{Failure, FailureChannel, Locked};
 use crate::critique::unknown::Unknown;
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Column, Flight, PerChannel, Span};
 
 /// The channels named hold at least this share of the error of all.
 const MOST_OF_IT: f64 = 0.6;
@@ -18,7 +18,7 @@ pub(super) struct Measured<'a> {
     /// The spans that they are of.
     pub spans: &'a [Span],
     /// By channel.
-    pub mse: [f64; 6],
+    pub mse: PerChannel<f64>,
 }
 
 impl<'a> Measured<'a> {
@@ -88,21 +88,21 @@ mod tests {
     use super::super::gram::tests::{noise, whole};
     use super::*;
 
-    fn of(shares: [f64; 6]) -> Vec<String> {
+    fn of(shares: PerChannel<f64>) -> Vec<String> {
         let flights = noise(1, &[2000]);
         let spans = whole(&flights);
-        let variances = Column::TARGETS.map(|column| variance(&flights, &spans, column).unwrap_or(f64::NAN));
-        let mse = std::array::from_fn(|channel| shares[channel] * variances[channel]);
+        let variances = |column| variance(&flights, &spans, column).unwrap_or(f64::NAN);
+        let mse = PerChannel::from_fn(|channel| shares[channel] * variances(channel.column()));
         let found = failure(&flights, &Measured { on: "locked", spans: &spans, mse }, &[]);
         found.map_or_else(Vec::new, |found| found.channels.into_iter().map(|channel| channel.channel).collect())
     }
 
     #[test]
     fn the_fewest_channels_that_hold_most_of_the_error_are_named_worst_first() {
-        assert_eq!(of([0.02, 0.03, 0.02, 0.8, 0.9, 0.05]), ["wy_dot", "wx_dot"]);
-        assert_eq!(of([0.02, 0.03, 0.02, 0.0, 0.9, 0.05]), ["wy_dot"]);
-        assert_eq!(of([0.5, 0.5, 0.5, 0.5, 0.51, 0.5]), ["wy_dot"], "spread over all channels, the worst alone");
-        assert_eq!(of([0.0; 6]), [""; 0]);
-        assert_eq!(of([f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.4]), ["wz_dot"]);
+        assert_eq!(of([0.02, 0.03, 0.02, 0.8, 0.9, 0.05].into()), ["wy_dot", "wx_dot"]);
+        assert_eq!(of([0.02, 0.03, 0.02, 0.0, 0.9, 0.05].into()), ["wy_dot"]);
+        assert_eq!(of([0.5, 0.5, 0.5, 0.5, 0.51, 0.5].into()), ["wy_dot"], "spread over all channels, the worst alone");
+        assert_eq!(of(PerChannel::splat(0.0)), [""; 0]);
+        assert_eq!(of([f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.4].into()), ["wz_dot"]);
     }
 }

@@ -6,6 +6,7 @@
 
 use super::design::Layout;
 use super::gram::{Block, BlockGram, Product};
+use crate::flight::{Channel, PerChannel};
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 /// What is known about each coefficient of a layout.
@@ -29,7 +30,7 @@ pub(super) struct Reduced {
 }
 
 impl Reduced {
-    pub fn new(layout: &Layout, channel: usize, grams: &[BlockGram]) -> Self {
+    pub fn new(layout: &Layout, channel: Channel, grams: &[BlockGram]) -> Self {
         let layout = &layout.channels[channel];
         let free = layout.free.iter().map(|entry| entry.0).collect();
         let Some(first) = grams.first() else { return Self { free, blocks: Vec::new() } };
@@ -91,21 +92,22 @@ impl Reduced {
 }
 
 /// Channels that are fitted together, with their coefficients.
-pub(super) fn components(layout: &Layout) -> Vec<(Vec<usize>, Vec<usize>)> {
-    let of_channel = |channel: usize| layout.channels[channel].free.iter().map(|entry| entry.0);
-    let mut group: Vec<usize> = (0..6).collect();
-    for left in 0..6 {
-        for right in left + 1..6 {
+pub(super) fn components(layout: &Layout) -> Vec<(Vec<Channel>, Vec<usize>)> {
+    let of_channel = |channel: Channel| layout.channels[channel].free.iter().map(|entry| entry.0);
+    let mut group = PerChannel::new(Channel::ALL);
+    for left in Channel::ALL {
+        for right in Channel::ALL.into_iter().skip(left.index() + 1) {
             if of_channel(left).any(|free| of_channel(right).any(|other| other == free)) {
                 let (from, to) = (group[right], group[left]);
                 group.iter_mut().filter(|group| **group == from).for_each(|group| *group = to);
             }
         }
     }
-    (0..6)
-        .filter(|root| group.contains(root))
+    Channel::ALL
+        .into_iter()
+        .filter(|root| group.values().contains(root))
         .map(|root| {
-            let channels: Vec<usize> = (0..6).filter(|&channel| group[channel] == root).collect();
+            let channels: Vec<Channel> = Channel::ALL.into_iter().filter(|&channel| group[channel] == root).collect();
             let mut members: Vec<usize> = channels.iter().flat_map(|&channel| of_channel(channel)).collect();
             members.sort_unstable();
             members.dedup();
@@ -128,7 +130,7 @@ pub(super) struct Solution {
 /// One component ready to be fitted on any choice of blocks.
 pub(super) struct Component<'a> {
     /// Channel, weight, reduced matrices.
-    pub channels: Vec<(usize, f64, &'a Reduced)>,
+    pub channels: Vec<(Channel, f64, &'a Reduced)>,
     /// Indices into [`Layout::free`].
     pub members: Vec<usize>,
     pub priors: Vec<Prior>,
@@ -304,8 +306,8 @@ impl Component<'_> {
 
     /// Squared errors of each channel's blocks, each under coefficients from the other folds. `fold` gives the fold of a block; a
     /// property of a flight is found from the flight's blocks of other folds.
-    pub fn held_out(&self, folds: usize, fold: &dyn Fn(usize) -> usize) -> Option<Vec<(usize, Vec<f64>)>> {
-        let mut errors: Vec<(usize, Vec<f64>)> =
+    pub fn held_out(&self, folds: usize, fold: &dyn Fn(usize) -> usize) -> Option<Vec<(Channel, Vec<f64>)>> {
+        let mut errors: Vec<(Channel, Vec<f64>)> =
             self.channels.iter().map(|(channel, ..)| (*channel, vec![0.0; self.blocks.len()])).collect();
         for held in 0..folds {
             let weight = |block: usize| if fold(block) == held { 0.0 } else { 1.0 };
@@ -317,7 +319,7 @@ impl Component<'_> {
         Some(errors)
     }
 
-    fn block_errors(&self, solution: &Solution, index: usize, errors: &mut [(usize, Vec<f64>)]) {
+    fn block_errors(&self, solution: &Solution, index: usize, errors: &mut [(Channel, Vec<f64>)]) {
         let flight = self.blocks[index].flight;
         let own = solution.by_flight.iter().find(|entry| entry.0 == flight).map(|entry| entry.1.as_slice());
         let locals: Vec<usize> = (0..self.members.len()).filter(|&member| self.is_local(member)).collect();
@@ -363,15 +365,14 @@ mod tests {
     use super::super::gram::{blocks, grams};
     use super::*;
     use crate::error::Result;
-    use crate::flight::Column;
     use crate::physics::{Effect, calibrate};
     use proptest::prelude::*;
 
-    fn squared(flights: &[crate::flight::Flight], model: &crate::physics::Model, block: &Block) -> Result<[f64; 6]> {
+    fn squared(flights: &[crate::flight::Flight], model: &crate::physics::Model, block: &Block) -> Result<PerChannel<f64>> {
         let flight = &flights[block.flight];
         let predicted = model.predict(flight)?;
-        Ok(std::array::from_fn(|channel| {
-            let measured = &flight.column(Column::TARGETS[channel])[block.start..block.end];
+        Ok(PerChannel::from_fn(|channel| {
+            let measured = &flight.column(channel.column())[block.start..block.end];
             measured.iter().zip(&predicted[channel][block.start..block.end]).map(|(y, f)| (y - f).powi(2)).sum()
         }))
     }
@@ -381,8 +382,8 @@ mod tests {
         let flights = noise(seed, lengths);
         let mut model = model();
         if shared {
-            let mut effect = Effect::formula("shared", 0, "vy * wz", 0.0)?;
-            effect.terms.push(crate::physics::Term { channel: 1, ..effect.terms[0].clone() });
+            let mut effect = Effect::formula("shared", Channel::VxDot, "vy * wz", 0.0)?;
+            effect.terms.push(crate::physics::Term { channel: Channel::VyDot, ..effect.terms[0].clone() });
             model.effects.push(effect);
         }
         let cut = blocks(&flights, &whole(&flights), 2.0);
@@ -407,7 +408,7 @@ mod tests {
             for (channels, members) in components(&layout) {
                 let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &all)).collect();
                 let priors = vec![Prior::FREE; layout.free.len()];
-                let weights = if shared { engine.weights(&engine.pass(&model, &[])?.base) } else { [1.0; 6] };
+                let weights = if shared { engine.weights(&engine.pass(&model, &[])?.base) } else { PerChannel::splat(1.0) };
                 let component = engine.component(&channels, &members, &reduced, &weights, &priors);
                 let weight = |block: usize| if engine.fold[block] == held { 0.0 } else { 1.0 };
                 let Some(solution) = component.solve(&weight) else { return Ok(false) };
@@ -472,7 +473,7 @@ mod tests {
             let priors = super::super::engine::priors(&model, &layout, &[]);
             for (channels, members) in components(&layout) {
                 let reduced: Vec<Reduced> = channels.iter().map(|&channel| Reduced::new(&layout, channel, &all)).collect();
-                let component = engine.component(&channels, &members, &reduced, &[1.0; 6], &priors);
+                let component = engine.component(&channels, &members, &reduced, &PerChannel::splat(1.0), &priors);
                 let found = component.without_each_flight();
                 assert_eq!(found.iter().map(|entry| entry.0).collect::<Vec<_>>(), [0, 1, 2]);
                 for (flight, values) in found {

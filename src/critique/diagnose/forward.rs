@@ -11,6 +11,7 @@ use super::resample::{RESAMPLES, Resampled, draw, resampled};
 use super::scored::Scored;
 use super::search::Search;
 use crate::error::Result;
+use crate::flight::PerChannel;
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
@@ -70,7 +71,7 @@ impl Search<'_> {
             let mse = self.engine.mse(&base);
             if let Some(last) = found.last_mut() {
                 last.shadows(&scored, &earlier);
-                last.removed = std::array::from_fn(|channel| last.mse_before[channel] - mse[channel]);
+                last.removed = PerChannel::from_fn(|channel| last.mse_before[channel] - mse[channel]);
             }
             for scored in &mut scored {
                 scored.rival = found.iter().find(|found| found.is_flawed_by(scored, &mse)).map(|found| found.step.effect.clone());
@@ -122,7 +123,7 @@ impl Search<'_> {
                 channels: chosen.falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL).map(|(&channel, _)| channel).collect(),
                 confusable,
                 mse_before: mse,
-                removed: [0.0; 6],
+                removed: PerChannel::splat(0.0),
             });
             model = found.last().map_or(model, |last| last.model.clone());
         }
@@ -166,9 +167,9 @@ impl Search<'_> {
             // What it removes beside the others, by channel.
             let falls = |trial: &Trial| {
                 let mse = self.engine.mse(trial);
-                std::array::from_fn::<f64, 6, _>(|channel| 1.0 - whole[channel] / mse[channel])
+                PerChannel::from_fn(|channel| 1.0 - whole[channel] / mse[channel])
             };
-            let cost = |falls: &[f64; 6]| falls.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let cost = |falls: &PerChannel<f64>| falls.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let costs = found.iter().zip(&pass.trials).filter_map(|(found, trial)| Some((found, falls(trial.as_ref()?))));
             let least = costs.min_by(|left, right| cost(&left.1).total_cmp(&cost(&right.1)));
             let Some((needless, falls)) = least.filter(|least| cost(&least.1) < SMALLEST_FALL) else { break };

@@ -3,6 +3,7 @@
 use super::gates::{SHADOW, SMALLEST_FALL, SMALLEST_SHARE_OF_ACCEPTED, SMALLEST_SHARE_OF_RIVAL};
 use super::report::Step;
 use super::scored::Scored;
+use crate::flight::{Channel, PerChannel};
 use crate::physics::Model;
 use std::collections::BTreeMap;
 
@@ -12,12 +13,12 @@ pub(super) struct Found {
     pub gain: f64,
     pub model: Model,
     /// Channels in which it is worth while.
-    pub channels: Vec<usize>,
+    pub channels: Vec<Channel>,
     /// Effects that it is mistaken for.
     pub confusable: &'static [&'static str],
     /// Mean squared errors before it was accepted, and what it took from them.
-    pub mse_before: [f64; 6],
-    pub removed: [f64; 6],
+    pub mse_before: PerChannel<f64>,
+    pub removed: PerChannel<f64>,
 }
 
 impl Found {
@@ -38,7 +39,7 @@ impl Found {
     /// only mend the form of this one.
     ///
     /// The form of a property of each flight is not in doubt.
-    pub(super) fn is_flawed_by(&self, other: &Scored<'_>, mse: &[f64; 6]) -> bool {
+    pub(super) fn is_flawed_by(&self, other: &Scored<'_>, mse: &PerChannel<f64>) -> bool {
         let own = self.model.effect(&self.step.effect);
         if own.is_some_and(|effect| effect.coefficients.iter().any(|coefficient| coefficient.by_flight.is_some())) {
             return false;

@@ -2,6 +2,7 @@
 
 use super::engine::{Engine, Errors, Trial};
 use super::gates::LARGEST_GAIN;
+use crate::flight::{Channel, PerChannel};
 
 /// A block's gain: half the logarithm of the ratio of its held-out errors, over the channels, within bounds.
 pub(super) fn gains(base: &Trial, trial: &Trial) -> Vec<f64> {
@@ -9,10 +10,11 @@ pub(super) fn gains(base: &Trial, trial: &Trial) -> Vec<f64> {
 }
 
 /// The same of squared errors before and after, by channel and block, over some channels.
-pub(super) fn gains_of(before: &Errors, after: &Errors, channels: &[bool; 6]) -> Vec<f64> {
-    (0..before[0].len())
+pub(super) fn gains_of(before: &Errors, after: &Errors, channels: &PerChannel<bool>) -> Vec<f64> {
+    (0..before[Channel::VxDot].len())
         .map(|block| {
-            (0..6)
+            Channel::ALL
+                .into_iter()
                 .filter(|&channel| channels[channel])
                 .map(|channel| {
                     let gain = 0.5 * (before[channel][block] / after[channel][block]).ln();

@@ -3,7 +3,7 @@
 
 use super::design::Design;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Column, Flight, PerChannel, Span};
 use ndarray::linalg::general_mat_mul;
 use ndarray::{Array2, ArrayView2, Axis, Slice};
 use std::ops::Range;
@@ -43,7 +43,7 @@ pub(super) fn blocks(flights: &[Flight], spans: &[Span], block_s: f64) -> Vec<Bl
 #[derive(Clone, Debug)]
 pub(super) struct BlockGram {
     pub rows: usize,
-    pub channels: [Square; 6],
+    pub channels: PerChannel<Square>,
 }
 
 /// `[X | y]ᵀ [X | y]` as far as any model needs it: a column that only one model has meets its own and those of several models, but not
@@ -173,8 +173,8 @@ pub(super) fn grams(flights: &[Flight], blocks: &[Block], design: &Design) -> Re
 }
 
 fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Vec<BlockGram>> {
-    let places: [Arc<Places>; 6] = std::array::from_fn(|channel| Arc::new(Places::new(&design.owners[channel])));
-    let empty = || BlockGram { rows: 0, channels: std::array::from_fn(|channel| Square::zeros(&places[channel])) };
+    let places: PerChannel<Arc<Places>> = PerChannel::from_fn(|channel| Arc::new(Places::new(&design.owners[channel])));
+    let empty = || BlockGram { rows: 0, channels: PerChannel::from_fn(|channel| Square::zeros(&places[channel])) };
     let mut found: Vec<BlockGram> = blocks.iter().map(|_| empty()).collect();
     let end = blocks.iter().map(|block| block.end).max().unwrap_or(0);
     let mut scratch = Vec::new();
@@ -222,7 +222,7 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::flight::Targets;
+    use crate::flight::{Channel, Targets};
     use crate::physics::Model;
     use phyture_kernels::Tolerance;
     use phyture_kernels::random::Stream;
@@ -279,7 +279,7 @@ pub(super) mod tests {
             let one = grams(&flights, &[Block { flight: 0, start: 0, end: samples }], &design).map_err(failed)?;
             let parts = grams(&flights, &blocks(&flights, &whole(&flights), block_s), &design).map_err(failed)?;
             prop_assert_eq!(parts.iter().map(|part| part.rows).sum::<usize>(), one[0].rows);
-            for channel in 0..6 {
+            for channel in Channel::ALL {
                 let size = one[0].channels[channel].size();
                 let entry = |square: &Square, (i, j)| square.at(square.place(i, j));
                 let entries = |gram: &BlockGram| Array2::from_shape_fn((size, size), |at| entry(&gram.channels[channel], at));
@@ -296,7 +296,7 @@ pub(super) mod tests {
         let flights = noise(4, &[1500]);
         let with = |formula: &str| -> Result<Model> {
             let mut model = model();
-            model.effects.push(crate::physics::Effect::formula("more", 2, formula, 0.0)?);
+            model.effects.push(crate::physics::Effect::formula("more", Channel::VzDot, formula, 0.0)?);
             Ok(model)
         };
         let models = [model(), with("vx * u4")?, with("wx * wz")?, with("lag(vy, 0.1)")?];
@@ -306,11 +306,11 @@ pub(super) mod tests {
         mixed.mix();
         let block = [Block { flight: 0, start: 0, end: 1500 }];
         let (apart, mixed) = (grams(&flights, &block, &apart)?, grams(&flights, &block, &mixed)?);
-        let [left, right] = [&apart[0].channels[2], &mixed[0].channels[2]];
+        let [left, right] = [&apart[0].channels[Channel::VzDot], &mixed[0].channels[Channel::VzDot]];
         assert_eq!(left.own.iter().map(|own| own.dim()).collect::<Vec<_>>(), [(1, 1); 3]);
         for layout in layouts {
             let columns: Vec<usize> =
-                layout.channels[2].free.iter().flat_map(|entry| entry.1.iter().map(|column| column.0)).collect();
+                layout.channels[Channel::VzDot].free.iter().flat_map(|entry| entry.1.iter().map(|column| column.0)).collect();
             for &i in columns.iter().chain(&[left.size() - 1]) {
                 for &j in columns.iter().chain(&[left.size() - 1]) {
                     assert!(near(&[left.at(left.place(i, j))], &[right.at(right.place(i, j))]));
@@ -325,7 +325,7 @@ pub(super) mod tests {
         let flights = noise(2, &[600]);
         let mut design = Design::default();
         let mut model = model();
-        model.effects.push(crate::physics::Effect::formula("root", 0, "sqrt(vx)", 0.0)?);
+        model.effects.push(crate::physics::Effect::formula("root", Channel::VxDot, "sqrt(vx)", 0.0)?);
         design.model(&model)?;
         let message = grams(&flights, &blocks(&flights, &whole(&flights), 3.0), &design).map_err(|error| error.to_string());
         assert!(matches!(message, Err(text) if text.contains("sqrt(vx)") && text.contains("`f0`")));

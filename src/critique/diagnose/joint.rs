@@ -16,6 +16,7 @@ use super::gram::grams;
 use super::known::{Known, known};
 use super::own::prediction_errors;
 use crate::error::{Error, Result};
+use crate::flight::{Channel, PerChannel};
 use crate::physics::{Model, Wanted};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use normal::Normal;
@@ -40,12 +41,12 @@ pub(super) struct Point {
     movable: Option<Vec<usize>>,
     known: Vec<Known>,
     /// By channel, the squares of `[J | A | y - rest]` of each block; columns are numbered as in `layout.free`, then `optional`.
-    reduced: Vec<Reduced>,
+    reduced: PerChannel<Reduced>,
     /// Names of the flights by index.
     names: Vec<String>,
     correlation: f64,
     /// Mean squared error of each channel.
-    pub mse: [f64; 6],
+    pub mse: PerChannel<f64>,
     /// Minus twice the logarithm of likelihood and prior, in independent samples, but for a constant.
     pub cost: f64,
 }
@@ -83,12 +84,12 @@ impl Point {
             }
         }
         let grams = grams(engine.flights, &engine.blocks, &design)?;
-        let reduced: Vec<Reduced> = (0..6).map(|channel| Reduced::new(&layout, channel, &grams)).collect();
+        let reduced = PerChannel::from_fn(|channel| Reduced::new(&layout, channel, &grams));
         drop(grams);
         let known = layout.free.iter().map(|&free| known(&model, free)).collect();
         let names = engine.flights.iter().map(|flight| flight.name.clone()).collect();
         let correlation = engine.correlation;
-        let (mse, cost) = ([0.0; 6], 0.0);
+        let (mse, cost) = (PerChannel::splat(0.0), 0.0);
         let mut point = Self { model, optional, layout, movable: None, known, reduced, names, correlation, mse, cost };
         point.weigh(engine);
         Ok(point)
@@ -96,7 +97,7 @@ impl Point {
 
     /// Error and cost at the present numbers.
     fn weigh(&mut self, engine: &Engine<'_>) {
-        let mut sums = [0.0; 6];
+        let mut sums = PerChannel::splat(0.0);
         for run in engine.runs() {
             let values = self.values(engine.blocks[run.start].flight);
             for block in run {
@@ -128,8 +129,8 @@ impl Point {
     }
 
     /// Squared error of a block, by channel.
-    fn errors(&self, block: usize, values: &[f64]) -> [f64; 6] {
-        std::array::from_fn(|channel| self.reduced[channel].error(block, &|place| values[place]))
+    fn errors(&self, block: usize, values: &[f64]) -> PerChannel<f64> {
+        PerChannel::from_fn(|channel| self.reduced[channel].error(block, &|place| values[place]))
     }
 
     /// The numbers that each flight has for itself, those of effects that are left out excepted.
@@ -149,9 +150,10 @@ impl Point {
             Moving::All => None,
             Moving::Own(name) => Some(numbers.filter(|&number| is_of(name, number)).collect()),
             Moving::Beside(name) => {
-                let of_channel = |channel: usize| self.layout.channels[channel].free.iter().map(|entry| entry.0);
-                let changed =
-                    (0..6).filter(|&channel| of_channel(channel).any(|number| number < self.known.len() && is_of(name, number)));
+                let of_channel = |channel: Channel| self.layout.channels[channel].free.iter().map(|entry| entry.0);
+                let changed = Channel::ALL
+                    .into_iter()
+                    .filter(|&channel| of_channel(channel).any(|number| number < self.known.len() && is_of(name, number)));
                 let beside: BTreeSet<usize> = changed.flat_map(of_channel).collect();
                 Some(numbers.filter(|number| beside.contains(number)).collect())
             }
@@ -293,7 +295,7 @@ impl Point {
     }
 
     /// Mean squared errors, and minus twice the logarithm of the likelihood in independent samples, but for a constant.
-    fn likelihood(&self, engine: &Engine<'_>, sums: &[f64; 6]) -> ([f64; 6], f64) {
+    fn likelihood(&self, engine: &Engine<'_>, sums: &PerChannel<f64>) -> (PerChannel<f64>, f64) {
         let rows = engine.rows().max(1) as f64;
         let mse = sums.map(|sum| (sum / rows).max(f64::MIN_POSITIVE));
         (mse, mse.iter().map(|mse| rows / self.correlation * mse.ln()).sum())
@@ -353,7 +355,7 @@ impl Point {
     /// Squared errors of each block under numbers fitted to the other folds, some effects being left out. Numbers on their bounds stay there.
     pub fn held_out(&self, engine: &Engine<'_>, folds: &Folds, absent: &[usize]) -> Option<Errors> {
         let (start, open) = self.start(absent);
-        let mut errors: Errors = std::array::from_fn(|_| vec![0.0; engine.blocks.len()]);
+        let mut errors: Errors = PerChannel::from_fn(|_| vec![0.0; engine.blocks.len()]);
         for (fold, normal) in folds.normals.iter().enumerate() {
             let solved = self.solve(normal, &open, &start, 0.0)?;
             self.errors_of_fold(engine, (folds, fold), &solved, &mut errors);
@@ -375,7 +377,7 @@ impl Point {
     /// Squared errors of each block under such numbers, found on other flights ([`Point::refitted`] of the same model there); those of each
     /// flight are found from its blocks of other folds, or are those of the model where there is none.
     pub fn errors_under(&self, engine: &Engine<'_>, folds: &Folds, solved: &[f64]) -> Errors {
-        let mut errors: Errors = std::array::from_fn(|_| vec![0.0; engine.blocks.len()]);
+        let mut errors: Errors = PerChannel::from_fn(|_| vec![0.0; engine.blocks.len()]);
         (0..folds.normals.len()).for_each(|fold| self.errors_of_fold(engine, (folds, fold), solved, &mut errors));
         errors
     }
@@ -424,9 +426,9 @@ impl Point {
     }
 
     /// Channels in which an effect acts.
-    pub fn channels(&self, place: usize) -> [bool; 6] {
+    pub fn channels(&self, place: usize) -> PerChannel<bool> {
         let column = self.known.len() + place;
-        std::array::from_fn(|channel| self.reduced[channel].free.contains(&column))
+        PerChannel::from_fn(|channel| self.reduced[channel].free.contains(&column))
     }
 }
 
@@ -497,7 +499,7 @@ pub(super) mod tests {
                         .for_each(|number| values[number] = 0.0);
                     absent.iter().for_each(|place| values[point.known.len() + place] = 1.0);
                     let found = point.errors(block, &values);
-                    for (channel, found) in found.into_iter().enumerate() {
+                    for (channel, &found) in found.pairs() {
                         let scale = expected[channel][block].max(1.0);
                         let difference = (found - expected[channel][block]).abs() / scale;
                         assert!(difference < 1e-6, "{} channel {channel}: {found} {}", definition.kind, expected[channel][block]);

@@ -2,6 +2,7 @@
 
 use super::gates::{LOOSE, SMALLEST_AMPLITUDE, SMALLEST_AMPLITUDE_OF_RIVAL, SMALLEST_FALL};
 use super::influence::Influences;
+use crate::flight::Channel;
 use crate::physics::{Model, catalogue};
 use std::collections::BTreeMap;
 
@@ -11,7 +12,7 @@ pub(super) struct Judged {
     /// Gain of each block.
     pub gains: Vec<f64>,
     /// Share of the held-out error without it that it removes, by channel that it changes.
-    pub falls: BTreeMap<usize, f64>,
+    pub falls: BTreeMap<Channel, f64>,
     pub p_value: f64,
     /// Standard error of its best known number, in usual sizes.
     pub looseness: f64,
@@ -33,7 +34,7 @@ impl Judged {
     }
 
     /// What it removes of a channel's error, in units of what is left with it.
-    fn removed(&self, channel: usize) -> f64 {
+    fn removed(&self, channel: Channel) -> f64 {
         self.falls.get(&channel).map_or(0.0, |fall| fall / (1.0 - fall))
     }
 
@@ -42,7 +43,7 @@ impl Judged {
     pub fn flaw_of<'j>(&self, others: impl Iterator<Item = &'j Judged> + Clone) -> Option<&'j str> {
         let notes = |kind: &str| catalogue::definition(kind).and_then(|definition| definition.notes);
         let listed = |one: &str, other: &str| notes(one).is_some_and(|notes| notes.confusable_with.contains(&other));
-        let stronger = |channel: usize| {
+        let stronger = |channel: Channel| {
             others.clone().filter(|other| other.effect != self.effect && !other.by_flight).find(|other| {
                 let related = listed(&self.effect, &other.effect) || listed(&other.effect, &self.effect);
                 let amplitude = if related { SMALLEST_AMPLITUDE_OF_RIVAL } else { SMALLEST_AMPLITUDE };

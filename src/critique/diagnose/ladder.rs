@@ -11,7 +11,7 @@ use super::own::{Halves, judged_errors};
 use super::search::Search;
 use super::selection::selection;
 use crate::error::{Error, Result};
-use crate::flight::Span;
+use crate::flight::{Channel, Span};
 use crate::physics::{Effect, Model};
 
 /// Effects that were found at once and have a rung of their own, at most; the others share the last one.
@@ -59,7 +59,9 @@ impl Ground<'_> {
         let judged = judged_errors(flights, &models, &halves, BLOCK_S, correlation)?;
         let sum = |errors: &[f64]| errors.iter().sum::<f64>();
         let higher = |[before, after]: [&Vec<f64>; 2]| sum(after) > (1.0 + LARGEST_RISE) * sum(before);
-        Ok(judged.is_some_and(|judged| (0..6).any(|channel| higher([&judged.errors[0][channel], &judged.errors[1][channel]]))))
+        Ok(judged.is_some_and(|judged| {
+            Channel::ALL.into_iter().any(|channel| higher([&judged.errors[0][channel], &judged.errors[1][channel]]))
+        }))
     }
 }
 

@@ -6,7 +6,7 @@ use super::gates::CORRELATION_S;
 use super::gram::blocks;
 use super::known::size_of;
 use crate::error::Result;
-use crate::flight::{Column, Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::formula::Node;
 use crate::physics::{Columns, Model, Regressor, Wanted};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -123,7 +123,7 @@ fn is_known(model: &Model, effect: usize, index: usize, flight: &str) -> bool {
 }
 
 /// What one flight says of its own numbers, by channel: `JᵀJ`, `Jᵀr` and `rᵀr`.
-type Sums = Vec<(DMatrix<f64>, DVector<f64>, f64)>;
+type Sums = PerChannel<(DMatrix<f64>, DVector<f64>, f64)>;
 
 /// A model's predictions and their derivatives by the numbers that each flight has for itself.
 struct OwnColumns {
@@ -131,7 +131,7 @@ struct OwnColumns {
     /// Predictions of the six channels, then the derivatives.
     nodes: Vec<Node>,
     /// By channel: which number, and where its derivative stands in `nodes`.
-    by_channel: Vec<Vec<(usize, usize)>>,
+    by_channel: PerChannel<Vec<(usize, usize)>>,
     numbers: usize,
 }
 
@@ -146,15 +146,15 @@ impl OwnColumns {
                 regressors.extend(own.into_iter().filter(is_own));
             }
         }
-        let mut nodes: Vec<Node> = columns.predictions(model)?.to_vec();
+        let mut nodes: Vec<Node> = columns.predictions(model)?.values().to_vec();
         let first = nodes.len();
         nodes.extend(regressors.iter().map(|regressor| regressor.node));
         let place = |one: &Regressor| numbers.iter().position(|number| Some(number.1) == one.number && number.0 == one.effect);
-        let of_channel = |channel: usize| {
+        let of_channel = |channel: Channel| {
             let own = regressors.iter().enumerate().filter(|(_, one)| one.channel == channel);
             own.filter_map(|(column, one)| Some((place(one)?, first + column))).collect()
         };
-        let by_channel = (0..6).map(of_channel).collect();
+        let by_channel = PerChannel::from_fn(of_channel);
         Ok(Self { columns, nodes, by_channel, numbers: numbers.len() })
     }
 
@@ -162,7 +162,7 @@ impl OwnColumns {
     fn sums(&self, log: &Flight, spans: &[&Span]) -> Result<Sums> {
         let end = spans.iter().map(|span| span.end).max().unwrap_or(0);
         let empty = || (DMatrix::zeros(self.numbers, self.numbers), DVector::zeros(self.numbers), 0.0);
-        let mut sums: Sums = (0..6).map(|_| empty()).collect();
+        let mut sums: Sums = PerChannel::from_fn(|_| empty());
         let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(left, right)| left * right).sum::<f64>();
         self.columns.evaluate(&self.nodes, log, end, &mut |range, values| {
             for span in spans {
@@ -171,9 +171,9 @@ impl OwnColumns {
                     continue;
                 }
                 let part = start - range.start..end - range.start;
-                for (channel, (matrix, side, square)) in sums.iter_mut().enumerate() {
-                    let measured = &log.column(Column::TARGETS[channel])[start..end];
-                    let predicted = &values.column(channel)[part.clone()];
+                for (channel, (matrix, side, square)) in sums.pairs_mut() {
+                    let measured = &log.column(channel.column())[start..end];
+                    let predicted = &values.column(channel.index())[part.clone()];
                     let rest: Vec<f64> = measured.iter().zip(predicted).map(|(measured, value)| measured - value).collect();
                     *square += dot(&rest, &rest);
                     for &(i, left) in &self.by_channel[channel] {
@@ -215,7 +215,7 @@ fn step(
     #[cfg(not(feature = "rayon"))]
     let found: Vec<Sums> = order.iter().map(one).collect::<Result<_>>()?;
     let rows: usize = spans.iter().map(|span| span.end - span.start).sum();
-    let mse: Vec<f64> = (0..6).map(|channel| found.iter().map(|sums| sums[channel].2).sum::<f64>() / rows.max(1) as f64).collect();
+    let mse = PerChannel::from_fn(|channel| found.iter().map(|sums| sums[channel].2).sum::<f64>() / rows.max(1) as f64);
     let mut moved = 0.0_f64;
     for (&flight, sums) in order.iter().zip(&found) {
         let name = &flights[flight].name;
@@ -235,7 +235,7 @@ fn step(
 
 /// By how much the numbers of a flight change, channels weighted by the inverse of their error, each number held near zero by its usual size;
 /// `None` where the equations have no finite solution.
-fn change(sums: &Sums, mse: &[f64], now: &DVector<f64>, sizes: &[f64], correlation: f64) -> Option<DVector<f64>> {
+fn change(sums: &Sums, mse: &PerChannel<f64>, now: &DVector<f64>, sizes: &[f64], correlation: f64) -> Option<DVector<f64>> {
     let (mut matrix, mut side) = (DMatrix::zeros(now.len(), now.len()), DVector::zeros(now.len()));
     for ((own, right, _), mse) in sums.iter().zip(mse) {
         matrix += own / mse.max(f64::MIN_POSITIVE);
@@ -257,16 +257,16 @@ pub(super) fn prediction_errors(engine: &Engine<'_>, model: &Model) -> Result<Er
     let mut columns = Columns::default();
     let nodes = columns.predictions(model)?;
     let runs: Vec<_> = engine.blocks.chunk_by(|left, right| left.flight == right.flight).collect();
-    let one = |run: &&[super::gram::Block]| -> Result<Vec<[f64; 6]>> {
+    let one = |run: &&[super::gram::Block]| -> Result<Vec<PerChannel<f64>>> {
         let flight = &engine.flights[run[0].flight];
         let end = run.iter().map(|block| block.end).max().unwrap_or(0);
-        let mut sums = vec![[0.0; 6]; run.len()];
-        columns.evaluate(&nodes, flight, end, &mut |range, values| {
+        let mut sums = vec![PerChannel::splat(0.0); run.len()];
+        columns.evaluate(nodes.values(), flight, end, &mut |range, values| {
             for (block, sums) in run.iter().zip(&mut sums) {
                 let (start, end) = (block.start.max(range.start), block.end.min(range.end));
-                for (channel, sum) in sums.iter_mut().enumerate().filter(|_| start < end) {
-                    let measured = &flight.column(Column::TARGETS[channel])[start..end];
-                    let predicted = &values.column(channel)[start - range.start..end - range.start];
+                for (channel, sum) in sums.pairs_mut().filter(|_| start < end) {
+                    let measured = &flight.column(channel.column())[start..end];
+                    let predicted = &values.column(channel.index())[start - range.start..end - range.start];
                     *sum += measured.iter().zip(predicted).map(|(measured, value)| (measured - value).powi(2)).sum::<f64>();
                 }
             }
@@ -275,14 +275,14 @@ pub(super) fn prediction_errors(engine: &Engine<'_>, model: &Model) -> Result<Er
         Ok(sums)
     };
     #[cfg(feature = "rayon")]
-    let sums: Vec<Vec<[f64; 6]>> = {
+    let sums: Vec<Vec<PerChannel<f64>>> = {
         use rayon::prelude::*;
         runs.par_iter().with_max_len(1).map(one).collect::<Result<_>>()?
     };
     #[cfg(not(feature = "rayon"))]
-    let sums: Vec<Vec<[f64; 6]>> = runs.iter().map(one).collect::<Result<_>>()?;
-    let flat: Vec<[f64; 6]> = sums.into_iter().flatten().collect();
-    Ok(std::array::from_fn(|channel| flat.iter().map(|sums| sums[channel]).collect()))
+    let sums: Vec<Vec<PerChannel<f64>>> = runs.iter().map(one).collect::<Result<_>>()?;
+    let flat: Vec<PerChannel<f64>> = sums.into_iter().flatten().collect();
+    Ok(PerChannel::from_fn(|channel| flat.iter().map(|sums| sums[channel]).collect()))
 }
 
 /// Errors of some models on the same blocks.
@@ -320,6 +320,7 @@ mod tests {
     use super::super::candidate::with;
     use super::super::gram::tests::{model, near, noise, whole};
     use super::*;
+    use crate::flight::Column;
     use crate::physics::catalogue;
 
     /// A model whose every number acts.
@@ -366,7 +367,7 @@ mod tests {
         }
         let judged = judged_errors(&flights, &models, &halves, 10.0, 100.0)?.expect("two halves");
         assert_eq!(judged.counts.iter().sum::<usize>(), 8000);
-        let sums: Vec<f64> = judged.errors.iter().map(|errors| errors[0].iter().sum()).collect();
+        let sums: Vec<f64> = judged.errors.iter().map(|errors| errors[Channel::VxDot].iter().sum()).collect();
         assert!(sums[1] < 0.1 * sums[0], "{sums:?}");
         Ok(())
     }
@@ -391,8 +392,8 @@ mod tests {
         for (index, block) in engine.blocks.iter().enumerate() {
             let flight = &flights[block.flight];
             let predicted = model().predict(flight)?;
-            for (channel, values) in predicted.iter().enumerate() {
-                let measured = &flight.column(Column::TARGETS[channel])[block.start..block.end];
+            for (channel, values) in predicted.pairs() {
+                let measured = &flight.column(channel.column())[block.start..block.end];
                 let sum: f64 = measured.iter().zip(&values[block.start..block.end]).map(|(y, f)| (y - f).powi(2)).sum();
                 assert!(near(&[errors[channel][index]], &[sum]));
             }

@@ -1,8 +1,8 @@
 //! What a diagnosis holds, as data and as JSON. Its sentences are in `sentences`, its layout for a terminal in `text`; no measuring here.
 
-use crate::critique::channels::{Intervals, PerChannel};
+use crate::critique::channels::{ChannelValues, Intervals};
 use crate::critique::shares::Share;
-use crate::flight::Span;
+use crate::flight::{Channel, PerChannel, Span};
 use crate::physics::SignFinding;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -209,19 +209,19 @@ pub struct Locked {
     #[serde(skip)]
     pub spans: Vec<Span>,
     /// Root mean square error before.
-    pub rmse_before: PerChannel,
+    pub rmse_before: ChannelValues,
     /// And with the accepted effects.
-    pub rmse_after: PerChannel,
+    pub rmse_after: ChannelValues,
     /// Share of the mean squared error removed, by channel, with its 95 % interval from blocks.
     pub mse_fall: BTreeMap<String, [f64; 3]>,
     /// The model as it was given, then with more and more of the accepted effects.
     pub waterfall: Vec<Bar>,
     /// Root mean square error that no model can go below, where the explainable part of the flights is known; see [`Locked::set_floor`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub floor: Option<PerChannel>,
+    pub floor: Option<ChannelValues>,
     /// With a floor: share of the mean squared error above it that was removed; its `mean` is that of the channels that have one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub removable_removed: Option<PerChannel>,
+    pub removable_removed: Option<ChannelValues>,
 }
 
 /// A bar of the waterfall.
@@ -230,7 +230,7 @@ pub struct Bar {
     /// Effects that it adds to the bar before it; the first adds nothing.
     pub added: Vec<String>,
     /// Root mean square error with them.
-    pub rmse: PerChannel,
+    pub rmse: ChannelValues,
     /// Its 95 % interval, from the scatter between blocks; for pictures.
     #[serde(skip)]
     pub rmse_ci95: Intervals,
@@ -278,14 +278,14 @@ const LEAST_REMOVABLE: f64 = 0.05;
 impl Locked {
     /// Notes the floor (a root mean square error by channel) and the share removed of what lies above it:
     /// (before² − after²) / (before² − floor²) of root mean square errors. A channel with less than 5 % of its error above the floor has none.
-    pub fn set_floor(&mut self, floor: PerChannel) {
-        let square = |of: &PerChannel, channel: usize| of.channels()[channel].map(|rmse| rmse * rmse);
-        let share = |channel: usize| {
+    pub fn set_floor(&mut self, floor: ChannelValues) {
+        let square = |of: &ChannelValues, channel: Channel| of.channels()[channel].map(|rmse| rmse * rmse);
+        let share = |channel: Channel| {
             let [before, after] = [&self.rmse_before, &self.rmse_after].map(|rmse| square(rmse, channel));
             let (before, after, floor) = (before?, after?, square(&floor, channel)?);
             (before - floor > LEAST_REMOVABLE * before).then(|| (before - after) / (before - floor))
         };
-        let mut removed = PerChannel::new(std::array::from_fn(share));
+        let mut removed = ChannelValues::new(PerChannel::from_fn(share));
         let known: Vec<f64> = removed.channels().into_iter().flatten().collect();
         removed.mean = (!known.is_empty()).then(|| known.iter().sum::<f64>() / known.len() as f64);
         (self.floor, self.removable_removed) = (Some(floor), Some(removed));
@@ -518,12 +518,12 @@ mod tests {
 
     #[test]
     fn the_removable_share_is_of_what_lies_above_the_floor() {
-        let all = |value: f64| PerChannel::new([Some(value); 6]);
+        let all = |value: f64| ChannelValues::new(PerChannel::splat(Some(value)));
         let mut locked = Locked { rmse_before: all(5.0), rmse_after: all(4.0), ..Locked::default() };
         // Above the floor lie 25 - 9 = 16, of which 9 were removed; in the last channel nothing to speak of lies above it.
         let mut floor = all(3.0).channels();
-        floor[5] = Some(4.999);
-        locked.set_floor(PerChannel::new(floor));
+        floor[Channel::WzDot] = Some(4.999);
+        locked.set_floor(ChannelValues::new(floor));
         let removed = locked.removable_removed.unwrap_or_default();
         assert_eq!((removed.vx_dot, removed.wz_dot, removed.mean), (Some(9.0 / 16.0), None, Some(9.0 / 16.0)));
         // A model below its floor is impossible but for chance; it is shown as it is.

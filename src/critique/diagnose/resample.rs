@@ -91,13 +91,14 @@ pub(super) mod tests {
     use super::super::gram::tests::{model, noise, whole};
     use super::super::gram::{Block, blocks};
     use super::*;
+    use crate::flight::Channel;
     use crate::flight::Column;
     use proptest::prelude::*;
 
     /// A flight in which the roll acceleration answers to the stick.
     pub(in super::super) fn pulled_by(flight: &mut crate::flight::Flight) -> Result<()> {
-        let mut accelerations = Column::TARGETS.map(|column| flight.column(column).to_vec());
-        accelerations[3].iter_mut().zip(flight.column(Column::U1)).for_each(|(value, stick)| *value += 3.0 * stick);
+        let mut accelerations = flight.accelerations();
+        accelerations[Channel::WxDot].iter_mut().zip(flight.column(Column::U1)).for_each(|(value, stick)| *value += 3.0 * stick);
         *flight = flight.with_accelerations(&accelerations)?;
         Ok(())
     }

@@ -6,7 +6,7 @@
 use super::report::{DependsOn, TriedFormula, UnknownChannel};
 use crate::critique::unknown::{ROWS_MAX, ResidualTable, Unknown, UnknownOptions, unknown};
 use crate::error::Result;
-use crate::flight::{Accelerations, Column, Flight, Span};
+use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel, Span};
 use crate::physics::{Effect, Model};
 
 /// Looks for a dependence of measured minus predicted acceleration. Nothing found is an empty list; too little data too.
@@ -39,10 +39,15 @@ fn least(unknown: &Unknown) -> f64 {
 /// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the
 /// effects accepted there took away and that remain. Where the effect reads the very variable, the dependence need be only half as
 /// large as what was removed. An effect that is worth while in another channel as well is not one.
-pub(super) fn stands_in(effect: &Effect, channels: &[usize], removed: &[f64; 6], left: &[f64; 6], unknown: &[Unknown]) -> bool {
+pub(super) fn stands_in(
+    effect: &Effect,
+    channels: &[Channel],
+    removed: &PerChannel<f64>,
+    left: &PerChannel<f64>,
+    unknown: &[Unknown],
+) -> bool {
     channels.iter().all(|&channel| {
-        let name = Column::TARGETS.get(channel).map_or("", |column| column.name());
-        unknown.iter().filter(|unknown| unknown.channel == name).any(|unknown| {
+        unknown.iter().filter(|unknown| unknown.channel == channel.name()).any(|unknown| {
             let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
             let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
             let mut formulas = terms.chain(effect.swaps.iter().map(|swap| &swap.with));

@@ -8,6 +8,7 @@ use super::scored::Scored;
 use super::search::Search;
 use super::significance::{OwnBlocks, Raw, block_weights, raw_scores};
 use crate::error::Result;
+use crate::flight::{Channel, PerChannel};
 use crate::physics::Model;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -33,9 +34,9 @@ impl Search<'_> {
         let pass = self.engine.pass(model, &models)?;
         let rows: Vec<usize> = pass.grams.iter().map(|gram| gram.rows).collect();
         let weights = block_weights(&pass.base, &rows);
-        let even: [Vec<f64>; 6] = {
+        let even: PerChannel<Vec<f64>> = {
             let channel = self.engine.weights(&pass.base);
-            std::array::from_fn(|index| vec![channel[index]; rows.len()])
+            channel.map(|weight| vec![weight; rows.len()])
         };
         let one = |(index, candidate): (usize, &&'c Candidate)| {
             let trials: Vec<&Trial> = owner
@@ -61,8 +62,8 @@ impl Search<'_> {
         candidate: &'c Candidate,
         trials: &[&Trial],
         pass: &Pass,
-        weights: &[Vec<f64>; 6],
-        even: &[Vec<f64>; 6],
+        weights: &PerChannel<Vec<f64>>,
+        even: &PerChannel<Vec<f64>>,
     ) -> Option<Scored<'c>> {
         let gains: Vec<Vec<f64>> = trials.iter().map(|trial| gains(&pass.base, trial)).collect();
         let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
@@ -118,16 +119,17 @@ impl Search<'_> {
     }
 
     /// Share of the held-out mean squared error that a trial removes, by channel that it acts in.
-    pub(super) fn falls(&self, base: &Trial, trial: &Trial) -> BTreeMap<usize, f64> {
+    pub(super) fn falls(&self, base: &Trial, trial: &Trial) -> BTreeMap<Channel, f64> {
         let (before, after) = (self.engine.mse(base), self.engine.mse(trial));
-        (0..6)
+        Channel::ALL
+            .into_iter()
             .filter(|&channel| trial.changed[channel] && self.touches(trial, base, channel))
             .map(|channel| (channel, 1.0 - after[channel] / before[channel]))
             .collect()
     }
 
     /// Whether a trial has other columns than the base in a channel, or only shares coefficients with one that has.
-    pub(super) fn touches(&self, trial: &Trial, base: &Trial, channel: usize) -> bool {
+    pub(super) fn touches(&self, trial: &Trial, base: &Trial, channel: Channel) -> bool {
         trial.layout.channels[channel] != base.layout.channels[channel]
     }
 

@@ -5,7 +5,7 @@ use super::engine::Trial;
 use super::gates::SMALLEST_FALL;
 use super::report::Status;
 use super::sentences;
-use crate::flight::Column;
+use crate::flight::Channel;
 use std::collections::BTreeMap;
 
 /// One candidate on one step.
@@ -15,7 +15,7 @@ pub(super) struct Scored<'a> {
     pub best: Trial,
     pub gains: Vec<f64>,
     pub gain: f64,
-    pub falls: BTreeMap<usize, f64>,
+    pub falls: BTreeMap<Channel, f64>,
     pub p_value: f64,
     pub detection: Option<f64>,
     pub excited: bool,
@@ -59,7 +59,6 @@ impl Scored<'_> {
 
     /// What decided that status, in words. `held` are coefficients held at the sign that physics gives them.
     pub(super) fn reason(&self, largest_p: f64, held: &[(String, String)]) -> String {
-        let name = |channel: usize| Column::TARGETS.get(channel).map_or("?", |column| column.name());
         match self.status(largest_p) {
             Status::NotExcited => sentences::not_carried(self.carrying),
             Status::NotSignificant => sentences::could_be_chance(self.p_value, largest_p),
@@ -69,13 +68,13 @@ impl Scored<'_> {
             }
             Status::Implausible => {
                 let worst = self.falls.iter().min_by(|left, right| left.1.total_cmp(right.1));
-                worst.map_or_else(String::new, |(&channel, &fall)| sentences::makes_worse(name(channel), fall))
+                worst.map_or_else(String::new, |(&channel, &fall)| sentences::makes_worse(channel.name(), fall))
             }
             Status::SamePhysics => sentences::mends(self.rival.as_deref().unwrap_or("?")),
             Status::Negligible if self.largest_fall() >= SMALLEST_FALL => sentences::few_blocks_gain(),
             Status::Accepted | Status::Negligible => {
                 let best = self.falls.iter().max_by(|left, right| left.1.total_cmp(right.1));
-                best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(name(channel), fall))
+                best.map_or_else(String::new, |(&channel, &fall)| sentences::too_little(channel.name(), fall))
             }
         }
     }

@@ -343,7 +343,7 @@ pub fn forbidden(held: &[String]) -> String {
 mod tests {
     use super::super::report::{FailureChannel, Locked};
     use super::*;
-    use crate::critique::channels::PerChannel;
+    use crate::critique::channels::ChannelValues;
 
     const FALLS: [f64; 3] = [0.36, 0.24, 0.46];
     const GROWS: [f64; 3] = [-0.083, -0.199, -0.044];
@@ -450,7 +450,7 @@ mod tests {
 
     #[test]
     fn the_removable_share_is_said_with_its_worst_channel() {
-        let of = |values: [f64; 6]| PerChannel::new(values.map(Some));
+        let of = |values: [f64; 6]| ChannelValues::new(values.map(Some).into());
         let mut found = Locked {
             rmse_before: of([1.0, 1.0, 1.0, 1.0, 1.0, 2.0]),
             rmse_after: of([0.6, 0.6, 0.6, 0.6, 0.6, 2.0]),

@@ -15,6 +15,7 @@ use super::design::Layout;
 use super::engine::Trial;
 use super::fit::{Reduced, components};
 use super::gram::BlockGram;
+use crate::flight::{Channel, PerChannel};
 use nalgebra::{Cholesky, DMatrix, DVector};
 use phyture_kernels::random::Stream;
 use std::ops::Range;
@@ -60,7 +61,7 @@ pub(super) fn raw_scores(
     base: &Trial,
     trial: &Trial,
     grams: &[BlockGram],
-    weights: &[Vec<f64>; 6],
+    weights: &PerChannel<Vec<f64>>,
     flights: &[OwnBlocks<'_>],
     locals: &[(usize, f64)],
 ) -> Option<Raw> {
@@ -68,15 +69,15 @@ pub(super) fn raw_scores(
     let one_sided = effect.coefficients.is_empty();
     let known = base.layout.free.len();
     // A number that acts in several channels is known from all of them.
-    let acts = |channel: &usize| match one_sided {
+    let acts = |channel: &Channel| match one_sided {
         true => trial.changed[*channel],
         false => trial.layout.channels[*channel].free.iter().any(|entry| entry.0 >= known),
     };
     let fitted_together = components(&trial.layout).into_iter().map(|(channels, _)| channels);
-    let mut channels: Vec<usize> = fitted_together.filter(|channels| channels.iter().any(acts)).flatten().collect();
+    let mut channels: Vec<Channel> = fitted_together.filter(|channels| channels.iter().any(acts)).flatten().collect();
     channels.sort_unstable();
     // The model's own coefficients that act in these channels, then the effect's; of a swap that is the change it makes.
-    let of_channel = |&channel: &usize| {
+    let of_channel = |&channel: &Channel| {
         let layout = if one_sided { &base.layout } else { &trial.layout };
         layout.channels[channel].free.iter().map(|entry| entry.0).collect::<Vec<_>>()
     };
@@ -154,8 +155,8 @@ impl Places<'_> {
     fn squares(
         &self,
         layout: &Layout,
-        channels: &[usize],
-        (grams, weights): (&[BlockGram], &[Vec<f64>; 6]),
+        channels: &[Channel],
+        (grams, weights): (&[BlockGram], &PerChannel<Vec<f64>>),
         range: Range<usize>,
     ) -> Vec<DMatrix<f64>> {
         let size = self.members.len() + 1 + self.own.len();
@@ -222,7 +223,7 @@ fn difference(base: &Trial, trial: &Trial, flight: &str) -> Layout {
     let mut layout = base.layout.clone();
     let new = layout.free.len();
     layout.free.push(super::design::Free { effect: trial.model.effects.len() - 1, coefficient: 0 });
-    for channel in (0..6).filter(|&channel| trial.changed[channel]) {
+    for channel in Channel::ALL.into_iter().filter(|&channel| trial.changed[channel]) {
         let mut columns: Vec<(usize, f64)> = Vec::new();
         let mut add = |column: usize, weight: f64| match columns.iter_mut().find(|known| known.0 == column) {
             Some(known) => known.1 += weight,
@@ -241,9 +242,9 @@ fn difference(base: &Trial, trial: &Trial, flight: &str) -> Layout {
 }
 
 /// Weights of blocks: 2/(1 + e/m) of the channel's inverse error, with e the block's mean squared error and m the channel's.
-pub(super) fn block_weights(base: &Trial, rows: &[usize]) -> [Vec<f64>; 6] {
+pub(super) fn block_weights(base: &Trial, rows: &[usize]) -> PerChannel<Vec<f64>> {
     let total: usize = rows.iter().sum();
-    std::array::from_fn(|channel| {
+    PerChannel::from_fn(|channel| {
         let mse = base.errors[channel].iter().sum::<f64>() / total.max(1) as f64;
         let weight = |(error, rows): (&f64, &usize)| 2.0 / (1.0 + error / *rows as f64 / mse) / mse;
         base.errors[channel].iter().zip(rows).map(weight).collect()

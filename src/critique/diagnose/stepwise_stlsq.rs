@@ -11,7 +11,7 @@ use super::design::{Design, Layout};
 use super::engine::Engine;
 use super::gram::{BlockGram, blocks, grams};
 use crate::error::Result;
-use crate::flight::{Flight, Span};
+use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::physics::Model;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use ndarray::Array2;
@@ -41,10 +41,10 @@ pub fn stepwise_and_stlsq(flights: &[Flight], model: &Model, searched: &[Span], 
         .collect();
     let mut design = Design::default();
     let own = design.model(&base)?;
-    let mut libraries: [Vec<(usize, String)>; 6] = Default::default();
+    let mut libraries: PerChannel<Vec<(usize, String)>> = PerChannel::default();
     for candidate in &tried {
         let layout = design.model(&with(&base, &candidate.effect))?;
-        for (channel, library) in libraries.iter_mut().enumerate() {
+        for (channel, library) in libraries.pairs_mut() {
             for column in columns(&layout, channel) {
                 if !columns(&own, channel).contains(&column) && !library.iter().any(|known| known.0 == column) {
                     library.push((column, candidate.id.clone()));
@@ -55,7 +55,7 @@ pub fn stepwise_and_stlsq(flights: &[Flight], model: &Model, searched: &[Span], 
     design.mix();
     let all = grams(flights, &engine.blocks, &design)?;
     let (mut stepped, mut sparse) = (Vec::new(), Vec::new());
-    for (channel, library) in libraries.iter().enumerate() {
+    for (channel, library) in libraries.pairs() {
         let problem = Problem::new(&all, &engine.fold, channel, &own, library);
         stepped.extend(problem.stepwise());
         sparse.extend(problem.thresholded());
@@ -64,7 +64,7 @@ pub fn stepwise_and_stlsq(flights: &[Flight], model: &Model, searched: &[Span], 
 }
 
 /// Columns of a layout in a channel, free ones only.
-fn columns(layout: &Layout, channel: usize) -> Vec<usize> {
+fn columns(layout: &Layout, channel: Channel) -> Vec<usize> {
     layout.channels[channel].free.iter().flat_map(|entry| entry.1.iter().map(|column| column.0)).collect()
 }
 
@@ -90,7 +90,7 @@ struct Problem<'a> {
 }
 
 impl<'a> Problem<'a> {
-    fn new(grams: &[BlockGram], fold: &[usize], channel: usize, own: &Layout, library: &'a [(usize, String)]) -> Self {
+    fn new(grams: &[BlockGram], fold: &[usize], channel: Channel, own: &Layout, library: &'a [(usize, String)]) -> Self {
         let fixed = &own.channels[channel].fixed;
         let mut order = columns(own, channel);
         let count = order.len();

@@ -7,7 +7,7 @@ use super::engine::Engine;
 use super::report::TriedFormula;
 use crate::critique::unknown::Unknown;
 use crate::error::{Error, Result};
-use crate::flight::{Column, Span};
+use crate::flight::{Channel, Span};
 use crate::physics::{Effect, FORMULA_COEFFICIENT, Model};
 
 /// What confirms a formula.
@@ -29,7 +29,7 @@ pub(super) fn name(channel: &str) -> String {
 /// determine its coefficient beside the model's.
 pub(super) fn tried(engine: &Engine<'_>, model: &Model, unknown: &Unknown, unseen: &Unseen<'_>) -> Result<Option<TriedFormula>> {
     let Some(suggested) = &unknown.suggested_formula else { return Ok(None) };
-    let Some(channel) = Column::TARGETS.iter().position(|column| column.name() == unknown.channel) else { return Ok(None) };
+    let Some(channel) = Channel::from_name(unknown.channel) else { return Ok(None) };
     let effect = Effect::formula(name(unknown.channel), channel, &suggested.formula, suggested.coefficient)?;
     let pass = match engine.pass(model, &[with(model, &effect)]) {
         Err(Error::Undetermined(_)) => return Ok(None),
@@ -63,7 +63,7 @@ mod tests {
     use super::super::gram::tests::{model, noise, whole};
     use super::*;
     use crate::critique::unknown::{Dependence, SuggestedFormula};
-    use crate::flight::Flight;
+    use crate::flight::{Column, Flight};
 
     fn unknown(formula: &str) -> Unknown {
         Unknown {
@@ -81,9 +81,12 @@ mod tests {
     fn flights(turned: bool) -> Result<Vec<Flight>> {
         let mut flights = noise(5, &[60_000, 20_000]);
         for (index, flight) in flights.iter_mut().enumerate() {
-            let mut accelerations: [Vec<f64>; 6] = Column::TARGETS.map(|column| flight.column(column).to_vec());
+            let mut accelerations = flight.accelerations();
             let sign = if turned && index == 1 { -2.0 } else { 2.0 };
-            accelerations[3].iter_mut().zip(flight.column(Column::U1)).for_each(|(value, u)| *value += sign * u * u.abs());
+            accelerations[Channel::WxDot]
+                .iter_mut()
+                .zip(flight.column(Column::U1))
+                .for_each(|(value, u)| *value += sign * u * u.abs());
             *flight = flight.with_accelerations(&accelerations)?;
         }
         Ok(flights)

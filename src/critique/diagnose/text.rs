@@ -5,10 +5,10 @@ use super::describe::STABLE;
 use super::report::{CandidateReport, Diagnosis, Locked, Method, Number, ParameterValue, Status, Step, UnknownChannel, Worth};
 use super::sentences::{self, percent};
 use super::signs::number_remark;
-use crate::critique::channels::PerChannel;
+use crate::critique::channels::ChannelValues;
 use crate::critique::table::OWN_FROM_FIRST_HALF;
 use crate::critique::wrap::{clipped, wrapped};
-use crate::flight::Column;
+use crate::flight::{Channel, PerChannel};
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -131,9 +131,9 @@ fn unknown(f: &mut fmt::Formatter<'_>, unknown: &UnknownChannel, locked: Option<
 }
 
 /// A table of the six channels: rows of texts under the channels' names.
-fn table(f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, [String; 6])]) -> fmt::Result {
-    let line = |cells: &[String; 6]| cells.iter().map(|cell| format!("{cell:>13}")).collect::<String>();
-    writeln!(f, "   {head:<28}{}", line(&Column::TARGETS.map(|column| column.name().to_owned())))?;
+fn table(f: &mut fmt::Formatter<'_>, head: &str, rows: &[(String, PerChannel<String>)]) -> fmt::Result {
+    let line = |cells: &PerChannel<String>| cells.iter().map(|cell| format!("{cell:>13}")).collect::<String>();
+    writeln!(f, "   {head:<28}{}", line(&PerChannel::from_fn(|channel| channel.name().to_owned())))?;
     rows.iter().try_for_each(|(name, cells)| writeln!(f, "   {:<28}{}", clipped(name, 28), line(cells)))
 }
 
@@ -143,10 +143,10 @@ fn halves(f: &mut fmt::Formatter<'_>, locked: &Locked) -> fmt::Result {
 }
 
 /// What was removed on the kept part by channel: its share with interval and, with a floor, the floor and the share of what lies above it.
-fn removed(locked: &Locked) -> Vec<(String, [String; 6])> {
-    let fall = |channel: usize| locked.mse_fall.get(Column::TARGETS[channel].name());
-    let row = |name: &str, cell: &dyn Fn(usize) -> Option<String>| {
-        (name.to_owned(), std::array::from_fn(|channel| cell(channel).unwrap_or_else(|| "–".into())))
+fn removed(locked: &Locked) -> Vec<(String, PerChannel<String>)> {
+    let fall = |channel: Channel| locked.mse_fall.get(channel.name());
+    let row = |name: &str, cell: &dyn Fn(Channel) -> Option<String>| {
+        (name.to_owned(), PerChannel::from_fn(|channel| cell(channel).unwrap_or_else(|| "–".into())))
     };
     let mut rows = Vec::new();
     if let Some(floor) = &locked.floor {
@@ -164,7 +164,7 @@ fn removed(locked: &Locked) -> Vec<(String, [String; 6])> {
     rows
 }
 
-fn rmse_row(name: String, values: &PerChannel) -> (String, [String; 6]) {
+fn rmse_row(name: String, values: &ChannelValues) -> (String, PerChannel<String>) {
     (name, values.channels().map(|value| value.map_or_else(|| "–".into(), |value| format!("{value:.4}"))))
 }
 
@@ -183,7 +183,7 @@ fn confirmation(f: &mut fmt::Formatter<'_>, locked: &Locked) -> fmt::Result {
 
 /// What a loop did to the errors on the kept part, by channel.
 fn before_and_after(f: &mut fmt::Formatter<'_>, diagnosis: &Diagnosis, locked: &Locked) -> fmt::Result {
-    let units = ("".to_owned(), Column::TARGETS.map(|column| column.unit().to_owned()));
+    let units = ("".to_owned(), PerChannel::from_fn(|channel| channel.unit().to_owned()));
     let rows = [units, rmse_row("before".into(), &locked.rmse_before), rmse_row("after".into(), &locked.rmse_after)];
     let rows: Vec<_> = rows.into_iter().chain(removed(locked)).collect();
     let count = diagnosis.accepted.len();
@@ -406,7 +406,7 @@ mod tests {
             refitted: true,
             ..Worth::default()
         };
-        let rmse = |value: f64| PerChannel::new([Some(value); 6]);
+        let rmse = |value: f64| ChannelValues::new(PerChannel::splat(Some(value)));
         let mut locked = Locked {
             part: "locked".into(),
             duration_s: 60.0,

@@ -20,7 +20,7 @@ use super::signs::wrong_signs;
 use super::{sentences, signs, suggest};
 use crate::critique::unknown::Unknown;
 use crate::error::{Error, Result};
-use crate::flight::{Flight, Span};
+use crate::flight::{Flight, PerChannel, Span};
 use crate::physics::{Effect, Model};
 use std::time::Instant;
 
@@ -264,7 +264,7 @@ impl Search<'_> {
             bare = self.engine.pass(&bare, &[])?.base.model;
         }
         let [whole, left] = [mse(&bare)?, mse(&last.model)?];
-        let removed: [f64; 6] = std::array::from_fn(|channel| whole[channel] - left[channel]);
+        let removed: PerChannel<f64> = PerChannel::from_fn(|channel| whole[channel] - left[channel]);
         let is_one = |found: &&Found| {
             let effect = found.model.effect(&found.step.effect);
             effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
@@ -280,6 +280,7 @@ mod tests {
     use super::super::report::{Status, Step};
     use super::*;
     use crate::critique::unknown::Dependence;
+    use crate::flight::Channel;
     use crate::flight::Column;
     use crate::physics::{calibrate, catalogue};
 
@@ -303,15 +304,15 @@ mod tests {
         let mut flights = noise(5, &[6000; 6]);
         for flight in &mut flights {
             let mut accelerations = model().predict(flight)?;
-            for (channel, values) in accelerations.iter_mut().enumerate() {
-                let noise = flight.column(Column::TARGETS[channel]);
-                let stick = flight.column(Column::U1).iter().map(|u1| if channel == 0 { *u1 } else { 0.0 });
+            for (channel, values) in accelerations.pairs_mut() {
+                let noise = flight.column(channel.column());
+                let stick = flight.column(Column::U1).iter().map(|u1| if channel == Channel::VxDot { *u1 } else { 0.0 });
                 values.iter_mut().zip(noise).zip(stick).for_each(|((value, noise), stick)| *value += 0.1 * noise + stick);
             }
             *flight = flight.with_accelerations(&accelerations)?;
         }
         let spans = whole(&flights);
-        let (before, _) = calibrate(&with(&model(), &Effect::formula("stick", 0, "u1", 0.0)?), &flights, &spans)?;
+        let (before, _) = calibrate(&with(&model(), &Effect::formula("stick", Channel::VxDot, "u1", 0.0)?), &flights, &spans)?;
         let cut = blocks(&flights, &spans, 10.0);
         let fold = (0..cut.len()).map(|block| block % 10).collect();
         let engine = Engine { flights: &flights, blocks: cut, fold, correlation: 100.0, held: Vec::new() };
@@ -321,10 +322,10 @@ mod tests {
             step: Step { effect: "stick".into(), ..Step::default() },
             gain: 1.0,
             model: before.clone(),
-            channels: vec![0],
+            channels: vec![Channel::VxDot],
             confusable: &[],
-            mse_before: [1.0; 6],
-            removed: [0.0; 6],
+            mse_before: PerChannel::splat(1.0),
+            removed: PerChannel::splat(0.0),
         }];
         let unknown = Unknown {
             channel: "vx_dot",
@@ -360,20 +361,22 @@ mod tests {
         let mut flights = noise(1, &[6000; 6]);
         for flight in &mut flights {
             let mut accelerations = model().predict(flight)?;
-            for ((sample, value), (one, other)) in
-                accelerations[0].iter_mut().enumerate().zip(flight.column(Column::U1).iter().zip(flight.column(Column::U2)))
+            for ((sample, value), (one, other)) in accelerations[Channel::VxDot]
+                .iter_mut()
+                .enumerate()
+                .zip(flight.column(Column::U1).iter().zip(flight.column(Column::U2)))
             {
                 *value += one + other + 0.1 * flight.column(Column::VyDot)[sample];
             }
             // What the model says of the others would leave no error at all.
-            for (channel, values) in accelerations.iter_mut().enumerate().skip(1) {
-                values.iter_mut().zip(flight.column(Column::TARGETS[channel])).for_each(|(value, noise)| *value += noise);
+            for (channel, values) in accelerations.pairs_mut().skip(1) {
+                values.iter_mut().zip(flight.column(channel.column())).for_each(|(value, noise)| *value += noise);
             }
             *flight = flight.with_accelerations(&accelerations)?;
         }
         let mut model = model();
         for (name, formula) in [("sum", "u1 + u2 + u3"), ("one", "u1"), ("other", "u2")] {
-            model.effects.push(Effect { enabled: false, ..Effect::formula(name, 0, formula, 0.0)? });
+            model.effects.push(Effect { enabled: false, ..Effect::formula(name, Channel::VxDot, formula, 0.0)? });
         }
         let without: Vec<String> = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
         let found = |max_effects: Option<usize>| {

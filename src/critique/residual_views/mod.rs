@@ -14,14 +14,16 @@ pub use time::{Autocorrelation, Spectrum, StickCorrelation, autocorrelation, spe
 
 use super::unknown::ResidualTable;
 use crate::error::{Error, Result};
-use crate::flight::Column;
+use crate::flight::Channel;
 
 /// The residual of a channel and the channel's name.
-fn channel(table: &ResidualTable, channel: usize) -> Result<(&[f64], &'static str)> {
-    let known = table.residual.get(channel).zip(Column::TARGETS.get(channel)).filter(|(values, _)| values.len() == table.len());
-    let fault =
-        || Error::Shape { operation: "residual view", message: format!("no channel {channel} with a residual for every row") };
-    known.map(|(values, column)| (values.as_slice(), column.name())).ok_or_else(fault)
+fn channel(table: &ResidualTable, channel: Channel) -> Result<(&[f64], &'static str)> {
+    let residual = &table.residual[channel];
+    if residual.len() != table.len() {
+        let message = format!("{} residuals of {channel} for {} rows", residual.len(), table.len());
+        return Err(Error::Shape { operation: "residual view", message });
+    }
+    Ok((residual, channel.name()))
 }
 
 /// A feature by name.
@@ -44,6 +46,7 @@ fn blocks(table: &ResidualTable) -> usize {
 #[cfg(test)]
 pub(in crate::critique::residual_views) mod testing {
     use super::*;
+    use crate::flight::PerChannel;
     use phyture_kernels::random::Stream;
 
     /// Blocks of 200 rows of 0.1 s, two blocks a flight, with features `vx` (noise of 1 s), `height` (of 3 s) and `u1` (of 0.3 s), and
@@ -63,7 +66,7 @@ pub(in crate::critique::residual_views) mod testing {
         table.names = ["vx", "height", "u1"].map(str::to_owned).into();
         table.units = ["m/s", "m", "1"].map(str::to_owned).into();
         table.features = vec![noise(10, 1.0), noise(11, 3.0), noise(12, 0.3)];
-        table.residual = std::array::from_fn(|channel| noise(channel as u64, 0.5));
+        table.residual = PerChannel::from_fn(|channel| noise(channel.index() as u64, 0.5));
         table.block = (0..400 * flights).map(|row| row / 200).collect();
         table.flight = (0..400 * flights).map(|row| row / 400).collect();
         table.time_s = (0..400 * flights).map(|row| 0.1 * (row % 400) as f64 + 0.05).collect();

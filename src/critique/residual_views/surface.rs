@@ -6,6 +6,7 @@ use super::{blocks, channel, feature, plain_features};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::critique::unknown::ResidualTable;
 use crate::error::Result;
+use crate::flight::Channel;
 use serde::Serialize;
 
 /// Cells along each variable.
@@ -64,7 +65,7 @@ fn place(edges: &[f64], value: f64) -> usize {
 ///
 /// # Errors
 /// [`crate::Error::Shape`] without such a channel, [`crate::Error::Undetermined`] if a feature is not in the table.
-pub fn surface(table: &ResidualTable, of: usize, [x, y]: [&str; 2]) -> Result<Option<Surface>> {
+pub fn surface(table: &ResidualTable, of: Channel, [x, y]: [&str; 2]) -> Result<Option<Surface>> {
     let (residual, name) = channel(table, of)?;
     let (across, along) = (feature(table, x)?, feature(table, y)?);
     let Some((x_edges, y_edges)) = edges(across, SIDE).zip(edges(along, SIDE)) else { return Ok(None) };
@@ -102,7 +103,7 @@ fn eta(cells: impl Iterator<Item = (f64, f64)>, residual: &[f64]) -> f64 {
 ///
 /// # Errors
 /// [`crate::Error::Shape`] without such a channel.
-pub fn informative_pair(table: &ResidualTable, of: usize) -> Result<Option<[String; 2]>> {
+pub fn informative_pair(table: &ResidualTable, of: Channel) -> Result<Option<[String; 2]>> {
     let (residual, _) = channel(table, of)?;
     let placed = |(name, values): (&str, &[f64])| {
         let edges = edges(values, SIDE)?;
@@ -136,10 +137,10 @@ mod tests {
     fn a_product_is_seen_over_its_two_variables() -> Result<()> {
         let mut table = table(1, 40);
         let product: Vec<f64> = table.features[0].iter().zip(&table.features[1]).map(|(x, y)| 1.5 * x * y + 0.5 * x).collect();
-        table.residual[2].iter_mut().zip(product).for_each(|(residual, value)| *residual = 0.3 * *residual + value);
-        let pair = informative_pair(&table, 2)?.unwrap_or_default();
+        table.residual[Channel::VzDot].iter_mut().zip(product).for_each(|(residual, value)| *residual = 0.3 * *residual + value);
+        let pair = informative_pair(&table, Channel::VzDot)?.unwrap_or_default();
         assert_eq!(pair, ["vx".to_owned(), "height".to_owned()]);
-        let found = surface(&table, 2, ["vx", "height"])?;
+        let found = surface(&table, Channel::VzDot, ["vx", "height"])?;
         let Some(found) = found else { panic!("both vary") };
         assert_eq!(found.cells.iter().map(|cell| cell.n).sum::<usize>(), table.len());
         assert!(found.share > 0.7, "{}", found.share);
@@ -152,9 +153,9 @@ mod tests {
     #[test]
     fn noise_has_no_share_and_misfits_are_refused() -> Result<()> {
         let table = table(2, 200);
-        let share = surface(&table, 0, ["vx", "u1"])?.map_or(1.0, |found| found.share);
+        let share = surface(&table, Channel::VxDot, ["vx", "u1"])?.map_or(1.0, |found| found.share);
         assert!(share < 0.05, "{share}");
-        assert!(surface(&table, 6, ["vx", "u1"]).is_err() && surface(&table, 0, ["vx", "u9"]).is_err());
+        assert!(surface(&table, Channel::VxDot, ["vx", "u9"]).is_err());
         Ok(())
     }
 
@@ -164,9 +165,9 @@ mod tests {
         #[test]
         fn cells_pool_to_the_mean(seed: u64) {
             let table = table(seed, 4);
-            let found = surface(&table, 1, ["height", "u1"])?;
+            let found = surface(&table, Channel::VyDot, ["height", "u1"])?;
             let pooled = found.map_or(f64::NAN, |found| found.cells.iter().map(|cell| cell.n as f64 * cell.mean).sum::<f64>());
-            prop_assert!((pooled - table.residual[1].iter().sum::<f64>()).abs() < 1e-6);
+            prop_assert!((pooled - table.residual[Channel::VyDot].iter().sum::<f64>()).abs() < 1e-6);
         }
     }
 }

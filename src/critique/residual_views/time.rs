@@ -6,6 +6,7 @@ use super::{blocks, channel, feature};
 use crate::blocks::{BlockMean, BlockSum};
 use crate::critique::unknown::ResidualTable;
 use crate::error::{Error, Result};
+use crate::flight::Channel;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -88,8 +89,8 @@ pub fn autocorrelation(table: &ResidualTable) -> Result<Vec<Autocorrelation>> {
     let (step_s, blocks) = (step_s(table)?, table.blocks());
     let longest = blocks.iter().map(ExactSizeIterator::len).max().unwrap_or(1);
     let lags = ((AUTOCORRELATION_S / step_s).round() as usize).min(longest - 1);
-    let of = |index: usize| {
-        let (values, name) = channel(table, index)?;
+    let of = |of: Channel| {
+        let (values, name) = channel(table, of)?;
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         let values: Vec<f64> = values.iter().map(|value| value - mean).collect();
         let moment = |lag: usize| {
@@ -113,7 +114,7 @@ pub fn autocorrelation(table: &ResidualTable) -> Result<Vec<Autocorrelation>> {
         let lag_s = (0..=lags).map(|lag| step_s * lag as f64).collect();
         Ok(Autocorrelation { channel: name, lag_s, correlation, lasts_s })
     };
-    (0..table.residual.len()).map(of).collect()
+    Channel::ALL.into_iter().map(of).collect()
 }
 
 /// Runs of rows of one flight without a gap.
@@ -146,8 +147,8 @@ pub fn spectrum(table: &ResidualTable) -> Result<Vec<Spectrum>> {
     let length = if longest >= 8 { 1 << longest.ilog2() } else { 0 };
     let window: Vec<f64> = (0..length).map(|row| 0.5 - 0.5 * (TAU * row as f64 / length as f64).cos()).collect();
     let power: f64 = window.iter().map(|weight| weight * weight).sum();
-    let of = |index: usize| {
-        let (values, name) = channel(table, index)?;
+    let of = |of: Channel| {
+        let (values, name) = channel(table, of)?;
         let (mut density, mut segments) = (vec![0.0; if length == 0 { 0 } else { length / 2 + 1 }], 0);
         for range in stretches.iter().filter(|range| length > 0 && range.len() >= length) {
             for start in (range.start..=range.end - length).step_by(length / 2) {
@@ -167,7 +168,7 @@ pub fn spectrum(table: &ResidualTable) -> Result<Vec<Spectrum>> {
         let frequency_hz = (0..density.len()).map(|line| line as f64 / (length as f64 * step_s)).collect();
         Ok(Spectrum { channel: name, frequency_hz, density, segments: segments as usize })
     };
-    (0..table.residual.len()).map(of).collect()
+    Channel::ALL.into_iter().map(of).collect()
 }
 
 /// Discrete Fourier transform in place, radix two (Cooley & Tukey 1965); the length is a power of two.
@@ -221,8 +222,8 @@ pub fn stick_correlations(table: &ResidualTable) -> Result<Vec<StickCorrelation>
     for stick in ["u1", "u2", "u3", "u4"] {
         let Ok(sticks) = feature(table, stick) else { continue };
         let sticks = centred(sticks);
-        for index in 0..table.residual.len() {
-            let (values, name) = channel(table, index)?;
+        for of in Channel::ALL {
+            let (values, name) = channel(table, of)?;
             let residuals = centred(values);
             let scale = rms(&sticks) * rms(&residuals);
             let mut of = StickCorrelation {
@@ -280,7 +281,7 @@ mod tests {
     fn a_tone_stands_in_the_spectrum_at_its_frequency() -> Result<()> {
         let mut table = table(2, 20);
         let tone: Vec<f64> = table.time_s.iter().map(|time| 2.0 * (TAU * 1.875 * time).sin()).collect();
-        table.residual[4].iter_mut().zip(tone).for_each(|(residual, tone)| *residual = 0.1 * *residual + tone);
+        table.residual[Channel::WyDot].iter_mut().zip(tone).for_each(|(residual, tone)| *residual = 0.1 * *residual + tone);
         let found = spectrum(&table)?;
         let density = &found[4].density;
         let peak = (0..density.len()).max_by(|a, b| density[*a].total_cmp(&density[*b])).unwrap_or(0);
@@ -300,7 +301,7 @@ mod tests {
         assert_eq!(warned(&plain)?, Vec::<&str>::new());
         let mut answers = plain.clone();
         for row in 3..answers.len() {
-            answers.features[2][row] -= 0.8 * answers.residual[3][row - 3];
+            answers.features[2][row] -= 0.8 * answers.residual[Channel::WxDot][row - 3];
         }
         assert_eq!(warned(&answers)?, ["wx_dot"]);
         let found = stick_correlations(&answers)?;
@@ -309,7 +310,7 @@ mod tests {
         assert!((wx.lag_s[place] + 0.3).abs() < 1e-9 && wx.correlation[place] < -0.4);
         let mut acts = plain.clone();
         for row in 2..acts.len() {
-            acts.residual[3][row] += acts.features[2][row - 2];
+            acts.residual[Channel::WxDot][row] += acts.features[2][row - 2];
         }
         assert_eq!(warned(&acts)?, Vec::<&str>::new());
         Ok(())

@@ -18,7 +18,7 @@ pub use skeleton::SuggestedFormula;
 pub use table::{ROW_S, ROWS_MAX, ResidualTable};
 
 use crate::error::{Error, Result};
-use crate::flight::Column;
+use crate::flight::Channel;
 use nalgebra::{DMatrix, DVector};
 use persistence::Moments;
 use phyture_kernels::random::{Stream, permutation};
@@ -110,14 +110,15 @@ pub struct Unknown {
 pub fn unknown(table: &ResidualTable, options: &UnknownOptions) -> Result<Vec<Unknown>> {
     check(table)?;
     let halves = CrossFit::new(table, options);
-    let whole = map(6, &|channel| halves.dependence(&halves.features, &halves.starts, &table.residual[channel]));
-    let worth = |(_, found): &(usize, &Explained)| found.r2_with_feedback > options.worth;
-    if !whole.iter().enumerate().any(|found| worth(&found)) {
+    let whole = map(Channel::COUNT, &|index| halves.dependence(&halves.features, &halves.starts, &table.residual.values()[index]));
+    let worth = |(_, found): &(Channel, &Explained)| found.r2_with_feedback > options.worth;
+    let by_channel = || Channel::ALL.into_iter().zip(&whole);
+    if !by_channel().any(|found| worth(&found)) {
         return Ok(Vec::new());
     }
     let null_r2_95 = halves.null(options.nulls);
-    let candidates = whole.iter().enumerate().filter(worth).filter(|(_, found)| found.r2_with_feedback > null_r2_95);
-    let candidates: Vec<(usize, &Explained)> = candidates.collect();
+    let candidates = by_channel().filter(worth).filter(|(_, found)| found.r2_with_feedback > null_r2_95);
+    let candidates: Vec<(Channel, &Explained)> = candidates.collect();
     let described = map(candidates.len(), &|index| {
         let (channel, found) = candidates[index];
         halves.describe(channel, found, null_r2_95, options.worth)
@@ -260,9 +261,9 @@ impl<'a> CrossFit<'a> {
     /// 95 % quantile of the largest R² of the six channels over pairings of residuals with the features of another block.
     fn null(&self, count: usize) -> f64 {
         let pairings: Vec<Vec<usize>> = (0..count as u64).map(|index| self.pairing(index)).collect();
-        let r2 = map(pairings.len() * 6, &|task| {
-            let channel = &self.table.residual[task % 6];
-            let residual: Vec<f64> = pairings[task / 6].iter().map(|row| channel[*row]).collect();
+        let r2 = map(pairings.len() * Channel::COUNT, &|task| {
+            let channel = &self.table.residual.values()[task % Channel::COUNT];
+            let residual: Vec<f64> = pairings[task / Channel::COUNT].iter().map(|row| channel[*row]).collect();
             self.plain_r2(&residual)
         });
         let mut largest: Vec<f64> = r2.chunks_exact(6).map(|channels| channels.iter().copied().fold(0.0, f64::max)).collect();
@@ -384,7 +385,7 @@ impl<'a> CrossFit<'a> {
     }
 
     /// Names the variables behind a dependence; `None` if it is one of feedback.
-    fn describe(&self, channel: usize, found: &Explained, null_r2_95: f64, worth: f64) -> Option<Unknown> {
+    fn describe(&self, channel: Channel, found: &Explained, null_r2_95: f64, worth: f64) -> Option<Unknown> {
         let residual = &self.table.residual[channel];
         let mut shares = self.importance(found, residual);
         // Rivals often move together (height and thrust, speed and its components): each is tried alone.
@@ -426,7 +427,7 @@ impl<'a> CrossFit<'a> {
         let depends_on: Vec<Dependence> = shares.iter().filter(|(_, share)| *share >= 0.01).map(named).collect();
         let first = shares.first().map(|(group, _)| self.groups[*group].1.as_slice()).unwrap_or_default();
         let second = shares.get(1).filter(|_| of_it < NEARLY_ALL).map(|(group, _)| self.groups[*group].1.as_slice());
-        let name = Column::TARGETS.get(channel).map_or("?", |column| column.name());
+        let name = channel.name();
         let shown = [first, second.unwrap_or_default()].concat();
         let part = if bent { self.beside_lines(&shown, residual).1 } else { vec![0.0; residual.len()] };
         let bent: Vec<f64> = residual.iter().zip(part).map(|(residual, part)| residual - part).collect();

@@ -3,7 +3,7 @@
 //! A term to start from, to be calibrated and judged like any other effect. Nothing here decides whether there is a dependence.
 
 use super::table::ResidualTable;
-use crate::flight::Column;
+use crate::flight::{Channel, Column};
 use crate::formula::Formula;
 use nalgebra::{Matrix4, Vector4};
 use serde::Serialize;
@@ -211,16 +211,14 @@ struct Candidate {
 /// `residual` is that of the channel, less straight lines in other variables.
 pub(super) fn suggest(
     table: &ResidualTable,
-    channel: usize,
+    channel: Channel,
     residual: &[f64],
     first: &[usize],
     second: &[usize],
     halves: &[Vec<Range<usize>>; 2],
 ) -> (Option<SuggestedFormula>, String) {
     let rows = halves.each_ref().map(|half| half.iter().cloned().flatten().collect::<Vec<usize>>());
-    let (y, Some(name)) = (residual, Column::TARGETS.get(channel)) else {
-        return (None, String::new());
-    };
+    let y = residual;
     let mut found: Vec<Candidate> = Vec::new();
     for (feature, label, values) in variables(table, first) {
         found.extend(single(&rows, &label, &values, y));
@@ -235,7 +233,7 @@ pub(super) fn suggest(
     let formula = Formula::parse(&best.text).map(|formula| formula.to_string());
     let usable = formula.ok().filter(|_| !best.text.contains("time_in_flight"));
     let suggested =
-        usable.map(|formula| SuggestedFormula { channel: name.name(), formula, coefficient: best.coefficient, r2: best.r2 });
+        usable.map(|formula| SuggestedFormula { channel: channel.name(), formula, coefficient: best.coefficient, r2: best.r2 });
     (suggested, best.words)
 }
 

@@ -3,7 +3,7 @@
 //! Only what was recorded and simple functions of it; no model, no test.
 
 use crate::error::{Error, Result};
-use crate::flight::{Accelerations, Column, Flight, Span, derived};
+use crate::flight::{Accelerations, Column, Flight, PerChannel, Span, derived};
 use crate::formula::Formula;
 use crate::physics::evaluate;
 
@@ -28,7 +28,7 @@ pub struct ResidualTable {
     /// the means stand in for them, and a state that follows a gust within a row is harder to tell from a cause.
     pub at_start: Vec<Vec<f64>>,
     /// Measured − predicted by channel in the order of [`Column::TARGETS`], m/s² and rad/s².
-    pub residual: [Vec<f64>; 6],
+    pub residual: PerChannel<Vec<f64>>,
     /// Block of each row, from 0 without gaps, never falling. A block lies in one span of one flight.
     pub block: Vec<usize>,
     /// Flight of each row, as in the spans.

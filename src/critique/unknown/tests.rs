@@ -1,7 +1,7 @@
 //! Known dependences, none at all, and sticks that follow the gusts: is the right thing said, and nothing where there is nothing?
 
 use super::*;
-use crate::flight::{Accelerations, Flight, Span, Targets};
+use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel, Span, Targets};
 use phyture_kernels::random::Stream;
 use proptest::prelude::*;
 
@@ -52,13 +52,14 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
     let mut made = Made { flights: Vec::new(), residual: Vec::new() };
     for flight in 0..count as u64 {
         let stream = |purpose: u64| Stream::new(seed, flight, purpose, 7);
-        let gust: Accelerations =
-            std::array::from_fn(|channel| gusts(stream(50 + channel as u64), 0.5).into_iter().map(|value| 0.3 * value).collect());
+        let gust: Accelerations = PerChannel::from_fn(|channel| {
+            gusts(stream(50 + channel.index() as u64), 0.5).into_iter().map(|value| 0.3 * value).collect()
+        });
         let of = |purpose: u64, tau_s: f64, scale: f64, mean: f64| -> Vec<f64> {
             smooth(stream(purpose), tau_s).into_iter().map(|value| mean + scale * value).collect()
         };
         // Speeds and rates hold the response to gusts of earlier samples.
-        let response = |channel: usize, damping: f64| -> Vec<f64> {
+        let response = |channel: Channel, damping: f64| -> Vec<f64> {
             let mut value = 0.0;
             (0..SAMPLES)
                 .map(|sample| {
@@ -71,17 +72,18 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
         let sum = |a: &[f64], b: &[f64], by: f64| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + by * b).collect() };
         let mut columns: [Vec<f64>; Column::COUNT] = std::array::from_fn(|_| vec![0.0; SAMPLES]);
         let mut set = |column: Column, values: Vec<f64>| columns[column as usize] = values;
-        let follow: [Vec<f64>; 6] = std::array::from_fn(|channel| response(channel, if channel < 3 { 0.4 } else { 5.0 }));
+        let follow: PerChannel<Vec<f64>> =
+            PerChannel::from_fn(|channel| response(channel, if channel < Channel::WxDot { 0.4 } else { 5.0 }));
         // With feedback the commands are small, so that much of the motion is the response to gusts.
         let command = if feedback > 0.0 { 0.15 } else { 1.0 };
         set(Column::Z, of(1, 5.0, 3.0, 8.0).iter().map(|height| -height).collect());
-        let vz = sum(&of(4, 2.0, 1.5 * command, 0.0), &follow[2], 1.0);
+        let vz = sum(&of(4, 2.0, 1.5 * command, 0.0), &follow[Channel::VzDot], 1.0);
         set(Column::U4, sum(&of(14, 1.0, 0.1, 0.4), &vz, 0.04));
-        set(Column::Vx, sum(&of(2, 3.0, 4.0 * command, 3.0), &follow[0], 1.0));
-        set(Column::Vy, sum(&of(3, 2.0, 2.0 * command, 0.0), &follow[1], 1.0));
+        set(Column::Vx, sum(&of(2, 3.0, 4.0 * command, 3.0), &follow[Channel::VxDot], 1.0));
+        set(Column::Vy, sum(&of(3, 2.0, 2.0 * command, 0.0), &follow[Channel::VyDot], 1.0));
         set(Column::Vz, vz);
         for (axis, column) in [Column::Wx, Column::Wy, Column::Wz].into_iter().enumerate() {
-            let rate = sum(&of(5 + axis as u64, 0.6, 0.6 * command, 0.0), &follow[3 + axis], 1.0);
+            let rate = sum(&of(5 + axis as u64, 0.6, 0.6 * command, 0.0), &follow.values()[3 + axis], 1.0);
             let stick = [Column::U1, Column::U2, Column::U3][axis];
             set(stick, sum(&of(11 + axis as u64, 0.3, 0.2 * command, 0.0), &rate, 0.3));
             set(column, rate);
@@ -98,7 +100,7 @@ fn made(seed: u64, count: usize, feedback: f64) -> Result<Made> {
 
 impl Made {
     /// Adds a term to one channel of the residual.
-    fn with(mut self, channel: usize, formula: &str, scale: f64) -> Result<Self> {
+    fn with(mut self, channel: Channel, formula: &str, scale: f64) -> Result<Self> {
         let formula = crate::formula::Formula::parse(formula)?;
         for (flight, residual) in self.flights.iter().zip(&mut self.residual) {
             let values = crate::physics::evaluate(&formula, flight)?;
@@ -115,15 +117,15 @@ impl Made {
 
 /// Channel, formula, size, variable that has to come first, what the suggestion has to contain.
 #[rustfmt::skip]
-const ALIENS: [(usize, &str, f64, &[&str], &str); 8] = [
-    (2, "sin(2 * height)", 1.0, &["height"], "sin("),
-    (0, "exp(-((vx - 4) / 1.5)^2)", 1.0, &["vx"], "exp("),
-    (5, "max(wz - 0.4, 0)", 2.0, &["wz"], "max("),
-    (2, "u4 * airspeed", 1.0, &["u4", "airspeed"], ""),
-    (1, "sin(yaw)", 0.4, &["yaw"], "sin("),
-    (3, "u1 * abs(u1)", 5.0, &["u1"], "u1"),
-    (4, "t", 0.03, &["t"], "t"),
-    (0, "cos(3 * height)", 0.25, &["height"], "sin("),
+const ALIENS: [(Channel, &str, f64, &[&str], &str); 8] = [
+    (Channel::VzDot, "sin(2 * height)", 1.0, &["height"], "sin("),
+    (Channel::VxDot, "exp(-((vx - 4) / 1.5)^2)", 1.0, &["vx"], "exp("),
+    (Channel::WzDot, "max(wz - 0.4, 0)", 2.0, &["wz"], "max("),
+    (Channel::VzDot, "u4 * airspeed", 1.0, &["u4", "airspeed"], ""),
+    (Channel::VyDot, "sin(yaw)", 0.4, &["yaw"], "sin("),
+    (Channel::WxDot, "u1 * abs(u1)", 5.0, &["u1"], "u1"),
+    (Channel::WyDot, "t", 0.03, &["t"], "t"),
+    (Channel::VxDot, "cos(3 * height)", 0.25, &["height"], "sin("),
 ];
 
 /// What is found for one of [`ALIENS`]: right channel and variable first, right shape.
@@ -132,7 +134,7 @@ fn judge(alien: usize, found: &[Unknown]) -> (bool, bool) {
     let Some(top) = found.first() else { return (false, false) };
     let first = top.depends_on.first().is_some_and(|first| variables.contains(&first.variable.as_str()));
     let shaped = top.suggested_formula.as_ref().is_some_and(|suggested| suggested.formula.contains(shape));
-    (top.channel == Column::TARGETS[channel].name() && first, shaped)
+    (top.channel == channel.name() && first, shaped)
 }
 
 #[test]
@@ -159,7 +161,7 @@ fn hidden_dependences_are_named() -> Result<()> {
 
 #[test]
 fn the_sine_of_height_comes_back_as_a_term() -> Result<()> {
-    let table = made(7, 40, 0.0)?.with(2, "sin(2 * height)", 1.0)?.table()?;
+    let table = made(7, 40, 0.0)?.with(Channel::VzDot, "sin(2 * height)", 1.0)?.table()?;
     let found = unknown(&table, &UnknownOptions::default())?;
     let [found] = found.as_slice() else { panic!("one channel: {found:?}") };
     assert!(found.depends_on[0].variable == "height" && found.depends_on[0].share > 0.85, "{found:?}");
@@ -185,11 +187,11 @@ fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
     for seed in 0..3 {
         let table = made(200 + seed, 30, 1.0)?.table()?;
         let search = CrossFit::new(&table, &UnknownOptions::default());
-        let roll = search.dependence(&search.features, &search.starts, &table.residual[3]);
+        let roll = search.dependence(&search.features, &search.starts, &table.residual[Channel::WxDot]);
         assert!(roll.r2_with_feedback > WORTH, "there is something to resist: {}", roll.r2_with_feedback);
         assert_eq!(unknown(&table, &UnknownOptions::default())?, []);
     }
-    let table = made(300, 30, 1.0)?.with(2, "sin(2 * height)", 0.5)?.table()?;
+    let table = made(300, 30, 1.0)?.with(Channel::VzDot, "sin(2 * height)", 0.5)?.table()?;
     let found = unknown(&table, &UnknownOptions::default())?;
     let named = found.first().is_some_and(|top| top.channel == "vz_dot" && top.depends_on[0].variable == "height");
     assert!(named, "a cause beside the feedback is still seen: {found:?}");
@@ -199,7 +201,7 @@ fn sticks_that_follow_gusts_are_not_causes() -> Result<()> {
 #[cfg(feature = "rayon")]
 #[test]
 fn the_number_of_threads_changes_nothing() -> Result<()> {
-    let table = made(5, 12, 0.0)?.with(0, "exp(-((vx - 4) / 1.5)^2)", 1.0)?.table()?;
+    let table = made(5, 12, 0.0)?.with(Channel::VxDot, "exp(-((vx - 4) / 1.5)^2)", 1.0)?.table()?;
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|error| Error::Undetermined(error.to_string()))?;
@@ -222,8 +224,8 @@ fn rows_stay_within_blocks_spans_and_what_was_recorded() -> Result<()> {
     assert_eq!(table.len(), 442);
     assert_eq!(table.blocks().iter().map(ExactSizeIterator::len).collect::<Vec<_>>(), [100, 100, 80, 2, 100, 60]);
     assert!(table.feature("sin(yaw)").is_none() && table.feature("height").is_some() && table.feature("lag(u4, 0.4)").is_some());
-    let expected = made.residual[0][2][5..10].iter().sum::<f64>() / 5.0;
-    assert!((table.residual[2][1] - expected).abs() < 1e-12 && (table.time_s[1] - 0.14).abs() < 1e-12);
+    let expected = made.residual[0][Channel::VzDot][5..10].iter().sum::<f64>() / 5.0;
+    assert!((table.residual[Channel::VzDot][1] - expected).abs() < 1e-12 && (table.time_s[1] - 0.14).abs() < 1e-12);
     let few = ResidualTable::new(&made.flights, &spans, &residuals, 10.0, 100)?;
     assert!(few.len() <= 100 && few.len() > 50, "{}", few.len());
     let outside = [Span { flight: 0, start: 0, end: 1501 }];
@@ -231,7 +233,7 @@ fn rows_stay_within_blocks_spans_and_what_was_recorded() -> Result<()> {
     assert!(matches!(ResidualTable::new(&made.flights, &[], &residuals, 10.0, 100), Err(Error::Undetermined(_))));
     assert!(matches!(unknown(&table, &UnknownOptions::default()), Err(Error::Undetermined(text)) if text.contains("6 blocks")));
     let mut uneven = table;
-    uneven.residual[3].pop();
+    uneven.residual[Channel::WxDot].pop();
     assert!(matches!(unknown(&uneven, &UnknownOptions::default()), Err(Error::Shape { .. })));
     Ok(())
 }
@@ -244,7 +246,7 @@ proptest! {
         let flights = lengths.iter().enumerate().flat_map(|(flight, length)| vec![flight; *length]).collect::<Vec<_>>();
         let rows = flights.len();
         let mut table = ResidualTable { names: vec!["vx".into()], features: vec![vec![0.0; rows]], ..Default::default() };
-        table.residual = std::array::from_fn(|_| vec![0.0; rows]);
+        table.residual = PerChannel::from_fn(|_| vec![0.0; rows]);
         (table.block, table.flight) = (flights.clone(), flights);
         let paired = CrossFit::new(&table, &UnknownOptions::default()).pairing(index);
         prop_assert_eq!(paired.len(), rows);

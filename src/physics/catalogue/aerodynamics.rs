@@ -2,6 +2,7 @@
 
 use super::super::definition::{Definition, Notes, change, coefficient, spread};
 use super::{ANY, HELICOPTER};
+use crate::flight::Channel;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
     Definition {
@@ -14,9 +15,9 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("k_x"), "airspeed * air_vx"),
-            (1, Some("k_y"), "airspeed * air_vy"),
-            (2, Some("k_z"), "airspeed * air_vz"),
+            (Channel::VxDot, Some("k_x"), "airspeed * air_vx"),
+            (Channel::VyDot, Some("k_y"), "airspeed * air_vy"),
+            (Channel::VzDot, Some("k_z"), "airspeed * air_vz"),
         ],
         swaps: &[],
         notes: Some(Notes {
@@ -44,12 +45,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("x_vy"), "air_vy"),
-            (0, Some("x_vz"), "air_vz"),
-            (1, Some("y_vx"), "air_vx"),
-            (1, Some("y_vz"), "air_vz"),
-            (2, Some("z_vx"), "air_vx"),
-            (2, Some("z_vy"), "air_vy"),
+            (Channel::VxDot, Some("x_vy"), "air_vy"),
+            (Channel::VxDot, Some("x_vz"), "air_vz"),
+            (Channel::VyDot, Some("y_vx"), "air_vx"),
+            (Channel::VyDot, Some("y_vz"), "air_vz"),
+            (Channel::VzDot, Some("z_vx"), "air_vx"),
+            (Channel::VzDot, Some("z_vy"), "air_vy"),
         ],
         swaps: &[],
         notes: Some(Notes {
@@ -110,7 +111,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         // The tail's thrust in full sticks: the sign holds for any convention of the stick.
-        terms: &[(1, Some("k_u"), "tail_thrust * control_moment_c_z / max(control_moment_c_z^2, 1e-6)"), (1, Some("k_r"), "wz")],
+        terms: &[
+            (Channel::VyDot, Some("k_u"), "tail_thrust * control_moment_c_z / max(control_moment_c_z^2, 1e-6)"),
+            (Channel::VyDot, Some("k_r"), "wz"),
+        ],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -136,7 +140,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
                 .positive("a tail rotor that turns the tail into the wind"),
         ],
         parameters: &[],
-        terms: &[(5, Some("k_fin"), "airspeed * air_vy")],
+        terms: &[(Channel::WzDot, Some("k_fin"), "airspeed * air_vy")],
         swaps: &[change("tail_thrust", "tail_thrust + k_tail * air_vy")],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -180,7 +184,11 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("k_z", "1/m", "yaw").within(-2.0, 0.0).usually(-0.25, -0.03),
         ],
         parameters: &[],
-        terms: &[(3, Some("k_x"), "airspeed * wx"), (4, Some("k_y"), "airspeed * wy"), (5, Some("k_z"), "airspeed * wz")],
+        terms: &[
+            (Channel::WxDot, Some("k_x"), "airspeed * wx"),
+            (Channel::WyDot, Some("k_y"), "airspeed * wy"),
+            (Channel::WzDot, Some("k_z"), "airspeed * wz"),
+        ],
         swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,

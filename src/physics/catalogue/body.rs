@@ -2,6 +2,7 @@
 
 use super::super::definition::{Definition, Notes, change, coefficient};
 use super::{ANY, HELICOPTER};
+use crate::flight::Channel;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
     // Euler's equation with the tensor I - J, J symmetric with a zero diagonal, solved to first order in J:
@@ -19,18 +20,18 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (3, Some("i_xz"), "(predicted_wz + wx * wy) / ix"),
-            (4, Some("i_xz"), "(wz^2 - wx^2) / iy"),
-            (5, Some("i_xz"), "(predicted_wx - wy * wz) / iz"),
-            (3, Some("i_xy"), "(predicted_wy - wx * wz) / ix"),
-            (4, Some("i_xy"), "(predicted_wx + wy * wz) / iy"),
-            (5, Some("i_xy"), "(wx^2 - wy^2) / iz"),
-            (3, Some("i_yz"), "(wy^2 - wz^2) / ix"),
-            (4, Some("i_yz"), "(predicted_wz - wx * wy) / iy"),
-            (5, Some("i_yz"), "(predicted_wy + wx * wz) / iz"),
-            (3, Some("ratio_x"), "wy * wz"),
-            (4, Some("ratio_y"), "wz * wx"),
-            (5, Some("ratio_z"), "wx * wy"),
+            (Channel::WxDot, Some("i_xz"), "(predicted_wz + wx * wy) / ix"),
+            (Channel::WyDot, Some("i_xz"), "(wz^2 - wx^2) / iy"),
+            (Channel::WzDot, Some("i_xz"), "(predicted_wx - wy * wz) / iz"),
+            (Channel::WxDot, Some("i_xy"), "(predicted_wy - wx * wz) / ix"),
+            (Channel::WyDot, Some("i_xy"), "(predicted_wx + wy * wz) / iy"),
+            (Channel::WzDot, Some("i_xy"), "(wx^2 - wy^2) / iz"),
+            (Channel::WxDot, Some("i_yz"), "(wy^2 - wz^2) / ix"),
+            (Channel::WyDot, Some("i_yz"), "(predicted_wz - wx * wy) / iy"),
+            (Channel::WzDot, Some("i_yz"), "(predicted_wy + wx * wz) / iz"),
+            (Channel::WxDot, Some("ratio_x"), "wy * wz"),
+            (Channel::WyDot, Some("ratio_y"), "wz * wx"),
+            (Channel::WzDot, Some("ratio_z"), "wx * wy"),
         ],
         swaps: &[],
         notes: Some(Notes {
@@ -51,7 +52,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("y_m", "m", "centre of mass to starboard of the mast").within(-0.05, 0.05).usually(-0.01, 0.01),
         ],
         parameters: &[],
-        terms: &[(4, Some("x_m"), "mass_kg / iy * thrust"), (3, Some("y_m"), "-mass_kg / ix * thrust")],
+        terms: &[(Channel::WyDot, Some("x_m"), "mass_kg / iy * thrust"), (Channel::WxDot, Some("y_m"), "-mass_kg / ix * thrust")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: ANY,
@@ -87,9 +88,9 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[coefficient("k", "1", "mass of that air over the aircraft's").within(0.0, 0.05).usually(0.002, 0.01)],
         parameters: &[],
         terms: &[
-            (0, Some("k"), "-(g_x + linear_drag_a_x * air_vx)"),
-            (1, Some("k"), "-(g_y + linear_drag_a_y * air_vy)"),
-            (2, Some("k"), "-(g_z + thrust)"),
+            (Channel::VxDot, Some("k"), "-(g_x + linear_drag_a_x * air_vx)"),
+            (Channel::VyDot, Some("k"), "-(g_y + linear_drag_a_y * air_vy)"),
+            (Channel::VzDot, Some("k"), "-(g_z + thrust)"),
         ],
         swaps: &[],
         notes: Some(Notes {

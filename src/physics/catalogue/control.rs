@@ -2,6 +2,7 @@
 
 use super::super::definition::{Definition, Notes, change, coefficient, parameter};
 use super::{ANY, HELICOPTER};
+use crate::flight::Channel;
 
 /// Delays that a search tries, s.
 const DELAYS: &[f64] = &[0.002, 0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.055, 0.075, 0.1];
@@ -208,12 +209,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         parameters: &[],
         // The cyclic's cross-coupling turns the disc's tilt; what tail and collective do to roll and pitch does not pass through it.
         terms: &[
-            (3, Some("x_u3"), "u3"),
-            (3, Some("x_u4"), "u4"),
-            (4, Some("y_u3"), "u3"),
-            (4, Some("y_u4"), "u4"),
-            (5, Some("z_u1"), "u1"),
-            (5, Some("z_u2"), "u2"),
+            (Channel::WxDot, Some("x_u3"), "u3"),
+            (Channel::WxDot, Some("x_u4"), "u4"),
+            (Channel::WyDot, Some("y_u3"), "u3"),
+            (Channel::WyDot, Some("y_u4"), "u4"),
+            (Channel::WzDot, Some("z_u1"), "u1"),
+            (Channel::WzDot, Some("z_u2"), "u2"),
         ],
         swaps: &[change("rotor_roll", "rotor_roll + x_u2 * u2"), change("rotor_pitch", "rotor_pitch + y_u1 * u1")],
         notes: Some(Notes {
@@ -236,7 +237,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             coefficient("y_p", "1/s", "pitch by roll rate").within(-15.0, 15.0).usually(-5.0, 5.0),
         ],
         parameters: &[],
-        terms: &[(3, Some("x_q"), "wy"), (4, Some("y_p"), "wx")],
+        terms: &[(Channel::WxDot, Some("x_q"), "wy"), (Channel::WyDot, Some("y_p"), "wx")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,

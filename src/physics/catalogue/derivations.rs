@@ -3,7 +3,7 @@
 use super::tests::{effect, helicopter};
 use crate::Result;
 use crate::flight::attitude::{cross, euler_rates, rotate, rotate_back, rotation_body_to_inertial, rotation_to_euler};
-use crate::flight::{Column, Flight, GRAVITY_M_S2, Targets};
+use crate::flight::{Channel, Column, Flight, GRAVITY_M_S2, Targets};
 use crate::physics::{Effect, Model};
 use nalgebra::{Matrix3, Vector3};
 use phyture_kernels::Tolerance;
@@ -14,7 +14,7 @@ const INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 fn at(model: &Model, state: [f64; 16]) -> Result<[f64; 6]> {
     let columns = std::array::from_fn(|column| vec![state.get(column).copied().unwrap_or(0.0)]);
     let predicted = model.predict(&Flight::new("one", "state", 0.0, 0.01, columns, Targets::Recorded)?)?;
-    Ok(predicted.map(|channel| channel[0]))
+    Ok(predicted.map(|channel| channel[0]).into_array())
 }
 
 /// What an effect adds to the helicopter at a state.
@@ -194,7 +194,7 @@ fn droop_and_inflow_answer_a_step_of_the_collective() -> Result<()> {
         let before = model.predict(&flight)?;
         model.effects.push(effect);
         let after = model.predict(&flight)?;
-        Ok(after[2].iter().zip(&before[2]).map(|(after, before)| after - before).collect())
+        Ok(after[Channel::VzDot].iter().zip(&before[Channel::VzDot]).map(|(after, before)| after - before).collect())
     };
     // Less thrust (positive is down), and more and more so.
     let droop = step(effect("rotor_droop", &[-0.1])?)?;

@@ -5,6 +5,7 @@
 
 use super::super::definition::{Definition, Notes, change, coefficient, spread};
 use super::ANY;
+use crate::flight::Channel;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
     // The recorded velocity is v + w x r, so v = v_rec - w x r, and v'_rec = v' + w' x r. What turning axes do to v gives w x (w x r).
@@ -18,12 +19,12 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("r_y"), "-predicted_wz"),
-            (0, Some("r_z"), "predicted_wy"),
-            (1, Some("r_x"), "predicted_wz"),
-            (1, Some("r_z"), "-predicted_wx"),
-            (2, Some("r_x"), "-predicted_wy"),
-            (2, Some("r_y"), "predicted_wx"),
+            (Channel::VxDot, Some("r_y"), "-predicted_wz"),
+            (Channel::VxDot, Some("r_z"), "predicted_wy"),
+            (Channel::VyDot, Some("r_x"), "predicted_wz"),
+            (Channel::VyDot, Some("r_z"), "-predicted_wx"),
+            (Channel::VzDot, Some("r_x"), "-predicted_wy"),
+            (Channel::VzDot, Some("r_y"), "predicted_wx"),
         ],
         swaps: &[
             change("vx", "vx - (wy * r_z - wz * r_y)"),
@@ -116,9 +117,9 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("velocity_s"), "wz * predicted_vy - wy * predicted_vz + linear_drag_a_x * predicted_vx"),
-            (1, Some("velocity_s"), "wx * predicted_vz - wz * predicted_vx + linear_drag_a_y * predicted_vy"),
-            (2, Some("velocity_s"), "wy * predicted_vx - wx * predicted_vy + linear_drag_a_z * predicted_vz"),
+            (Channel::VxDot, Some("velocity_s"), "wz * predicted_vy - wy * predicted_vz + linear_drag_a_x * predicted_vx"),
+            (Channel::VyDot, Some("velocity_s"), "wx * predicted_vz - wz * predicted_vx + linear_drag_a_y * predicted_vy"),
+            (Channel::VzDot, Some("velocity_s"), "wy * predicted_vx - wx * predicted_vy + linear_drag_a_z * predicted_vz"),
         ],
         swaps: &[
             change("g_x", "g_x + attitude_s * (wz * g_y - wy * g_z)"),

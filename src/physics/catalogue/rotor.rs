@@ -2,6 +2,7 @@
 
 use super::super::definition::{Definition, Notes, Origin, change, coefficient, parameter};
 use super::{HELICOPTER, MULTIROTOR};
+use crate::flight::Channel;
 
 /// Speed squared of the rotor, relative: power beyond hover, in induced powers of hover, behind the rotor's and governor's lag. Momentum
 /// theory: T (v_i + v_c), the induced part as thrust to the 3/2, the climbing part with the speed along the thrust.
@@ -39,7 +40,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "the torque that drives the main rotor turns the fuselage the other way",
         coefficients: &[coefficient("k", "rad/s²", "yaw acceleration at 1 g of thrust").within(-60.0, 60.0).usually(-6.0, 6.0)],
         parameters: &[parameter("exponent", "1", "power of the thrust").starting(1.5).tried(&[1.0, 1.5, 2.0]).within(1.0, 2.0)],
-        terms: &[(5, Some("k"), "abs(thrust / 9.80665)^exponent")],
+        terms: &[(Channel::WzDot, Some("k"), "abs(thrust / 9.80665)^exponent")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -57,7 +58,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         coefficients: &[coefficient("n_w", "rad/(m s)", "yaw by descent at 1 g of thrust").within(-20.0, 20.0).usually(-6.0, 6.0)],
         parameters: &[],
         // Power is thrust times climb: inverted, the sign turns over.
-        terms: &[(5, Some("n_w"), "-thrust / 9.80665 * air_vz")],
+        terms: &[(Channel::WzDot, Some("n_w"), "-thrust / 9.80665 * air_vz")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
@@ -87,8 +88,8 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             parameter("induced_m_s", "m/s", "induced velocity in hover").known_by(Origin::HoverInduced).within(0.1, 30.0),
         ],
         terms: &[
-            (3, None, concat!("damping_share * rate_damping_b_x * wx * (", speed_squared!(), " - 1)")),
-            (4, None, concat!("damping_share * rate_damping_b_y * wy * (", speed_squared!(), " - 1)")),
+            (Channel::WxDot, None, concat!("damping_share * rate_damping_b_x * wx * (", speed_squared!(), " - 1)")),
+            (Channel::WyDot, None, concat!("damping_share * rate_damping_b_y * wy * (", speed_squared!(), " - 1)")),
         ],
         swaps: &[
             change("rotor_speed", concat!("rotor_speed * sqrt(", speed_squared!(), ")")),
@@ -125,7 +126,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             .starting(0.02)
             .tried(&[0.005, 0.01, 0.02, 0.04, 0.08])
             .within(0.002, 0.3)],
-        terms: &[(5, Some("k"), "rate(lag(u3, tau_s))")],
+        terms: &[(Channel::WzDot, Some("k"), "rate(lag(u3, tau_s))")],
         swaps: &[],
         notes: Some(Notes {
             vehicles: MULTIROTOR,
@@ -147,10 +148,10 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         ],
         parameters: &[],
         terms: &[
-            (0, Some("tilt"), "rotor_pitch / max(abs(control_moment_c_y), 1e-3) * thrust"),
-            (1, Some("tilt"), "-rotor_roll / max(abs(control_moment_c_x), 1e-3) * thrust"),
-            (0, Some("lag_s"), "-wy * thrust"),
-            (1, Some("lag_s"), "wx * thrust"),
+            (Channel::VxDot, Some("tilt"), "rotor_pitch / max(abs(control_moment_c_y), 1e-3) * thrust"),
+            (Channel::VyDot, Some("tilt"), "-rotor_roll / max(abs(control_moment_c_x), 1e-3) * thrust"),
+            (Channel::VxDot, Some("lag_s"), "-wy * thrust"),
+            (Channel::VyDot, Some("lag_s"), "wx * thrust"),
         ],
         swaps: &[],
         notes: Some(Notes {

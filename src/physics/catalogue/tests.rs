@@ -2,7 +2,7 @@
 
 use super::super::{Model, SIGNALS, standard_names};
 use super::*;
-use crate::flight::{Column, Flight, Targets};
+use crate::flight::{Channel, Column, Flight, PerChannel, Targets};
 use crate::physics::{Columns, Effect, Origin, Wanted};
 use crate::{Error, Result};
 use proptest::prelude::*;
@@ -158,7 +158,7 @@ proptest! {
         stream.reset(flight.start_s);
         for (sample, state) in wild.iter().enumerate() {
             let found = stream.push(&std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]))?;
-            for (channel, values) in predicted.iter().enumerate() {
+            for (channel, values) in predicted.pairs() {
                 prop_assert!(found[channel].is_finite());
                 prop_assert_eq!(found[channel].to_bits(), values[sample].to_bits(), "sample {}: {:?}", sample, state);
             }
@@ -212,7 +212,7 @@ fn deviation_of_columns(model: &Model, flight: &Flight) -> Result<Vec<(String, f
     numbers.dedup();
     let mut found = Vec::new();
     for place in numbers {
-        let mut slope = vec![vec![0.0; flight.len()]; 6];
+        let mut slope = PerChannel::splat(vec![0.0; flight.len()]);
         columns.evaluate(&nodes, flight, flight.len(), &mut |range, block| {
             for (index, regressor) in
                 regressors.iter().enumerate().filter(|(_, r)| (r.effect, r.number) == (place.0, Some(place.1)))
@@ -232,7 +232,7 @@ fn deviation_of_columns(model: &Model, flight: &Flight) -> Result<Vec<(String, f
 }
 
 /// The difference of a slope to that of the prediction over steps of a number, exceeded at 2 % of the samples, over the largest slope.
-fn difference(model: &Model, flight: &Flight, place: (usize, usize), slope: &[Vec<f64>], step: f64) -> Result<f64> {
+fn difference(model: &Model, flight: &Flight, place: (usize, usize), slope: &PerChannel<Vec<f64>>, step: f64) -> Result<f64> {
     let moved = |by: f64| {
         let mut moved = model.clone();
         if let Some((value, _)) = moved.effects[place.0].number_mut(place.1) {
@@ -244,7 +244,7 @@ fn difference(model: &Model, flight: &Flight, place: (usize, usize), slope: &[Ve
     // A servo that is fast enough has no slope; differences then are rounding.
     let largest = slope.iter().flatten().fold(0.1_f64, |largest, value| largest.max(value.abs()));
     let mut differences: Vec<f64> = Vec::new();
-    for channel in 0..6 {
+    for channel in Channel::ALL {
         for sample in 0..flight.len() {
             let four =
                 far_down[channel][sample] - 8.0 * down[channel][sample] + 8.0 * up[channel][sample] - far_up[channel][sample];
@@ -280,7 +280,7 @@ fn with_everything_off_the_model_is_the_baseline_to_the_bit() -> Result<()> {
     assert_eq!(found, expected);
     // The sums of the paper's equations, term after term.
     let of = |column: Column| flight.column(column);
-    for (sample, expected) in expected[2].iter().enumerate() {
+    for (sample, expected) in expected[Channel::VzDot].iter().enumerate() {
         let at = |column: Column| of(column)[sample];
         let gravity = crate::flight::attitude::gravity_body(at(Column::Roll), at(Column::Pitch))[2];
         let turning = at(Column::Vx) * at(Column::Wy) - at(Column::Vy) * at(Column::Wx);

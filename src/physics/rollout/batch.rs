@@ -4,7 +4,7 @@
 use super::motion::{Motion, Seen, State};
 use super::program::{LaneProgram, When};
 use crate::error::Result;
-use crate::flight::Flight;
+use crate::flight::{Channel, Flight, PerChannel};
 
 /// Largest size of the body rates before a lane is stopped, rad/s: above what gyroscopes of small aircraft measure (2000 °/s is 35 rad/s).
 pub const MOST_RATE_RAD_S: f64 = 100.0;
@@ -19,9 +19,9 @@ pub(crate) trait Addition {
     fn held(
         &mut self,
         step: usize,
-        physics: [&[f64]; 6],
+        physics: PerChannel<&[f64]>,
         inputs: &dyn Fn(usize) -> Vec<f64>,
-        held: &mut [Vec<f64>; 6],
+        held: &mut PerChannel<Vec<f64>>,
     ) -> Result<()>;
 
     /// Whether it stands for the accelerations, not beside them.
@@ -70,7 +70,7 @@ impl Batch<'_> {
         let lanes = self.starts.len();
         let mut motion = Motion::recorded(self.flight, &self.starts);
         let mut seen = Seen::new(lanes, self.angles);
-        let mut held: [Vec<f64>; 6] = std::array::from_fn(|_| vec![0.0; lanes]);
+        let mut held: PerChannel<Vec<f64>> = PerChannel::from_fn(|_| vec![0.0; lanes]);
         let mut stopped = vec![None; lanes];
         let mut steps = Vec::with_capacity(horizon + 1);
         steps.push(motion.clone());
@@ -104,25 +104,25 @@ impl Batch<'_> {
     }
 
     /// What is added over the step that begins here.
-    fn hold_addition(&mut self, step: usize, motion: &Motion, seen: &Seen, held: &mut [Vec<f64>; 6]) -> Result<()> {
+    fn hold_addition(&mut self, step: usize, motion: &Motion, seen: &Seen, held: &mut PerChannel<Vec<f64>>) -> Result<()> {
         let (Some(addition), Some(further)) = (&mut self.addition, &mut self.further) else { return Ok(()) };
         further.hold(&self.starts, step);
         further.evaluate(When::Sample, motion, seen);
         let (lanes, model) = (self.starts.len(), &self.model);
-        let physics = std::array::from_fn(|channel| &model.root(channel)[..lanes]);
+        let physics = PerChannel::from_fn(|channel| &model.root(channel.index())[..lanes]);
         addition.held(step, physics, &|index| further.root(index)[..lanes].to_vec(), held)
     }
 
     /// The derivative of a motion on which the model has been evaluated.
-    fn slope(&self, motion: &Motion, seen: &Seen, held: &[Vec<f64>; 6], slope: &mut Motion) {
+    fn slope(&self, motion: &Motion, seen: &Seen, held: &PerChannel<Vec<f64>>, slope: &mut Motion) {
         motion.kinematics(seen, slope);
         let replaces = self.addition.as_ref().map(|addition| addition.replaces());
-        for (channel, to) in slope.accelerations_mut().iter_mut().enumerate() {
-            if self.hold_rates && channel >= 3 {
+        for (channel, to) in Channel::ALL.into_iter().zip(slope.accelerations_mut()) {
+            if self.hold_rates && channel.is_angular() {
                 to.fill(0.0);
                 continue;
             }
-            let (own, held) = (self.model.root(channel), &held[channel]);
+            let (own, held) = (self.model.root(channel.index()), &held[channel]);
             match replaces {
                 None => to.copy_from_slice(&own[..held.len()]),
                 Some(true) => to.copy_from_slice(held),

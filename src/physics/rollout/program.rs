@@ -53,7 +53,7 @@ impl Program {
         let mut composer = Composer::new();
         let composed = composer.add(model, None, true)?;
         composed.numbers.iter().for_each(|(_, symbol)| composer.graph.let_vary(*symbol));
-        Ok(Self::new(composer, composed.channels.to_vec(), composed.numbers))
+        Ok(Self::new(composer, composed.channels.values().to_vec(), composed.numbers))
     }
 
     /// Formulas of standard quantities and further columns.

@@ -1,8 +1,8 @@
 //! Rollouts against closed forms, against the batch and the stream of the same formulas, and against each other.
 
 use super::*;
-use crate::flight::Targets;
 use crate::flight::attitude::euler_to_quaternion;
+use crate::flight::{Channel, Targets};
 use crate::formula::Formula;
 use crate::physics::Effect;
 use phyture_kernels::Tolerance;
@@ -123,9 +123,9 @@ proptest! {
     fn a_lag_of_a_control_is_that_of_the_batch_to_the_bit(
         controls in prop::collection::vec(-1.0..1.0_f64, 60), tau in 0.01..0.3_f64, start in 1_usize..20,
     ) {
-        let model = of_effects(vec![Effect::formula("lagged", 5, &format!("lag(u3, {tau})"), 2.0)?]);
+        let model = of_effects(vec![Effect::formula("lagged", Channel::WzDot, &format!("lag(u3, {tau})"), 2.0)?]);
         let flight = flight(60, STEP_S, |column, sample| if column == Column::U3 { controls[sample] } else { 0.0 })?;
-        let [.., batch] = model.predict(&flight)?;
+        let batch = &model.predict(&flight)?[Channel::WzDot];
         let found = path(&model, &flight, start, 30)?;
         let mut rate = 0.0;
         for (step, found_at) in found.iter().enumerate().skip(1) {
@@ -142,7 +142,7 @@ proptest! {
         rates in prop::collection::vec(-1.0..1.0_f64, 60), tau in 0.01..0.3_f64, start in 1_usize..20,
     ) {
         // A lag of a rate that nothing changes once it is predicted: it goes to that rate exponentially.
-        let model = of_effects(vec![Effect::formula("blowback", 2, &format!("lag(wz, {tau})"), 3.0)?]);
+        let model = of_effects(vec![Effect::formula("blowback", Channel::VzDot, &format!("lag(wz, {tau})"), 3.0)?]);
         let flight = flight(60, STEP_S, |column, sample| if column == Column::Wz { rates[sample] } else { 0.0 })?;
         let mut stream = Formula::parse(&format!("lag(wz, {tau})"))?.stream(STEP_S)?;
         let mut lagged = 0.0;
@@ -166,8 +166,8 @@ fn lively() -> Result<Model> {
     model = with(model, "rate_damping", &[("b_x", -4.0), ("b_y", -3.0), ("b_z", -2.0)]);
     model = with(model, "control_moment", &[("c_x", 20.0), ("c_y", 15.0), ("c_z", 10.0)]);
     model = with(model, "collective_thrust", &[("c_z", -15.0)]);
-    model.effects.push(Effect::formula("blowback", 4, "lag(vx, 0.07) * airspeed", -0.05)?);
-    model.effects.push(Effect::formula("late", 3, "delay(wy, 0.023) + rate(vy) * sin(yaw)", 0.4)?);
+    model.effects.push(Effect::formula("blowback", Channel::WyDot, "lag(vx, 0.07) * airspeed", -0.05)?);
+    model.effects.push(Effect::formula("late", Channel::WxDot, "delay(wy, 0.023) + rate(vy) * sin(yaw)", 0.4)?);
     Ok(model)
 }
 
@@ -179,7 +179,7 @@ fn lively_flight(samples: usize) -> Result<Flight> {
 fn the_method_is_of_order_four() -> Result<()> {
     let mut model = lively()?;
     model.effects.retain(|effect| effect.name != "late" && effect.name != "blowback");
-    model.effects.push(Effect::formula("square", 0, "abs(vx) * vx", -0.1)?);
+    model.effects.push(Effect::formula("square", Channel::VxDot, "abs(vx) * vx", -0.1)?);
     let state = [0.0, 0.0, -10.0, 0.3, -0.2, 0.5, 8.0, -3.0, 2.0, 2.0, -1.5, 1.0];
     let end = |steps: usize| -> Result<State> {
         let flight = flight(steps + 3, 0.8 / steps as f64, still(state))?;
@@ -277,7 +277,7 @@ fn what_cannot_be_rolled_out_is_refused_by_name() -> Result<()> {
     without.absent = vec![Column::Vy];
     let lacks = said(&of_effects(Vec::new()), &[without], 10);
     assert!(lacks.starts_with("f: found no column `vy`, expected attitude, velocity and rates"), "{lacks}");
-    let reads = of_effects(vec![Effect::formula("motor", 2, "rpm", 1.0)?]);
+    let reads = of_effects(vec![Effect::formula("motor", Channel::VzDot, "rpm", 1.0)?]);
     assert!(said(&reads, &flights, 10).contains("unknown name `rpm`"));
     let other = flight(40, 0.02, |_, _| 0.0)?;
     assert!(said(&model, &[flights[0].clone(), other], 10).contains("`step` is 0.02 s, expected the 0.01 s of flight `f`"));

@@ -17,9 +17,9 @@ use crate::critique::digits::significant;
 use crate::critique::locate::Traced;
 use crate::critique::predictions::deviation;
 use crate::critique::table::OWN_FROM_FIRST_HALF;
-use crate::critique::{Comparison, ModelError, PartError, PerChannel, Row, Shares, paired};
+use crate::critique::{ChannelValues, Comparison, ModelError, PartError, Row, Shares, paired};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Flight, Targets, Window};
+use crate::flight::{Channel, Flight, Targets, Window};
 
 /// What [`compare_page`] shows.
 #[derive(Clone, Copy, Debug)]
@@ -95,10 +95,12 @@ impl CompareReport<'_> {
 }
 
 /// The verdict in words.
-fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChannel) -> Result<Vec<String>> {
+fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &ChannelValues) -> Result<Vec<String>> {
     let channels = model.rmse.channels();
-    let relative: Vec<(usize, f64)> =
-        (0..6).filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?))).collect();
+    let relative: Vec<(Channel, f64)> = Channel::ALL
+        .into_iter()
+        .filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?)))
+        .collect();
     let mut out = Vec::new();
     out.extend(report.comparison.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
     if model.not_finite > 0 {
@@ -110,10 +112,10 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &PerChanne
     let worst = relative.iter().max_by(|a, b| a.1.total_cmp(&b.1));
     let finest = relative.iter().min_by(|a, b| a.1.total_cmp(&b.1));
     if let (Some(worst), Some(finest)) = (worst, finest) {
-        let says = |(channel, share): &(usize, f64)| {
-            let unit = Column::TARGETS[*channel].unit();
+        let says = |(channel, share): &(Channel, f64)| {
+            let unit = channel.unit();
             let rmse = channels[*channel].map_or_else(String::new, |rmse| significant(rmse, 3));
-            let name = said(Column::TARGETS[*channel].name());
+            let name = said(channel.name());
             format!("{name}: off by {rmse} {unit}, {:.0} % of what it varies by", 100.0 * share)
         };
         let (finest, worst) = (says(finest), says(worst));
@@ -158,9 +160,10 @@ fn against_yardstick(report: &CompareReport<'_>, model: &ModelError) -> Result<O
     let Some(yardstick) = report.yardstick.filter(|index| *index != report.focus) else { return Ok(None) };
     let (Some(own), Some(other)) = (report.rows.get(report.focus), report.rows.get(yardstick)) else { return Ok(None) };
     let apart = paired(report.flights, report.windows, other, own)?;
-    let wins: Vec<&str> = (0..6)
+    let wins: Vec<&str> = Channel::ALL
+        .into_iter()
         .filter(|channel| apart.ci95.channels()[*channel].is_some_and(|[low, _]| low > 0.0))
-        .map(|channel| Column::TARGETS[channel].name())
+        .map(|channel| channel.name())
         .collect();
     let beats = format!("{} beats the yardstick “{}”", model.name, other.name);
     Ok(Some(match wins.len() {

@@ -6,9 +6,9 @@ use super::super::page::{Map, MapCell, Part};
 use super::{CompareReport, channel_columns};
 use crate::critique::digits::{Kind, significant};
 use crate::critique::locate::{Dependence, Stretch, Variable, dependences, stretches};
-use crate::critique::{ModelError, PartError, PerChannel, Regime, Row};
+use crate::critique::{ChannelValues, ModelError, PartError, Regime, Row};
 use crate::error::Result;
-use crate::flight::{Column, Flight, Window};
+use crate::flight::{Channel, Column, Flight, PerChannel, Window};
 use std::collections::BTreeMap;
 
 /// Lines of one panel besides the measured one, at most.
@@ -72,22 +72,25 @@ pub fn trace_figure(title: &str, of: &Lines<'_>, stretch: &Stretch) -> Figure {
     // The model in focus first, so that it has the same look on every page.
     let others = (0..of.rows.len()).filter(|index| *index != of.focus && of.yardstick != Some(*index));
     let order: Vec<&Row> = [of.focus].into_iter().chain(others).take(MODELS).filter_map(|index| of.rows.get(index)).collect();
-    let measured = |channel: usize| flight.column(Column::TARGETS[channel]);
+    let measured = |channel: Channel| flight.column(channel.column());
     // No number breaks a line.
-    let predicted = |row: &Row, channel: usize| -> Vec<f64> {
+    let predicted = |row: &Row, channel: Channel| -> Vec<f64> {
         points.iter().map(|(_, window)| window.map_or(f64::NAN, |window| row.predicted[window][channel])).collect()
     };
-    let left = |row: &Row, channel: usize| -> Vec<f64> {
+    let left = |row: &Row, channel: Channel| -> Vec<f64> {
         predicted(row, channel).iter().zip(&points).map(|(value, (sample, _))| measured(channel)[*sample] - value).collect()
     };
     let sticks = [Column::U1, Column::U2, Column::U3, Column::U4].into_iter().filter(|stick| !flight.absent.contains(stick));
     let trace = Trace {
         time_s: (span.start..span.end).map(|sample| flight.time_s(sample)).collect(),
-        measured: (0..6).map(|channel| measured(channel)[span.start..span.end].to_vec()).collect(),
+        measured: Channel::ALL.into_iter().map(|channel| measured(channel)[span.start..span.end].to_vec()).collect(),
         predicted_s: points.iter().map(|(sample, _)| flight.time_s(*sample)).collect(),
         sparse,
-        models: order.iter().map(|row| (row.name.clone(), (0..6).map(|channel| predicted(row, channel)).collect())).collect(),
-        residuals: order.iter().take(2).map(|row| (0..6).map(|channel| left(row, channel)).collect()).collect(),
+        models: order
+            .iter()
+            .map(|row| (row.name.clone(), Channel::ALL.into_iter().map(|channel| predicted(row, channel)).collect()))
+            .collect(),
+        residuals: order.iter().take(2).map(|row| Channel::ALL.into_iter().map(|channel| left(row, channel)).collect()).collect(),
         sticks: sticks.map(|stick| (stick.name().to_owned(), flight.column(stick)[span.start..span.end].to_vec())).collect(),
     };
     let caption = format!(
@@ -103,22 +106,26 @@ pub fn trace_figure(title: &str, of: &Lines<'_>, stretch: &Stretch) -> Figure {
 }
 
 /// RMSE over the standard deviation of the channel.
-pub(super) fn normalised(part: &PartError, deviation: &PerChannel) -> [Option<f64>; 6] {
-    std::array::from_fn(|channel| Some(part.rmse.channels()[channel]? / deviation.channels()[channel]?))
+pub(super) fn normalised(part: &PartError, deviation: &ChannelValues) -> PerChannel<Option<f64>> {
+    PerChannel::from_fn(|channel| Some(part.rmse.channels()[channel]? / deviation.channels()[channel]?))
 }
 
 /// Manoeuvre × channel and regime × channel of a model, beside those of another where there is one: in one order and on one scale.
-pub fn maps(before: Option<&ModelError>, model: &ModelError, deviation: &PerChannel) -> Vec<Part> {
+pub fn maps(before: Option<&ModelError>, model: &ModelError, deviation: &ChannelValues) -> Vec<Part> {
     let row = |name: &str, part: &PartError, old: Option<&PartError>| {
         let (shades, old_shades) = (normalised(part, deviation), old.map(|old| normalised(old, deviation)));
-        let cell = |channel: usize| MapCell {
+        let cell = |channel: Channel| MapCell {
             text: Kind::Error.text(part.rmse.channels()[channel]),
             detail: part.rmse_ci95.channels()[channel]
                 .map_or_else(String::new, |[low, high]| format!("{} … {}", significant(low, 2), significant(high, 2))),
             value: shades[channel],
             before: old.zip(old_shades).map(|(old, shades)| (Kind::Error.text(old.rmse.channels()[channel]), shades[channel])),
         };
-        (name.to_owned(), format!("n = {} in {} blocks", part.n, part.blocks), (0..6).map(cell).collect::<Vec<_>>())
+        (
+            name.to_owned(),
+            format!("n = {} in {} blocks", part.n, part.blocks),
+            Channel::ALL.into_iter().map(cell).collect::<Vec<_>>(),
+        )
     };
     // The worst part before first.
     let score = |part: &PartError| normalised(part, deviation).into_iter().flatten().fold(0.0, f64::max);
@@ -170,21 +177,21 @@ const SHARE_SHOWN: f64 = 0.01;
 /// Which variables go with the residuals of the channels, with those of another model beside them: a map of shares.
 pub fn shares_map(
     caption: &str,
-    found: &[(Variable, [Dependence; 6])],
-    before: Option<&[(Variable, [Dependence; 6])]>,
+    found: &[(Variable, PerChannel<Dependence>)],
+    before: Option<&[(Variable, PerChannel<Dependence>)]>,
     full: Option<f64>,
 ) -> Part {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let row = |(variable, of): &(Variable, [Dependence; 6])| {
+    let row = |(variable, of): &(Variable, PerChannel<Dependence>)| {
         let old = before.and_then(|before| before.iter().find(|(other, _)| other == variable));
-        let cell = |channel: usize| MapCell {
+        let cell = |channel: Channel| MapCell {
             text: percent(of[channel].share),
             value: Some(of[channel].share),
             before: old.map(|(_, old)| (percent(old[channel].share), Some(old[channel].share))),
             detail: String::new(),
         };
         let words = spoken(variable.name()).unwrap_or_default();
-        (figures::with_unit(variable.name(), variable.unit()), words.to_owned(), (0..6).map(cell).collect())
+        (figures::with_unit(variable.name(), variable.unit()), words.to_owned(), Channel::ALL.into_iter().map(cell).collect())
     };
     Part::Map(Map {
         caption: caption.to_owned(),
@@ -219,15 +226,15 @@ pub fn residuals(report: &CompareReport<'_>) -> Result<Vec<Part>> {
         shares_map(&format!("Share of the residual of {whose} that goes with one variable alone"), &found, pair, None),
     ];
     let mut quiet = Vec::new();
-    for (channel, column) in Column::TARGETS.iter().enumerate() {
-        let mut order: Vec<&(Variable, [Dependence; 6])> = found.iter().collect();
+    for channel in Channel::ALL {
+        let mut order: Vec<&(Variable, PerChannel<Dependence>)> = found.iter().collect();
         order.sort_by(|a, b| b.1[channel].share.total_cmp(&a.1[channel].share));
         if order.first().is_none_or(|(_, of)| of[channel].share < SHARE_SHOWN) {
-            quiet.push(said(column.name()));
+            quiet.push(said(channel.name()));
             continue;
         }
         let names: Vec<String> = order.iter().take(VARIABLES).map(|(variable, _)| named(variable.name())).collect();
-        let panel = |((variable, of), name): (&&(Variable, [Dependence; 6]), &'_ String)| {
+        let panel = |((variable, of), name): (&&(Variable, PerChannel<Dependence>), &'_ String)| {
             (name.clone(), variable.unit(), of[channel].clone())
         };
         let panels: Vec<_> = order.iter().zip(&names).map(panel).collect();
@@ -236,8 +243,8 @@ pub fn residuals(report: &CompareReport<'_>) -> Result<Vec<Part>> {
             .map(|(variable, unit, dependence)| BinnedPanel { variable, unit, dependence, change: None, after: None })
             .collect();
         let caption = format!("What is left by {}, against the variables it goes with most.", name(report.focus));
-        let title = format!("Residual of {}", named(column.name()));
-        parts.push(Part::Figure(figures::binned(&title, &caption, column.unit(), &panels)));
+        let title = format!("Residual of {}", named(channel.name()));
+        parts.push(Part::Figure(figures::binned(&title, &caption, channel.unit(), &panels)));
     }
     if !quiet.is_empty() {
         parts.push(Part::Text(format!(

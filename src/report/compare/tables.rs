@@ -7,8 +7,8 @@ use crate::critique::channels::Intervals;
 use crate::critique::digits::{Kind, significant};
 use crate::critique::shares::bars;
 use crate::critique::table::{FLOOR, LEGEND, MEASURES};
-use crate::critique::{Comparison, ModelError, PerChannel, Shares, Uncertainty};
-use crate::flight::Column;
+use crate::critique::{ChannelValues, Comparison, ModelError, Shares, Uncertainty};
+use crate::flight::{Channel, Column};
 
 /// Heads of the columns: what `first` says, the channels in words with symbol and unit below, and the mean.
 pub fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, String)> {
@@ -21,27 +21,27 @@ pub fn channel_columns(first: &str, share: bool, mean: bool) -> Vec<(String, Str
 /// The error of every model in each channel with its interval and the floor.
 pub fn strip(comparison: &Comparison, yardstick: Option<usize>) -> Figure {
     let kind = |index: usize| if yardstick == Some(index) { Bar::Before } else { Bar::Physics };
-    let panel = |(channel, (title, unit)): (usize, (String, String))| FallPanel {
+    let panel = |(channel, (title, unit)): (Channel, (String, String))| FallPanel {
         title,
         unit,
         bars: (0..comparison.models.len()).filter_map(|index| bar_of(comparison, index, channel, kind(index))).collect(),
         floor: comparison.floor.and_then(|floor| floor.channels()[channel]),
     };
-    let panels: Vec<FallPanel> = channel_panels().into_iter().enumerate().map(panel).collect();
+    let panels: Vec<FallPanel> = Channel::ALL.into_iter().zip(channel_panels()).map(panel).collect();
     let caption = format!("Root mean square error with its 95 % interval: {}.", comparison.basis());
     figures::falls("Error of every model", &caption, &panels)
 }
 
 /// The bar of one model in one channel, of the kind given unless it has a network.
-pub fn bar_of(comparison: &Comparison, index: usize, channel: usize, kind: Bar) -> Option<Fall> {
+pub fn bar_of(comparison: &Comparison, index: usize, channel: Channel, kind: Bar) -> Option<Fall> {
     let model = comparison.models.get(index)?;
     let network = comparison.shares.iter().any(|shares| shares.name == model.name);
-    let value = *model.rmse.channels().get(channel)?;
+    let value = model.rmse.channels()[channel];
     Some(Fall {
         name: model.name.clone(),
         kind: if network { Bar::Network } else { kind },
         value: value?,
-        ci95: *model.rmse_ci95.channels().get(channel)?,
+        ci95: model.rmse_ci95.channels()[channel],
         remark: String::new(),
     })
 }
@@ -51,7 +51,7 @@ pub fn error_tables(comparison: &Comparison) -> Vec<Part> {
     let between = |interval: Option<[f64; 2]>| {
         interval.map(|[low, high]| format!(" [{}, {}]", significant(low, 2), significant(high, 2))).unwrap_or_default()
     };
-    let table = |(title, words, kind, measure): (&str, &str, Kind, fn(&ModelError) -> PerChannel)| {
+    let table = |(title, words, kind, measure): (&str, &str, Kind, fn(&ModelError) -> ChannelValues)| {
         let key = match title {
             "RMSE" => "rmse",
             "MAE" => "mae",
@@ -149,7 +149,7 @@ pub fn share_parts(shares: &Shares) -> Vec<Part> {
 /// Coefficient × channel, shaded by the share of the error, and the totals.
 pub fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
     let (sd, share) = (uncertainty.sd.channels(), uncertainty.share_of_rmse.channels());
-    let cell = |channel: usize, value: Option<f64>| MapCell {
+    let cell = |channel: Channel, value: Option<f64>| MapCell {
         text: Kind::Error.text(value),
         // sd / share is the RMSE of the channel.
         value: value
@@ -162,7 +162,7 @@ pub fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
     let rows = uncertainty.coefficients.iter().map(|one| {
         let [low, high] = one.ci95;
         let interval = format!("{} … {} {}", significant(low, 3), significant(high, 3), one.unit);
-        let cells = one.movement.channels().into_iter().enumerate().map(|(channel, value)| cell(channel, value)).collect();
+        let cells = one.movement.channels().pairs().map(|(channel, value)| cell(channel, *value)).collect();
         (format!("{} {}", one.effect, one.name), interval, cells)
     });
     let map = Map {
@@ -180,6 +180,6 @@ pub fn uncertainty_parts(uncertainty: &Uncertainty) -> Vec<Part> {
     vec![Part::Map(map), Part::Table(table), Part::Text(uncertainty.note())]
 }
 
-fn with_mean(values: &PerChannel) -> Vec<Option<f64>> {
+fn with_mean(values: &ChannelValues) -> Vec<Option<f64>> {
     values.channels().into_iter().chain([values.mean]).collect()
 }

@@ -8,7 +8,7 @@ use super::DiagnoseReport;
 use crate::critique::diagnose::sentences::{self, Told, change, percent, removable, rises, unseen};
 use crate::critique::diagnose::{Bar, Confirmation, Diagnosis, Step, Verdict};
 use crate::critique::table::{OWN_FROM_FIRST_HALF, ordinal};
-use crate::flight::Column;
+use crate::flight::Channel;
 
 /// Of as many effects the verdict says what each is; of more, those that are worth most are named.
 const EXPLAINED: usize = 2;
@@ -122,7 +122,7 @@ pub(super) fn strip(report: &DiagnoseReport<'_>) -> Vec<Part> {
         )];
     }
     let panels =
-        channel_panels().into_iter().enumerate().map(|(channel, (title, unit))| panel(report, &bars, channel, title, unit));
+        Channel::ALL.into_iter().zip(channel_panels()).map(|(channel, (title, unit))| panel(report, &bars, channel, title, unit));
     let panels: Vec<FallPanel> = panels.collect();
     let locked = report.told().iter().find_map(|diagnosis| diagnosis.locked.as_ref());
     let on = locked.map_or_else(String::new, |locked| unseen(locked.kept, locked.duration_s));
@@ -149,7 +149,7 @@ pub(super) fn bars<'a>(report: &DiagnoseReport<'a>) -> Vec<&'a Bar> {
     rounds.enumerate().flat_map(|(round, locked)| locked.waterfall.iter().skip(usize::from(round > 0))).collect()
 }
 
-fn panel(report: &DiagnoseReport<'_>, bars: &[&Bar], channel: usize, title: String, unit: String) -> FallPanel {
+fn panel(report: &DiagnoseReport<'_>, bars: &[&Bar], channel: Channel, title: String, unit: String) -> FallPanel {
     let of_bar = |(place, bar): (usize, &&Bar)| {
         let first = place == 0;
         let value = bar.rmse.channels()[channel]?;
@@ -168,7 +168,7 @@ fn panel(report: &DiagnoseReport<'_>, bars: &[&Bar], channel: usize, title: Stri
         })
     };
     let mut all: Vec<Fall> = bars.iter().enumerate().filter_map(of_bar).collect();
-    let name = Column::TARGETS[channel].name();
+    let name = channel.name();
     let unknown = report.diagnoses.last().and_then(|diagnosis| diagnosis.unknown.as_ref());
     let suggested = unknown.into_iter().flatten().find(|unknown| unknown.channel == name && unknown.suggested_formula.is_some());
     let measured = suggested.and_then(|unknown| unknown.tried.as_ref()?.locked_rmse);

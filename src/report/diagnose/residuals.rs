@@ -9,7 +9,7 @@ use crate::critique::Row;
 use crate::critique::locate::{Dependence, Variable, dependences};
 use crate::critique::residual_views::{informative_pair, surface};
 use crate::error::Result;
-use crate::flight::{Column, Window};
+use crate::flight::{Channel, Column, PerChannel, Window};
 use crate::physics::Effect;
 
 /// Share of a residual that the darkest shade stands for at least: below it all is noise.
@@ -18,7 +18,7 @@ const LEAST_DARKEST: f64 = 0.1;
 const SHARE_SHOWN: f64 = 0.01;
 
 /// Residuals of the six channels against variables.
-type Found = Vec<(Variable, [Dependence; 6])>;
+type Found = Vec<(Variable, PerChannel<Dependence>)>;
 
 impl Seen<'_> {
     /// Against each variable.
@@ -50,10 +50,10 @@ impl Seen<'_> {
         let caption = format!("Share of the residual of the {whose} that goes with one variable alone");
         parts.push(shares_map(&caption, now, after.map(|_| before.as_slice()), Some(full)));
         let mut quiet = Vec::new();
-        for (channel, column) in Column::TARGETS.iter().enumerate() {
+        for channel in Channel::ALL {
             let shown = self.shown(channel, before);
             if shown.is_empty() {
-                quiet.push(said(column.name()));
+                quiet.push(said(channel.name()));
                 continue;
             }
             let of = |found: &'_ Found, variable: Variable| {
@@ -76,8 +76,8 @@ impl Seen<'_> {
                     after: after.as_ref(),
                 })
                 .collect();
-            let title = format!("Residual of {}", named(column.name()));
-            parts.push(Part::Figure(figures::binned(&title, "", column.unit(), &panels)));
+            let title = format!("Residual of {}", named(channel.name()));
+            parts.push(Part::Figure(figures::binned(&title, "", channel.unit(), &panels)));
         }
         if !quiet.is_empty() {
             parts.push(Part::Text(format!("No variable accounts for 1 % of the residual of {}.", quiet.join(", "))));
@@ -86,7 +86,7 @@ impl Seen<'_> {
     }
 
     /// The variables of a channel that are drawn: those that added effects read, and those that the residual goes with most.
-    fn shown(&self, channel: usize, before: &Found) -> Vec<Variable> {
+    fn shown(&self, channel: Channel, before: &Found) -> Vec<Variable> {
         let mut order: Vec<(f64, Variable)> = before.iter().map(|(variable, of)| (of[channel].share, *variable)).collect();
         order.sort_by(|a, b| b.0.total_cmp(&a.0));
         let read = |variable: Variable| self.added(channel).any(|effect| reads(effect, channel, variable));
@@ -100,11 +100,11 @@ impl Seen<'_> {
         let flights = self.report.flights;
         // As if the change were all that the model misses: its residual is the change.
         let predicted = |window: &Window| {
-            std::array::from_fn(|channel| {
+            PerChannel::from_fn(|channel| {
                 let at = |side: &super::views::Side| {
                     side.predicted[window.flight][channel].get(window.last).copied().unwrap_or(f64::NAN)
                 };
-                flights[window.flight].column(Column::TARGETS[channel])[window.last] - (at(after) - at(before))
+                flights[window.flight].column(channel.column())[window.last] - (at(after) - at(before))
             })
         };
         let row = Row { name: "change".into(), predicted: windows.iter().map(predicted).collect() };
@@ -112,7 +112,7 @@ impl Seen<'_> {
     }
 
     /// Added effects that act in a channel.
-    fn added(&self, channel: usize) -> impl Iterator<Item = &Effect> {
+    fn added(&self, channel: Channel) -> impl Iterator<Item = &Effect> {
         let acts = move |index: usize| self.report.after.acts(index).is_ok_and(|acts| acts[channel]);
         self.report.added().filter(move |(index, _)| acts(*index)).map(|(_, effect)| effect)
     }
@@ -121,7 +121,7 @@ impl Seen<'_> {
     pub fn surface(&self) -> Result<Vec<Part>> {
         let Some(table) = self.table() else { return Ok(vec![text(NO_TABLE)]) };
         let mut best = None;
-        for channel in 0..Column::TARGETS.len() {
+        for channel in Channel::ALL {
             let Some(pair) = informative_pair(table, channel)? else { continue };
             let Some(found) = surface(table, channel, [&pair[0], &pair[1]])? else { continue };
             if best.as_ref().is_none_or(|(_, share, _)| found.share > *share) {
@@ -140,18 +140,17 @@ impl Seen<'_> {
         };
         let [x, y] = [axis(&pair[0]), axis(&pair[1])];
         let panels: Vec<_> = found.iter().map(|(title, of)| (title.clone(), of)).collect();
-        let column = Column::TARGETS[channel];
-        let title = format!("Residual of {} over {} and {}", named(column.name()), pair[0], pair[1]);
+        let title = format!("Residual of {} over {} and {}", named(channel.name()), pair[0], pair[1]);
         let caption = "The channel and the two variables with which the residual goes most. Stripes along one axis: one variable is \
                        enough; a checked pattern: their product matters. Both panels have one colour scale.";
         let note = "A choice of axes, not a finding: in pure noise these are the two that go with it by chance, and so many cells take \
                     some per cent of any noise.";
-        Ok(vec![Part::Figure(figures::surfaces(&title, caption, column.unit(), [&x, &y], &panels)), text(note)])
+        Ok(vec![Part::Figure(figures::surfaces(&title, caption, channel.unit(), [&x, &y], &panels)), text(note)])
     }
 }
 
 /// Whether an effect acts on a channel without memory and reads the variable there.
-fn reads(effect: &Effect, channel: usize, variable: Variable) -> bool {
+fn reads(effect: &Effect, channel: Channel, variable: Variable) -> bool {
     let formulas = || {
         let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
         terms.chain(effect.swaps.iter().map(|swap| &swap.with))

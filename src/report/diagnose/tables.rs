@@ -10,7 +10,7 @@ use crate::critique::diagnose::sentences::{or_the_log, share, tried, unseen, wor
 use crate::critique::diagnose::{CandidateReport, Influence, Locked, Status, Step, number_remark};
 use crate::critique::digits::{Kind, significant};
 use crate::error::{Error, Result};
-use crate::flight::{Column, Span};
+use crate::flight::{Channel, Span};
 use crate::physics::catalogue;
 use std::collections::BTreeMap;
 
@@ -212,10 +212,7 @@ pub(super) fn suggestions(report: &DiagnoseReport<'_>) -> Vec<Part> {
 /// What was removed, by channel: of all the error and, with a floor, of what lies above it.
 fn removed(locked: &Locked, round: &str) -> Table {
     let percent = |share: f64| format!("{:.1}", 100.0 * share);
-    let above = |channel: &str| {
-        let place = Column::TARGETS.iter().position(|column| column.name() == channel)?;
-        locked.removable_removed?.channels()[place]
-    };
+    let above = |channel: &str| locked.removable_removed?.channels()[Channel::from_name(channel)?];
     let rows = locked.mse_fall.iter().map(|(channel, fall)| {
         let mut row: Vec<Cell> = vec![channel.as_str().into()];
         row.extend(fall.map(|share| percent(share).into()));

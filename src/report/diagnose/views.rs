@@ -16,7 +16,7 @@ use crate::critique::unknown::{ROWS_MAX, ResidualTable};
 use crate::critique::{Row, compare as errors};
 use crate::error::{Error, Result};
 use crate::flight::windows::windows;
-use crate::flight::{Accelerations, Column, Span, Window, split};
+use crate::flight::{Accelerations, Channel, Column, PerChannel, Span, Window, split};
 
 /// Samples that maps and binned residuals look at, at most; of more every k-th is taken.
 const SAMPLES: usize = 150_000;
@@ -55,8 +55,8 @@ pub(super) fn views(report: &DiagnoseReport<'_>) -> Result<[Vec<Part>; 6]> {
         let residual = |flight: usize| -> Result<Accelerations> {
             let known = report.flights.get(flight).zip(predicted.get(flight));
             let (flight, predicted) = known.ok_or_else(|| shape(format!("there is no flight {flight}")))?;
-            Ok(std::array::from_fn(|channel| {
-                flight.column(Column::TARGETS[channel]).iter().zip(&predicted[channel]).map(|(y, p)| y - p).collect()
+            Ok(PerChannel::from_fn(|channel| {
+                flight.column(channel.column()).iter().zip(&predicted[channel]).map(|(y, p)| y - p).collect()
             }))
         };
         // Too few rows, or a model that fails somewhere: the views that need the table say so.
@@ -83,7 +83,7 @@ impl Seen<'_> {
     }
 
     pub fn row(&self, side: &Side, windows: &[Window]) -> Row {
-        let at = |window: &Window| std::array::from_fn(|channel| side.predicted[window.flight][channel][window.last]);
+        let at = |window: &Window| PerChannel::from_fn(|channel| side.predicted[window.flight][channel][window.last]);
         Row { name: side.name.into(), predicted: windows.iter().map(at).collect() }
     }
 
@@ -145,17 +145,17 @@ impl Seen<'_> {
         let last = self.sides.iter().rev().find_map(|side| Some((side.name, side.table.as_ref()?)));
         let Some((name, table)) = last else { return Ok(vec![text(NO_TABLE)]) };
         let (mut even, mut panels) = (Vec::new(), Vec::new());
-        for (channel, column) in Column::TARGETS.iter().enumerate() {
+        for channel in Channel::ALL {
             let tree = regions(table, channel)?;
             let loudest = tree.leaves().iter().map(|leaf| leaf.rmse).fold(0.0, f64::max);
             if tree.split.is_none() || loudest < UNEVEN * tree.rmse {
-                even.push(said(column.name()));
+                even.push(said(channel.name()));
                 continue;
             }
             let mut bars = vec![bar_of("all flights".into(), &tree)];
             leaves(&tree, &[], &mut bars);
             bars[1..].sort_by(|a, b| b.value.total_cmp(&a.value));
-            panels.push(FallPanel { title: named(column.name()), unit: column.unit().to_owned(), bars, floor: None });
+            panels.push(FallPanel { title: named(channel.name()), unit: channel.unit().to_owned(), bars, floor: None });
         }
         let mut parts = Vec::new();
         if !panels.is_empty() {

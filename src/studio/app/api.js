@@ -12,7 +12,9 @@ import { read } from './place.js';
  *   variables: [string, string][], names: string[], signals: [string, string, string][], check: string, fault: boolean }} Overview
  * @typedef {{ id: number, did: string, rmse: PerChannel | null, ci95: Intervals | null, calibrated: boolean }} Step
  * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_first_half: boolean, saved: boolean, file: string | null,
- *   file_changed: boolean }} Steps
+ *   file_changed: boolean, kept: string | null, unkept: string | null, left: Left[], revision: number }} Steps
+ * @typedef {{ file: string, written_s: number, steps: string[], search: string | null, fault: string | null }} Left
+ * @typedef {{ revision: number, file_changed: boolean, search: Job['progress'] }} Pulse
  * @typedef {{ name: string, meaning: string, value: number, unit: string, ci95: [number, number] | null, usual: [number, number] | null,
  *   bounds: [number | null, number | null], slider: [number, number], fixed: boolean, by_flight: [number, number, number] | null }} Numeral
  * @typedef {{ name: string, kind: string, meaning: string, formula: string, enabled: boolean, baseline: boolean, added_by: string | null,

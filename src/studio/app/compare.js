@@ -5,7 +5,7 @@ import { ask } from './api.js';
 import { choice, h } from './dom.js';
 import { number, percent, time } from './format.js';
 import { read, slide } from './place.js';
-import { stack } from './plots.js';
+import { stack, timeWidth } from './plots.js';
 
 /** @type {import('./plots.js').Stack | null} */
 let plots = null;
@@ -24,10 +24,23 @@ export async function show(app, into) {
   const now = steps.steps[steps.at];
   const other = steps.steps.find((step) => step.id === place.against && step.id !== now.id) ?? null;
   const channel = overview.channels[place.channel];
+  const wanted = {
+    flight,
+    channel: place.channel,
+    from_s: place.from,
+    to_s: place.to,
+    pixels: Math.min(4000, Math.round(timeWidth(into.clientWidth) * devicePixelRatio)),
+    against: other?.id ?? null,
+  };
+  const mine = ++asked;
+  // Asked before anything is drawn: what is shown stays if nobody answers.
+  /** @type {import('./api.js').Trace} */
+  const trace = await ask('trace', wanted);
+  if (mine !== asked || read().view !== 'compare') return;
   const line = h('p', { class: 'quiet', id: 'compare-line' });
   const pictures = h('div', { class: 'stack', id: 'compare-plots', 'data-flight': overview.flights[flight].name });
-  into.replaceChildren(controls(app, flight, other), line, pictures);
   plots?.destroy();
+  into.replaceChildren(controls(app, flight, other), line, pictures);
   plots = stack(
     pictures,
     channel,
@@ -36,18 +49,6 @@ export async function show(app, into) {
     (from, to) => slide({ from, to }),
     () => slide({ from: null, to: null }),
   );
-  const wanted = {
-    flight,
-    channel: place.channel,
-    from_s: place.from,
-    to_s: place.to,
-    pixels: Math.min(4000, Math.round(plots.width() * devicePixelRatio)),
-    against: other?.id ?? null,
-  };
-  const mine = ++asked;
-  /** @type {import('./api.js').Trace} */
-  const trace = await ask('trace', wanted);
-  if (mine !== asked || !plots) return;
   plots.draw(trace);
   const [first, last] = trace.whole_s;
   drawn = { from: place.from ?? first, to: place.to ?? last, first, last };

@@ -1,7 +1,8 @@
 // @ts-check
 // The frame of the app: head, scores, banner, keys, and which view is shown.
 
-import { ask, Refused } from './api.js';
+import { ask } from './api.js';
+import * as banner from './banner.js';
 import * as compare from './compare.js';
 import { keysHelp, saveDialog } from './dialog.js';
 import { byId, h } from './dom.js';
@@ -32,29 +33,19 @@ import * as where from './where.js';
 const views = { compare, where, learn, model };
 const NAMES = { compare: 'Compare', where: 'Where it fails', learn: 'Learn', model: 'Model' };
 const THEME = 'phyture-theme';
+/** How often is asked whether what is shown is still so, ms. */
+const PULSE_MS = 1500;
 
 /** @type {App} */
 let app;
 let shown = '';
 let busy = 0;
+/** How far a search was at the last look. */
+let search = /** @type {import('./api.js').Job['progress']} */ ('idle');
 
 /** @param {unknown} error */
 function failed(error) {
-  const text = error instanceof Error ? error.message : String(error);
-  const status = error instanceof Refused ? error.status : -1;
-  const hint = {
-    0: 'Start it again with the same command and open the address that it prints. Model files that were saved are as they were.',
-    401: 'Open the address that the program printed; it carries a key that this page lacks.',
-    403: 'The studio was perhaps started anew: open the address that it printed last.',
-  }[status];
-  const close = h(
-    'button',
-    { type: 'button', class: 'plain', 'aria-label': 'Close', onclick: () => byId('banner').replaceChildren() },
-    '×',
-  );
-  byId('banner').replaceChildren(
-    h('div', { class: 'fault' }, h('p', {}, h('strong', {}, text), hint ? ` ${hint}` : ''), close),
-  );
+  banner.tell(error, app);
 }
 
 /** @param {string} text */
@@ -95,7 +86,7 @@ async function step(/** @type {string} */ name, /** @type {object} */ body = {})
     await draw();
     return false;
   }
-  byId('banner').replaceChildren();
+  banner.clear();
   app.steps = steps;
   await draw();
   return true;
@@ -106,6 +97,38 @@ async function refresh() {
   await draw();
 }
 
+/** Looks whether another tab, another program or a search changed what is shown, and whether the program still runs. */
+async function look() {
+  if (document.hidden || busy > 0) return;
+  try {
+    /** @type {import('./api.js').Pulse} */
+    const pulse = await ask('pulse');
+    if (busy > 0) return;
+    if (banner.isGone()) {
+      banner.isBack();
+      note('The studio answers again.');
+      await refresh();
+      return;
+    }
+    if (search === 'running' && pulse.search === 'done' && read().view !== 'learn') note('Diagnose has ended: see Learn.');
+    const isNew = pulse.revision !== app.steps.revision || pulse.file_changed !== app.steps.file_changed;
+    if (!isNew && pulse.search === search) return;
+    search = pulse.search;
+    const before = app.steps;
+    app.steps = await ask('steps');
+    const path = (/** @type {typeof before} */ of) => JSON.stringify([of.at, of.steps.map((step) => step.id)]);
+    if (path(before) === path(app.steps)) frame();
+    else await draw();
+  } catch (error) {
+    if (!banner.isGone()) failed(error);
+  }
+}
+
+async function watch() {
+  await look();
+  window.setTimeout(watch, PULSE_MS);
+}
+
 function head() {
   const { view } = read();
   const { steps, overview } = app;
@@ -114,9 +137,8 @@ function head() {
       'a',
       {
         href: '#',
-        role: 'tab',
         'data-view': name,
-        'aria-selected': String(name === view),
+        'aria-current': name === view ? 'page' : null,
         title: `key ${index + 1}`,
         onclick: (/** @type {Event} */ event) => {
           event.preventDefault();
@@ -124,6 +146,9 @@ function head() {
         },
       },
       NAMES[name],
+      name === 'learn' && search === 'running'
+        ? h('i', { class: 'spin', role: 'img', 'aria-label': ', a search runs' })
+        : null,
     );
   const tool = (
     /** @type {string} */ id,
@@ -134,7 +159,7 @@ function head() {
   ) => h('button', { type: 'button', id, title, disabled: !on, onclick: act }, text);
   byId('head').replaceChildren(
     h('div', { class: 'brand' }, h('h1', {}, 'phyture'), h('span', { title: overview.data }, short(overview.data))),
-    h('nav', { role: 'tablist', 'aria-label': 'Views' }, VIEWS.map(tab)),
+    h('nav', { 'aria-label': 'Views' }, VIEWS.map(tab)),
     h(
       'div',
       { class: 'tools' },
@@ -191,26 +216,18 @@ function score() {
   byId('score').replaceChildren(h('h2', { class: 'unseen' }, 'Errors'), ...overview.channels.map(cell));
 }
 
-function warnings() {
-  const told = byId('banner').querySelector('.fault:not(.lasting)');
-  const lasting = [];
-  if (app.overview.fault) lasting.push(`The check of the log found a fault: ${app.overview.check}`);
-  if (app.steps.file_changed)
-    lasting.push(
-      `${app.steps.file} was changed by another program since the studio read or wrote it. The model here is as it was; save it under another name, or start the studio again to read the file.`,
-    );
-  byId('banner')
-    .querySelectorAll('.lasting')
-    .forEach((old) => old.remove());
-  lasting.forEach((text) => byId('banner').append(h('div', { class: 'fault lasting' }, h('p', {}, text))));
-  return told;
+/** All but the view. */
+function frame() {
+  head();
+  score();
+  banner.warn(app);
 }
 
 async function draw() {
+  // What is shown stays until there is something to show.
+  if (banner.isGone()) return;
   const { view } = read();
-  head();
-  score();
-  warnings();
+  frame();
   if (shown && shown !== view) views[shown].hide?.();
   shown = view;
   document.title = `${NAMES[view]} · phyture studio`;
@@ -268,9 +285,12 @@ async function start() {
   window.addEventListener('hashchange', () => draw());
   window.addEventListener('keydown', key);
   // Another tab may have changed the model, or another program its file.
-  window.addEventListener('focus', () => working(refresh));
+  window.addEventListener('focus', look);
+  // Plots are drawn in the colours of a theme: the system's may change in the evening.
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => draw());
   await draw();
   document.body.dataset.ready = 'yes';
+  watch();
 }
 
 function overviewNote() {

@@ -21,6 +21,14 @@ const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const STICKS = ['u1 lateral', 'u2 longitudinal', 'u3 tail', 'u4 collective'];
 
 /**
+ * Pixels that the time axis has of a width: axis and margins take the rest.
+ * @param {number} width
+ */
+export function timeWidth(width) {
+  return Math.max(100, Math.floor(width) - 76);
+}
+
+/**
  * @typedef {object} Stack
  * @property {(trace: import('./api.js').Trace) => void} draw
  * @property {() => void} destroy
@@ -191,6 +199,6 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
       watch.disconnect();
       plots.forEach((one) => one.made.destroy());
     },
-    width: () => Math.max(100, width() - 76),
+    width: () => timeWidth(into.clientWidth),
   };
 }

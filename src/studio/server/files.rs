@@ -20,6 +20,7 @@ const FILES: &[(&str, &str, &str)] = &[
     file!("views.css", CSS),
     file!("main.js", SCRIPT),
     file!("api.js", SCRIPT),
+    file!("banner.js", SCRIPT),
     file!("charts.js", SCRIPT),
     file!("compare.js", SCRIPT),
     file!("dialog.js", SCRIPT),

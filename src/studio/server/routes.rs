@@ -1,6 +1,7 @@
 //! Requests by name: JSON in, a method of the studio, JSON out.
 
 use super::Refusal;
+use crate::flight::Channel;
 use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ struct MapWanted {
 struct DependenceWanted {
     #[serde(default)]
     part: PartWanted,
-    channel: usize,
+    channel: Channel,
 }
 
 #[derive(Deserialize)]
@@ -47,11 +48,18 @@ struct FileWanted {
     overwrite: bool,
 }
 
+/// A draft by its file, as it was told.
+#[derive(Deserialize)]
+struct LeftWanted {
+    file: String,
+}
+
 /// Answers a request.
 pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Vec<u8>, Refusal> {
     match name {
         "overview" => json(&studio.overview()),
         "steps" => json(&studio.steps()?),
+        "pulse" => json(&studio.pulse()),
         "undo" => json(&studio.undo()?),
         "redo" => json(&studio.redo()?),
         "go_to" => json(&studio.go_to(parsed::<ToState>(body)?.state)?),
@@ -75,6 +83,8 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
         "stop" => json(&studio.stop()),
+        "take_up" => json(&studio.take_up(&parsed::<LeftWanted>(body)?.file)?),
+        "discard" => json(&studio.discard(&parsed::<LeftWanted>(body)?.file)?),
         "save" => {
             let FileWanted { path, overwrite } = parsed(body)?;
             json(&studio.save(&path, overwrite)?)

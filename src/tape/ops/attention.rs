@@ -6,7 +6,7 @@ use super::{or_scratch, rows, rows_mut};
 use crate::tape::Shape;
 use crate::tape::error::Result;
 use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, exactly, misfit};
-use phyture_kernels::attention::{self, Gradients};
+use phyture_kernels::attention::{self, Gradients, Inputs};
 use phyture_kernels::dropout::Mask;
 use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, RowsMut};
@@ -52,10 +52,10 @@ impl<T: Real> Op<T> for Attention {
     fn forward(&self, io: Forward<'_, T>) {
         let [shape, keys, ..] = io.shapes else { return };
         let (q, k, v) = (rows(io.x[0], shape), rows(io.x[1], keys), rows(io.x[2], keys));
-        let mask = self.mask(io.stream);
+        let inputs = Inputs { heads: self.heads, q, k, v, dropout: self.mask(io.stream) };
         io.parts.rows(q.rows(), attention::CUT, [io.y, io.workspace], io.scratch, |piece, [o, lse], scratch| {
             let o = RowsMut::packed(o, piece.len(), q.cols());
-            attention::forward_rows(io.isa, self.heads, q, k, v, mask, piece.start, o, lse, scratch);
+            attention::forward_rows(io.isa, inputs, piece.start, o, lse, scratch);
         });
     }
 
@@ -83,11 +83,14 @@ impl<T: Real> Differentiable<T> for Attention {
             write_k: dk.write,
             write_v: dv.write,
         };
-        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
-        let (o, d_o) = (rows(io.y, q), rows(io.dy, q));
-        let mask = self.mask(io.stream);
-        let lse = io.workspace;
-        attention::backward(io.isa, self.heads, operands.0, operands.1, operands.2, mask, o, lse, d_o, gradients, scratch);
+        let inputs = Inputs {
+            heads: self.heads,
+            q: rows(io.x[0], q),
+            k: rows(io.x[1], k),
+            v: rows(io.x[2], k),
+            dropout: self.mask(io.stream),
+        };
+        attention::backward(io.isa, inputs, (rows(io.y, q), io.workspace), rows(io.dy, q), gradients, scratch);
     }
 }
 

@@ -120,7 +120,7 @@ impl<T: Real> Differentiable<T> for BatchNorm {
         let [dx, dgamma, dbeta, ..] = io.dx;
         if let Some(dx) = dx {
             let sums = io.coupled.map(|coupled| (coupled.total, coupled.samples * n));
-            batch_norm::backward_input(io.isa, x, kept, io.x[1], dy, sums, rows_mut(dx.values, shape), dx.write);
+            batch_norm::backward_input(io.isa, x, kept, io.x[1], dy, sums, (rows_mut(dx.values, shape), dx.write));
         }
         // A sample gives its own share of the sums; the session adds the shares.
         batch_norm::backward_sums(io.isa, x, kept, dy, &mut io.scratch[..2 * channels]);

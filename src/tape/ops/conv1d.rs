@@ -119,7 +119,7 @@ impl<T: Real> Op<T> for Conv1d {
         let epilogue = self.epilogue.kernel(io.stream);
         io.parts.rows(geometry.output_rows(sizes.rows), conv1d::CUT, [io.y], io.scratch, |piece, [y], scratch| {
             let y = RowsMut::packed(y, piece.len(), outputs);
-            conv1d::forward_rows(io.isa, geometry, x, weight, bias, epilogue, piece.start, y, scratch);
+            conv1d::forward_rows(io.isa, geometry, x, (weight, bias), epilogue, (piece.start, y), scratch);
         });
     }
 

@@ -123,7 +123,7 @@ impl<T: Real> Op<T> for GeneralConv1d {
         let y = RowsMut::packed(io.y, sizes.geometry.rows, sizes.outputs);
         let bias = (!bias.is_empty()).then_some(io.x[2]);
         let epilogue = self.epilogue(io.stream);
-        conv1d_general::forward(io.isa, sizes.geometry, rows(io.x[0], x), io.x[1], bias, epilogue, y, io.scratch);
+        conv1d_general::forward(io.isa, sizes.geometry, rows(io.x[0], x), (io.x[1], bias), epilogue, y, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {

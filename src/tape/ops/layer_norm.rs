@@ -38,7 +38,7 @@ impl<T: Real> Op<T> for LayerNorm {
     fn forward(&self, io: Forward<'_, T>) {
         let [x, ..] = io.shapes else { return };
         let (mean, rstd) = io.workspace.split_at_mut(x.rows().0);
-        layer_norm::forward(io.isa, rows(io.x[0], x), io.x[1], io.x[2], self.eps, rows_mut(io.y, x), mean, rstd);
+        layer_norm::forward(io.isa, rows(io.x[0], x), (io.x[1], io.x[2]), self.eps, rows_mut(io.y, x), (mean, rstd));
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -58,14 +58,14 @@ impl<T: Real> Differentiable<T> for LayerNorm {
         let (mean, rstd) = io.workspace.split_at(n);
         let [dx, dgamma, dbeta, ..] = io.dx;
         if let Some(dx) = dx {
-            layer_norm::backward_input(io.isa, x, io.x[1], mean, rstd, dy, rows_mut(dx.values, shape), dx.write);
+            layer_norm::backward_input(io.isa, x, io.x[1], (mean, rstd), dy, rows_mut(dx.values, shape), dx.write);
         }
         if dgamma.is_none() && dbeta.is_none() {
             return;
         }
         // By way of scratch: the two may have different write modes, or only one be asked for.
         let (gamma, beta) = io.scratch.split_at_mut(channels);
-        layer_norm::backward_parameters(io.isa, x, mean, rstd, dy, gamma, beta, Write::Set);
+        layer_norm::backward_parameters(io.isa, x, (mean, rstd), dy, (gamma, beta), Write::Set);
         for (to, from) in [(dgamma, gamma), (dbeta, beta)] {
             if let Some(to) = to {
                 strided::copy(io.isa, Rows::packed(from, 1, channels), RowsMut::packed(to.values, 1, channels), to.write);

@@ -76,7 +76,7 @@ impl<T: Real> Differentiable<T> for Pool {
             pool::Pool::Mean => (Rows::packed(&[], 0, channels), Rows::packed(&[], 0, channels)),
         };
         let dy = Rows::packed(io.dy, after, channels);
-        pool::backward(io.isa, self.kind, self.geometry, pair, dy, rows_mut(dx.values, x), dx.write, io.scratch);
+        pool::backward(io.isa, self.kind, self.geometry, pair, dy, (rows_mut(dx.values, x), dx.write), io.scratch);
     }
 }
 

@@ -51,9 +51,9 @@ impl<T: Real> Op<T> for ProbSparse {
     fn forward(&self, io: Forward<'_, T>) {
         let [q, k, ..] = io.shapes else { return };
         let stream = io.stream.unwrap_or(Stream::new(self.seed, 0, 0, 0));
-        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
+        let operands = [rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k)];
         let o = rows_mut(io.y, q);
-        prob_sparse::forward(io.isa, self.sparse, stream, operands.0, operands.1, operands.2, o, io.workspace, io.scratch);
+        prob_sparse::forward(io.isa, self.sparse, stream, operands, o, io.workspace, io.scratch);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
@@ -75,9 +75,9 @@ impl<T: Real> Differentiable<T> for ProbSparse {
         let dv = or_scratch(dv, &mut scratch, k.len());
         let writes = [dq.write, dk.write, dv.write];
         let gradients = Gradients { dq: rows_mut(dq.values, q), dk: rows_mut(dk.values, k), dv: rows_mut(dv.values, k), writes };
-        let operands = (rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k));
+        let operands = [rows(io.x[0], q), rows(io.x[1], k), rows(io.x[2], k)];
         let (d_o, kept) = (rows(io.dy, q), io.workspace);
-        prob_sparse::backward(io.isa, self.sparse, operands.0, operands.1, operands.2, d_o, kept, gradients, scratch);
+        prob_sparse::backward(io.isa, self.sparse, operands, d_o, kept, gradients, scratch);
     }
 }
 

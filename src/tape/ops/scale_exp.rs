@@ -53,7 +53,7 @@ impl<T: Real> Differentiable<T> for ScaleExp {
         let mut scratch = io.scratch;
         let dx = or_scratch(dx, &mut scratch, shape.len());
         let ds = or_scratch(ds, &mut scratch, shape.len());
-        sci::scale_backward(io.isa, x, s, dy, rows_mut(dx.values, shape), dx.write, rows_mut(ds.values, shape), ds.write);
+        sci::scale_backward(io.isa, x, s, dy, (rows_mut(dx.values, shape), dx.write), (rows_mut(ds.values, shape), ds.write));
     }
 }
 

@@ -22,7 +22,7 @@ impl Update<'_> {
     /// Parameters and both moments, from the gradient.
     pub fn work<T: Real>(self, gradient: &[T], [parameters, first, second]: [&mut [T]; 3]) {
         if gradient.len() <= BLOCK {
-            return adam::step(self.isa, self.adam, self.step, 1.0, gradient, parameters, first, second);
+            return adam::step(self.isa, self.adam, self.step, 1.0, gradient, parameters, (first, second));
         }
         let half = (gradient.len() / 2).next_multiple_of(BLOCK / 2);
         let (low_gradient, high_gradient) = gradient.split_at(half);

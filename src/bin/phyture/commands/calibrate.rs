@@ -5,7 +5,7 @@ use crate::context::{Context, interruption};
 use crate::output::Progress;
 use phyture::critique::wrap::wrapped;
 use phyture::flight::split::Split;
-use phyture::flight::{Column, DataSet};
+use phyture::flight::{Column, DataSet, PerChannel};
 use phyture::physics::{Calibration, Effect, Entry, Model, OutputError, calibrate, output_error};
 use phyture::{Error, Result};
 use serde::Serialize;
@@ -122,14 +122,14 @@ fn print_errors(context: &Context, set: &DataSet, calibrated: &Model, split: &Sp
     context.say(format!("\nRMSE        {}", Column::TARGETS.map(|column| format!("{:>9}", column.name())).concat()));
     for (part, spans) in parts.into_iter().filter(|(_, spans)| !spans.is_empty()) {
         let errors = calibrated.rmse(&set.flights, spans)?;
-        context.say(format!("{part:<11} {}", errors.map(|error| format!("{error:>9.3}")).concat()));
+        context.say(format!("{part:<11} {}", errors.map(|error| format!("{error:>9.3}")).values().concat()));
         rmse.insert(part.into(), per_channel(&errors)?);
     }
     Ok(rmse)
 }
 
 /// Six numbers by channel name, with their mean.
-fn per_channel(values: &[f64; 6]) -> Result<Value> {
+fn per_channel(values: &PerChannel<f64>) -> Result<Value> {
     let mean = values.iter().sum::<f64>() / 6.0;
     let pairs = Column::TARGETS.iter().map(|column| column.name()).zip(values.iter().copied()).chain([("mean", mean)]);
     pairs.map(|(name, value)| Ok((name.to_owned(), number(value)?))).collect::<Result<Map<_, _>>>().map(Value::Object)

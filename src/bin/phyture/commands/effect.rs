@@ -149,8 +149,7 @@ fn text(definition: &Definition) -> String {
     let Shared { formulas, parts } = shared(&effect.terms.iter().map(product).chain(changes).collect::<Vec<_>>());
     let (products, changes) = formulas.split_at(effect.terms.len());
     for (term, product) in effect.terms.iter().zip(products) {
-        let column = Column::TARGETS[term.channel];
-        line(2, format!("{:<6} += {product}   [{}]", column.name(), column.unit()));
+        line(2, format!("{:<6} += {product}   [{}]", term.channel.name(), term.channel.unit()));
     }
     for (swap, with) in effect.swaps.iter().zip(changes) {
         let within = if swap.within.is_empty() { String::new() } else { format!("   in {}", swap.within.join(", ")) };
@@ -210,8 +209,7 @@ fn text(definition: &Definition) -> String {
 /// Everything about an effect, for a program.
 fn described(definition: &Definition) -> Value {
     let terms = definition.terms.iter().map(|(channel, coefficient, formula)| {
-        let column = Column::TARGETS[*channel];
-        json!({ "channel": column.name(), "unit": column.unit(), "coefficient": coefficient, "formula": formula })
+        json!({ "channel": channel.name(), "unit": channel.unit(), "coefficient": coefficient, "formula": formula })
     });
     let swaps = definition.swaps.iter().map(|swap| json!({ "name": swap.name, "with": swap.with, "within": swap.within }));
     let coefficients = definition.coefficients.iter().map(|coefficient| {
@@ -274,7 +272,7 @@ fn add(context: &Context, id: &str, path: &Path, output: &PathBuf) -> Result<Exi
             "the enabled effect and coefficient of that name, as the paper's baseline has it",
         );
     }
-    if !model.acts(model.effects.len() - 1)?.contains(&true) {
+    if !model.acts(model.effects.len() - 1)?.values().contains(&true) {
         return fault(
             format!("nothing that reads {}, which `{id}` changes", names(&effect.changes())),
             "an enabled effect that does, as the paper's baseline has it",

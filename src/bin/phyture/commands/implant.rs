@@ -4,7 +4,7 @@ use super::effect::find;
 use crate::arguments::Data;
 use crate::context::{Context, data_sha256};
 use phyture::disk::write_atomically;
-use phyture::flight::{Column, DataSet, Span, write};
+use phyture::flight::{Channel, Column, DataSet, Span, write};
 use phyture::physics::{Effect, Model, calibrate, implant, spread_over_flights, typical};
 use phyture::suggest::did_you_mean;
 use phyture::{Error, Result};
@@ -151,9 +151,9 @@ fn sized(mut effect: Effect, sizes: &[String]) -> Result<Effect> {
 
 /// `wx_dot = 1.5 * sin(3 * height)` as an effect.
 fn of_formula(text: &str, scale: f64) -> Result<Effect> {
-    let names = Column::TARGETS.map(Column::name);
+    let names = Channel::ALL.map(Channel::name);
     let (channel, formula) = text.split_once('=').map_or((text, ""), |(channel, formula)| (channel.trim(), formula.trim()));
-    let index = names.iter().position(|name| *name == channel).ok_or_else(|| {
+    let channel = Channel::from_name(channel).ok_or_else(|| {
         let hint = did_you_mean(channel, names);
         fault(
             "--formula",
@@ -161,7 +161,7 @@ fn of_formula(text: &str, scale: f64) -> Result<Effect> {
             &format!("`channel = formula`, the channel one of {}", names.join(", ")),
         )
     })?;
-    Effect::formula(IMPLANTED, index, formula, scale)
+    Effect::formula(IMPLANTED, channel, formula, scale)
 }
 
 /// Root mean square of what was added, by channel.

@@ -5,7 +5,7 @@ use crate::context::Context;
 use crate::output::Progress;
 use phyture::flight::windows::windows;
 use phyture::flight::write::{self, Values};
-use phyture::flight::{Column, DataSet, Flight, Span, Window};
+use phyture::flight::{Channel, DataSet, Flight, PerChannel, Span, Window};
 use phyture::hybrid::{Hybrid, check_finite};
 use phyture::physics::Model;
 use phyture::{Error, Result};
@@ -126,13 +126,13 @@ impl Predictor {
     }
 
     /// At the windows of one flight, all of them finite.
-    fn predict(&self, context: &Context, flight: &Flight, windows: &[Window]) -> Result<Vec<[f64; 6]>> {
+    fn predict(&self, context: &Context, flight: &Flight, windows: &[Window]) -> Result<Vec<PerChannel<f64>>> {
         match self {
             Self::Hybrid(hybrid) => hybrid.predict(std::slice::from_ref(flight), windows, context.threads()),
             Self::Physics(model) => {
                 let columns = model.predict(flight)?;
                 let at = |window: &Window| {
-                    let values = std::array::from_fn(|channel| columns[channel][window.last]);
+                    let values = PerChannel::from_fn(|channel| columns[channel][window.last]);
                     check_finite(flight, window.last, &values).map(|()| values)
                 };
                 windows.iter().map(at).collect()
@@ -167,13 +167,14 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(path: &Path, format: Format, set: &DataSet, windows: &[Window], predicted: &[[f64; 6]]) -> Result<()> {
+fn write(path: &Path, format: Format, set: &DataSet, windows: &[Window], predicted: &[PerChannel<f64>]) -> Result<()> {
     let numbers = |value: &dyn Fn(usize) -> f64| (0..windows.len()).map(value).collect::<Vec<f64>>();
     let flight_of = |row: usize| &set.flights[windows[row].flight];
     let text = |value: &dyn Fn(usize) -> String| (0..windows.len()).map(value).collect::<Vec<String>>();
     let (manoeuvres, flights) = (text(&|row| flight_of(row).manoeuvre.clone()), text(&|row| flight_of(row).name.clone()));
     let mut columns = vec![("t".to_owned(), numbers(&|row| flight_of(row).time_s(windows[row].last)))];
-    for (channel, column) in Column::TARGETS.into_iter().enumerate() {
+    for channel in Channel::ALL {
+        let column = channel.column();
         columns.push((column.name().to_owned(), numbers(&|row| flight_of(row).column(column)[windows[row].last])));
         columns.push((format!("{}_predicted", column.name()), numbers(&|row| predicted[row][channel])));
     }
