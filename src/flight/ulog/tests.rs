@@ -90,7 +90,7 @@ fn what_was_appended_after_a_crash_is_read_on() -> Result<()> {
     bytes.extend(sample(3, 3000, &[3.0, 0.0]));
     // The offset stands behind head and flags before it.
     bytes[HEADER + 3 + 16..HEADER + 3 + 24].copy_from_slice(&(appended as u64).to_le_bytes());
-    let (streams, _) = read(&bytes, "")?;
+    let (streams, _) = read(&bytes, "extra = [\"rate.xyz[0]\"]")?;
     assert_eq!(streams[0].fields[0].1, [1.0, 3.0]);
     bytes[HEADER + 3 + 16] = 1;
     bytes[HEADER + 3 + 17] = 0xff;
