@@ -122,23 +122,33 @@ impl Browser {
         id.map(str::to_owned).ok_or_else(|| Error::Undetermined(format!("no {css}")))
     }
 
+    /// Does something with an element. The page may draw itself anew between finding it and using it: then it is looked for again.
+    fn on(&self, css: &str, act: impl Fn(&str) -> Result<()>) -> Result<()> {
+        let begun = Instant::now();
+        loop {
+            match act(&self.element(css)?) {
+                Err(error) if error.to_string().contains("stale element") && begun.elapsed() < PATIENCE => {}
+                done => return done,
+            }
+        }
+    }
+
     /// Clicks as a person does: the element has to be there, visible and not covered.
     pub fn click(&self, css: &str) -> Result<()> {
-        let element = self.element(css)?;
-        self.post(&format!("/element/{element}/click"), &json!({})).map(drop)
+        self.on(css, |element| self.post(&format!("/element/{element}/click"), &json!({})).map(drop))
     }
 
     /// Types into an element, after what is there was deleted.
     pub fn write(&self, css: &str, text: &str) -> Result<()> {
-        let element = self.element(css)?;
-        self.post(&format!("/element/{element}/clear"), &json!({}))?;
-        self.post(&format!("/element/{element}/value"), &json!({ "text": text })).map(drop)
+        self.on(css, |element| {
+            self.post(&format!("/element/{element}/clear"), &json!({}))?;
+            self.post(&format!("/element/{element}/value"), &json!({ "text": text })).map(drop)
+        })
     }
 
     /// Presses keys on an element.
     pub fn keys(&self, css: &str, keys: &str) -> Result<()> {
-        let element = self.element(css)?;
-        self.post(&format!("/element/{element}/value"), &json!({ "text": keys })).map(drop)
+        self.on(css, |element| self.post(&format!("/element/{element}/value"), &json!({ "text": keys })).map(drop))
     }
 
     /// Drags over an element, from and to a share of its width.
