@@ -35,6 +35,8 @@ pub(super) struct Composed {
     pub channels: PerChannel<Node>,
     /// The numbers with their symbols.
     pub numbers: Vec<(Free, Node)>,
+    /// Velocity against the air, where some effect makes it another than that over ground.
+    pub air: Option<[Node; 3]>,
 }
 
 /// Puts models into one graph, in which what they share is one.
@@ -74,9 +76,11 @@ impl Composer {
             numbers: BTreeMap::new(),
         };
         let summands = chain.build()?;
+        let air = chain.air(None);
         let numbers = std::mem::take(&mut chain.numbers).into_iter().collect();
         let channels = PerChannel::from_fn(|channel| sum(&mut self.graph, &summands, channel));
-        Ok(Composed { summands, channels, numbers })
+        let ground = ["vx", "vy", "vz"].map(|name| self.graph.input(name));
+        Ok(Composed { summands, channels, numbers, air: (air != ground).then_some(air) })
     }
 
     /// The symbol of a number; one for each value that it has among the models.
@@ -299,10 +303,15 @@ impl Chain<'_> {
         }
     }
 
+    /// Velocity against the air.
+    fn air(&mut self, reader: Option<usize>) -> [Node; 3] {
+        ["air_vx", "air_vy", "air_vz"].map(|name| self.signal(reader, name).expect("a signal of the table"))
+    }
+
     /// Speed and angles of the air: as derived from the log where nothing changes it.
     fn of_air(&mut self, reader: Option<usize>, name: &str) -> Option<Node> {
         let columns = ["vx", "vy", "vz"];
-        let air = ["air_vx", "air_vy", "air_vz"].map(|name| self.signal(reader, name).expect("a signal of the table"));
+        let air = self.air(reader);
         if columns.map(|name| self.composer.graph.input(name)) == air {
             return Some(self.composer.graph.input(name));
         }

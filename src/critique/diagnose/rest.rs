@@ -4,7 +4,7 @@
 //! worth while, the rest depends on a variable that the effect reads, and more of the error depends so than the effect removed.
 
 use super::report::{DependsOn, TriedFormula, UnknownChannel};
-use crate::critique::unknown::{ROWS_MAX, ResidualTable, Unknown, UnknownOptions, unknown};
+use crate::critique::unknown::{ResidualTable, Unknown, UnknownOptions, unknown};
 use crate::error::Result;
 use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel, Span};
 use crate::physics::{Effect, Model};
@@ -19,7 +19,9 @@ pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], blo
         }
         Ok(residual)
     };
-    let table = ResidualTable::new(flights, spans, &residual, block_s, ROWS_MAX)?;
+    // What blows on the aircraft is the air: beside a wind, velocities over ground blur a dependence on them.
+    let air = |flight: usize| flights.get(flight).map_or(Ok(None), |flight| model.air_velocity(flight));
+    let table = ResidualTable::against_air(flights, spans, &residual, &air, block_s)?;
     match unknown(&table, &UnknownOptions { seed, ..UnknownOptions::default() }) {
         Err(crate::Error::Undetermined(_)) => Ok(Vec::new()),
         found => Ok(found?.into_iter().filter(|unknown| unknown.r2 >= least(unknown)).collect()),
@@ -60,8 +62,8 @@ pub(super) fn stands_in(
 
 /// Whether two names speak of the same motion: a speed is made of velocities.
 fn related(name: &str, variable: &str) -> bool {
-    let speeds = |name: &str| ["airspeed", "hypot(vx, vy)"].contains(&name);
-    let name = name.strip_prefix("air_").unwrap_or(name);
+    let speeds = |name: &str| ["airspeed", "hypot(vx, vy)", "hypot(air_vx, air_vy)"].contains(&name);
+    let [name, variable] = [name, variable].map(|name| name.strip_prefix("air_").unwrap_or(name));
     let velocities = |name: &str| ["vx", "vy", "vz"].contains(&name);
     let gravity = ["g_x", "g_y", "g_z"].contains(&name) && ["roll", "pitch"].contains(&variable);
     name == variable

@@ -15,7 +15,7 @@ mod table;
 mod trees;
 
 pub use skeleton::SuggestedFormula;
-pub use table::{ROW_S, ROWS_MAX, ResidualTable};
+pub use table::{AirOf, ROW_S, ROWS_MAX, ResidualTable};
 
 use crate::error::{Error, Result};
 use crate::flight::Channel;
@@ -41,7 +41,7 @@ const RIVALS: usize = 6;
 /// Share of the whole dependence from which a variable alone is "nearly all of it".
 const NEARLY_ALL: f64 = 0.8;
 /// States and sticks in which a model usually has straight lines.
-const LINES: [&str; 10] = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"];
+const LINES: [&str; 13] = ["vx", "vy", "vz", "air_vx", "air_vy", "air_vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"];
 /// Rows of value zero that a knot of a broken line is taken to hold beside its own.
 const KNOT_RIDGE: f64 = 10.0;
 /// Rows of a half on which importance is measured.

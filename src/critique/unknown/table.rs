@@ -1,6 +1,6 @@
 //! The rows on which dependence of the residual is sought: means over short stretches of flight, in blocks.
 //!
-//! Only what was recorded and simple functions of it; no model, no test.
+//! Only what was recorded, simple functions of it, and velocity against the air where the caller knows the wind; no model, no test.
 
 use crate::error::{Error, Result};
 use crate::flight::{Accelerations, Column, Flight, PerChannel, Span, derived};
@@ -14,10 +14,13 @@ const LEAD_S: f64 = 0.03;
 /// Most rows, if the caller has no other wish.
 pub const ROWS_MAX: usize = 24_000;
 
+/// Velocity of a flight against the air along the body axes, m/s, where it is known to be another than that over ground.
+pub type AirOf<'a> = &'a dyn Fn(usize) -> Result<Option<[Vec<f64>; 3]>>;
+
 /// Residuals and what was measured with them, one row a short stretch.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualTable {
-    /// Features, as formulas (`vx`, `hypot(vx, vy)`, `sin(yaw)`, `lag(u4, 0.1)`); `time_in_flight` is none.
+    /// Features, as formulas (`vx` or, where the wind is known, `air_vx`; `hypot(vx, vy)`, `sin(yaw)`, `lag(u4, 0.1)`); `time_in_flight` is none.
     pub names: Vec<String>,
     /// SI units of the features.
     pub units: Vec<String>,
@@ -44,19 +47,20 @@ struct Candidate {
     reads: &'static [Column],
 }
 
-/// All features in the order of [`ResidualTable::names`], except time.
-fn candidates() -> Vec<Candidate> {
+/// All features in the order of [`ResidualTable::names`], except time. Velocities are those against the air where that is known.
+fn candidates(air: bool) -> Vec<Candidate> {
     use Column::{Pitch, Roll, U1, U2, U3, U4, Vx, Vy, Vz, Wx, Wy, Wz, Yaw, Z};
     const PLAIN: [&[Column]; 12] = [&[Vx], &[Vy], &[Vz], &[Wx], &[Wy], &[Wz], &[U1], &[U2], &[U3], &[U4], &[Roll], &[Pitch]];
     let plain = PLAIN.into_iter().filter_map(|reads| {
         let column = reads.first()?;
-        Some(Candidate { name: column.name().into(), unit: column.unit(), reads })
+        let name = if air && matches!(column, Vx | Vy | Vz) { format!("air_{}", column.name()) } else { column.name().into() };
+        Some(Candidate { name, unit: column.unit(), reads })
     });
     let made = |name: &str, unit, reads| Candidate { name: name.into(), unit, reads };
     let further = [
         made("height", "m", &[Z][..]),
         made("airspeed", "m/s", &[Vx, Vy, Vz]),
-        made("hypot(vx, vy)", "m/s", &[Vx, Vy]),
+        made(if air { "hypot(air_vx, air_vy)" } else { "hypot(vx, vy)" }, "m/s", &[Vx, Vy]),
         made("sin(yaw)", "1", &[Yaw]),
         made("cos(yaw)", "1", &[Yaw]),
     ];
@@ -89,6 +93,20 @@ impl ResidualTable {
         Self::with_rows(flights, spans, residuals, block_s, rows_max, ROW_S)
     }
 
+    /// As [`ResidualTable::new`], with velocity against the air in the place of that over ground in all flights if `air` gives it for any.
+    ///
+    /// # Errors
+    /// As [`ResidualTable::new`], and whatever `air` gives.
+    pub fn against_air(
+        flights: &[Flight],
+        spans: &[Span],
+        residuals: &dyn Fn(usize) -> Result<Accelerations>,
+        air: AirOf<'_>,
+        block_s: f64,
+    ) -> Result<Self> {
+        Self::build(flights, spans, residuals, Some(air), (block_s, ROW_S, ROWS_MAX))
+    }
+
     /// As [`ResidualTable::new`] with rows of `row_s` instead of [`ROW_S`]: short ones for spectra.
     ///
     /// # Errors
@@ -101,6 +119,17 @@ impl ResidualTable {
         rows_max: usize,
         row_s: f64,
     ) -> Result<Self> {
+        Self::build(flights, spans, residuals, None, (block_s, row_s, rows_max))
+    }
+
+    /// The table; sizes are the length of a block and of a row, s, and the most rows.
+    fn build(
+        flights: &[Flight],
+        spans: &[Span],
+        residuals: &dyn Fn(usize) -> Result<Accelerations>,
+        air: Option<AirOf<'_>>,
+        (block_s, row_s, rows_max): (f64, f64, usize),
+    ) -> Result<Self> {
         let shape = |message: String| Error::Shape { operation: "residual table", message };
         let mut seconds = 0.0;
         for span in spans {
@@ -112,7 +141,11 @@ impl ResidualTable {
         let used = |flight: &usize| spans.iter().any(|span| span.flight == *flight);
         let of_spans: Vec<usize> = (0..flights.len()).filter(used).collect();
         let absent = |column: &Column| of_spans.iter().any(|flight| flights[*flight].absent.contains(column));
-        let mut candidates = candidates();
+        let mut against_air = false;
+        for &flight in &of_spans {
+            against_air = against_air || air.map_or(Ok(None), |air| air(flight))?.is_some();
+        }
+        let mut candidates = candidates(against_air);
         candidates.retain(|candidate| !candidate.reads.iter().any(absent));
         let mut table = Self::default();
         table.features.resize(candidates.len() + 1, Vec::new());
@@ -124,8 +157,9 @@ impl ResidualTable {
             if let Some(bad) = residual.iter().find(|column| column.len() != flight.len()) {
                 return Err(shape(format!("{} residuals for {} samples of `{}`", bad.len(), flight.len(), flight.name)));
             }
+            let known = if against_air { Some(air_or_ground(flight, air.map_or(Ok(None), |air| air(index))?)) } else { None };
             let columns: Vec<Vec<f64>> =
-                candidates.iter().map(|candidate| column(flight, &candidate.name)).collect::<Result<_>>()?;
+                candidates.iter().map(|candidate| column(flight, &candidate.name, known.as_ref())).collect::<Result<_>>()?;
             let samples = (row_s / flight.step_s - 1e-9).ceil().max(1.0) as usize;
             let rows_of_block = (block_s / (samples as f64 * flight.step_s)).round().max(1.0) as usize;
             for span in spans.iter().filter(|span| span.flight == index) {
@@ -198,8 +232,23 @@ impl ResidualTable {
     }
 }
 
-/// A feature of a whole flight.
-fn column(flight: &Flight, name: &str) -> Result<Vec<f64>> {
+/// Velocity against the air; that over ground in a flight without wind.
+fn air_or_ground(flight: &Flight, air: Option<[Vec<f64>; 3]>) -> [Vec<f64>; 3] {
+    air.unwrap_or_else(|| [Column::Vx, Column::Vy, Column::Vz].map(|column| flight.column(column).to_vec()))
+}
+
+/// A feature of a whole flight, whose velocity against the air may be known.
+fn column(flight: &Flight, name: &str, air: Option<&[Vec<f64>; 3]>) -> Result<Vec<f64>> {
+    if let Some([x, y, z]) = air {
+        match name {
+            "air_vx" => return Ok(x.clone()),
+            "air_vy" => return Ok(y.clone()),
+            "air_vz" => return Ok(z.clone()),
+            "hypot(air_vx, air_vy)" => return Ok(x.iter().zip(y).map(|(x, y)| x.hypot(*y)).collect()),
+            "airspeed" => return Ok(x.iter().zip(y).zip(z).map(|((x, y), z)| x.hypot(*y).hypot(*z)).collect()),
+            _ => {}
+        }
+    }
     match derived::of_flight(flight, name) {
         Some(values) => Ok(values),
         None => evaluate(&Formula::parse(name)?, flight),
