@@ -12,6 +12,7 @@ use super::own::Halves;
 use super::report::{Bar, Diagnosis, Locked, Status, Step, Verdict, Worth};
 use super::selection::selection;
 use super::sentences;
+use super::suggest::is_suggested;
 use crate::blocks::{BlockMean, BlockSum};
 use crate::critique::channels::ChannelValues;
 use crate::critique::shares::Share;
@@ -123,7 +124,16 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
     let nothing = || Error::Shape { operation: "loop", message: "there is no round to tell of".into() };
     let last = rounds.last().ok_or_else(nothing)?;
     let added: Vec<&Diagnosis> = rounds.iter().filter(|round| round.is_confirmed()).collect();
-    let mut whole = Diagnosis { notes: notes(rounds), seconds: rounds.iter().map(|round| round.seconds).sum(), ..last.clone() };
+    // A round that tried suggested formulas alone says nothing of the catalogue.
+    let of_catalogue = |round: &&Diagnosis| round.candidates.iter().any(|candidate| !is_suggested(&candidate.effect));
+    let searched_last = rounds.iter().rfind(of_catalogue).unwrap_or(last);
+    let mut whole = Diagnosis {
+        notes: notes(rounds),
+        seconds: rounds.iter().map(|round| round.seconds).sum(),
+        unknown: last.unknown.clone(),
+        failure: last.failure.clone(),
+        ..searched_last.clone()
+    };
     if added.is_empty() {
         return Ok(whole);
     }
@@ -135,7 +145,7 @@ pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &S
         step.indistinguishable.retain(|other| !whole.accepted.contains(other));
     }
     as_in_the_model(&mut whole, model);
-    let (open, refused) = (last.candidates.iter(), Status::Accepted);
+    let (open, refused) = (searched_last.candidates.iter(), Status::Accepted);
     let left = open.filter(|candidate| candidate.status != refused).cloned();
     whole.candidates = whole.steps.iter().map(accepted).chain(left).collect();
     let step_s = flights.first().map_or(0.01, |flight| flight.step_s);

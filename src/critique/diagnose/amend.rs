@@ -1,11 +1,12 @@
 //! The loop: diagnose, add what is confirmed, calibrate, until nothing worthwhile is left. No file is written here: the caller is
 //! told of every round.
 
+use super::suggest::{is_suggested, standing};
 use super::{Diagnosis, Options, diagnose};
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::{Flight, Span};
-use crate::physics::{Effect, Model, calibrate, doubt};
+use crate::physics::{Effect, Model, calibrate, catalogue, doubt};
 
 /// Rounds before the loop stops by itself.
 const MOST_ROUNDS: usize = 4;
@@ -59,6 +60,9 @@ pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
 /// Diagnoses, adds and calibrates until nothing is found that the confirming flights confirm. `told` hears of every round, from 1,
 /// and may add to its diagnosis. Effects that are switched off stay in the model, switched off, unless they were found.
 ///
+/// With [`Options::formulas`], once the catalogue has no more to give, formulas that the rest of the error suggests and the confirming flights
+/// bear out are tried as effects are, by themselves and beside all that was found.
+///
 /// # Errors
 /// As [`diagnose`]; what `told` gives.
 pub fn amend(
@@ -69,27 +73,49 @@ pub fn amend(
     told: &mut dyn FnMut(usize, &mut Diagnosis) -> Result<()>,
 ) -> Result<Amended> {
     let off: Vec<_> = model.effects.iter().filter(|effect| !effect.enabled).cloned().collect();
+    let given = |effect: &Effect| off.iter().any(|known| known.name == effect.name);
     let mut model = calibrated(model, flights, split)?;
-    model.effects.extend(off);
-    let mut rounds = Vec::new();
+    model.effects.extend(off.iter().cloned());
+    let mut rounds: Vec<Diagnosis> = Vec::new();
+    let mut options = options.clone();
+    let (mut at_once, mut of_formulas) = (false, false);
     for round in 1..=MOST_ROUNDS {
-        let mut outcome = diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), options)?;
+        let mut outcome = diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), &options)?;
         let confirmed = outcome.diagnosis.is_confirmed();
+        at_once |= outcome.diagnosis.both_roads;
         if confirmed {
             let still_off = |effect: &&Effect| !effect.enabled && outcome.model.effect(&effect.name).is_none();
             let off: Vec<_> = model.effects.iter().filter(still_off).cloned().collect();
             // Where everything was fitted at once, it is calibrated, with what is known of the numbers beforehand.
-            model = if outcome.diagnosis.both_roads { outcome.model } else { calibrated(&outcome.model, flights, split)? };
+            model = if at_once { outcome.model } else { calibrated(&outcome.model, flights, split)? };
             as_in_the_model(&mut outcome.diagnosis, &model);
             model.effects.extend(off);
         }
         told(round, &mut outcome.diagnosis)?;
+        let suggested = match &outcome.diagnosis.unknown {
+            Some(unknown) if options.formulas && (confirmed || !of_formulas) => standing(unknown, &model)?,
+            _ => Vec::new(),
+        };
         // Everything that applies has then been judged beside everything else.
-        let is_last = !confirmed || outcome.diagnosis.both_roads;
+        let is_last = !confirmed || outcome.diagnosis.both_roads || of_formulas;
         rounds.push(outcome.diagnosis);
-        if is_last {
+        if is_last && suggested.is_empty() {
             break;
         }
+        if is_last {
+            of_formulas = true;
+            options.without = others_than(&suggested, &model);
+            model.effects.extend(suggested);
+        }
     }
+    // A formula that was tried and not taken is no wish of the user's.
+    model.effects.retain(|effect| effect.enabled || given(effect) || !is_suggested(&effect.name));
     Ok(Amended { rounds, model })
+}
+
+/// All candidates but these.
+fn others_than(suggested: &[Effect], model: &Model) -> Vec<String> {
+    let off = model.effects.iter().filter(|effect| !effect.enabled).map(|effect| effect.name.clone());
+    let known = catalogue::kinds().map(str::to_owned).chain(off);
+    known.filter(|name| suggested.iter().all(|effect| effect.name != *name)).collect()
 }

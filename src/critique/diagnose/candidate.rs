@@ -4,6 +4,9 @@
 use crate::flight::Flight;
 use crate::physics::{Columns, Definition, Effect, Model, SPREAD, Wanted, catalogue};
 
+/// What effects that a search puts into a model are marked with.
+pub(super) const FOUND: &str = "diagnose";
+
 /// An effect that may be missing.
 #[derive(Clone, Debug)]
 pub(super) struct Candidate {
@@ -41,7 +44,7 @@ pub(super) fn candidates(model: &Model, flights: &[Flight]) -> Vec<Candidate> {
             return None;
         }
         let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
-        effect.added_by = Some("diagnose".into());
+        effect.added_by = Some(FOUND.into());
         let variants = grid(definition, &effect);
         Some((Some(definition), effect, variants))
     });
@@ -108,5 +111,5 @@ pub(super) fn with(model: &Model, effect: &Effect) -> Model {
 
 /// Whether a search put an effect into the model.
 pub(super) fn is_found(effect: &Effect) -> bool {
-    effect.added_by.as_deref() == Some("diagnose")
+    effect.added_by.as_deref() == Some(FOUND)
 }

@@ -14,13 +14,15 @@ pub struct Options {
     pub seed: u64,
     /// Candidates to leave out.
     pub without: Vec<String>,
+    /// Whether a loop, once nothing of the catalogue is left, also tries the formulas that the rest of the error suggests.
+    pub formulas: bool,
     /// Follows the search, and may stop it.
     pub watch: Watch,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { max_effects: None, seed: 1, without: Vec::new(), watch: Watch::default() }
+        Self { max_effects: None, seed: 1, without: Vec::new(), formulas: false, watch: Watch::default() }
     }
 }
 

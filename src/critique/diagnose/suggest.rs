@@ -1,10 +1,10 @@
 //! A formula that the shape of a dependence suggests is tried before it is given to anybody: calibrated with the model on what was
 //! searched, and measured on what was not.
 
-use super::candidate::with;
+use super::candidate::{FOUND, with};
 use super::confirm::confirm;
 use super::engine::Engine;
-use super::report::TriedFormula;
+use super::report::{TriedFormula, UnknownChannel};
 use crate::critique::unknown::Unknown;
 use crate::error::{Error, Result};
 use crate::flight::{Channel, Span};
@@ -20,9 +20,35 @@ pub(super) struct Unseen<'a> {
     pub block_s: f64,
 }
 
+/// What the names of suggested effects begin with.
+const SUGGESTED: &str = "suggested_";
+
 /// Name of the effect that a suggestion becomes in a model file.
 pub(super) fn name(channel: &str) -> String {
-    format!("suggested_{channel}")
+    format!("{SUGGESTED}{channel}")
+}
+
+/// Whether an effect of this name is a formula that the rest of the error suggested.
+pub(super) fn is_suggested(effect: &str) -> bool {
+    effect.starts_with(SUGGESTED)
+}
+
+/// The formulas that held on unseen flights as effects of a model, switched off, under names that are free in it.
+///
+/// # Errors
+/// [`Error::Formula`] for one that cannot be read.
+pub(super) fn standing(unknown: &[UnknownChannel], model: &Model) -> Result<Vec<Effect>> {
+    let effect = |unknown: &UnknownChannel| {
+        let (formula, coefficient) = unknown.suggested_formula.as_ref().zip(unknown.suggested_coefficient)?;
+        let channel = Channel::from_name(&unknown.channel)?;
+        let plain = name(&unknown.channel);
+        let numbered = (2..).map(|number| format!("{plain}_{number}"));
+        let free = std::iter::once(plain.clone()).chain(numbered).find(|name| model.effect(name).is_none())?;
+        let made = Effect::formula(free, channel, formula, coefficient);
+        let meaning = format!("no physics with a name: {}, which the rest of the error suggested", unknown.shape);
+        Some(made.map(|effect| Effect { enabled: false, added_by: Some(FOUND.into()), meaning, ..effect }))
+    };
+    unknown.iter().filter_map(effect).collect()
 }
 
 /// The suggested formula of one dependence beside `model`, on its own. `None` without a suggestion, or where the blocks do not

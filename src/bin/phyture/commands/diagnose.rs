@@ -263,6 +263,10 @@ pub struct LoopArgs {
     /// has seen, and how much of what lies above it the effects remove
     #[arg(long, value_name = "DIR")]
     pub explainable: Option<PathBuf>,
+    /// Add formulas as well that the rest of the error suggests, where flights that no search has seen bear them out: no physics with a name,
+    /// and to be looked at before they are flown
+    #[arg(long)]
+    pub formulas: bool,
     /// What is searched and what only confirms.
     #[command(flatten)]
     pub division: Division,
@@ -280,7 +284,7 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     let Some((set, split, data_sha256)) = prepare(context, data, &model, division, &mut page)? else {
         return Ok(ExitCode::from(CHECK_FAILED));
     };
-    let options = Options { seed: context.seed(), ..Options::default() };
+    let options = Options { seed: context.seed(), formulas: wanted.formulas, ..Options::default() };
     let explainable = read_explainable(data, truth, &split)?;
     let task = SearchTask { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
     let ledger = output.with_extension("ledger.jsonl");
