@@ -51,7 +51,7 @@ pub(super) enum Memory {
 
 /// `1 - a` and `ramp` of a lag.
 #[inline]
-fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
+pub(super) fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
     if tau_s <= 0.0 {
         return [1.0, 1.0];
     }

@@ -90,6 +90,8 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
         let history = description.config.history();
         let mut session = Session::infer(hybrid.network.graph(), &[hybrid.network.output()], Threads(1))?;
         session.load(&hybrid.parameters)?;
+        // A session asks for the memory of its results when it first predicts; here, not in flight.
+        session.predict(1, &|_, slabs| slabs.iter_mut().for_each(|slab| slab.fill(0.0)), &mut |_, _| ())?;
         let most_names = formulas.iter().chain(&of_linear).map(|formula| formula.names().len()).max().unwrap_or(0);
         Ok(Self {
             model,

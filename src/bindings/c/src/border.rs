@@ -168,12 +168,7 @@ pub unsafe fn shared<'a, T>(pointer: *const T, name: &'static str) -> Result<&'a
 ///
 /// # Safety
 /// `pointer` is null or points at `found` numbers that nobody changes for as long as the slice lives.
-pub unsafe fn numbers<'a>(
-    pointer: *const f64,
-    found: usize,
-    expected: usize,
-    name: &'static str,
-) -> Result<&'a [f64], Fault> {
+pub unsafe fn numbers<'a>(pointer: *const f64, found: usize, expected: usize, name: &'static str) -> Result<&'a [f64], Fault> {
     if found != expected {
         return Err(Fault::Length { name, found, expected });
     }
@@ -203,9 +198,10 @@ pub unsafe fn path(pointer: *const c_char) -> Result<PathBuf, Fault> {
     #[cfg(not(unix))]
     match text.to_str() {
         Ok(text) => Ok(text.into()),
-        Err(_) => {
-            Err(Fault::file(phyture::Error::File { path: text.to_string_lossy().as_ref().into(), message: "a path that is no UTF-8".into() }))
-        }
+        Err(_) => Err(Fault::file(phyture::Error::File {
+            path: text.to_string_lossy().as_ref().into(),
+            message: "a path that is no UTF-8".into(),
+        })),
     }
 }
 
@@ -245,10 +241,14 @@ mod tests {
         let mut text = Text::new(&mut room);
         assert_eq!(guarded(&mut text, || panic!("index {} of {}", 7, 3)), PhytureStatus::Panic);
         let used = text.used;
-        let said: Vec<u8> = room.iter().take(used).map(|byte| {
-            // SAFETY: the room was written as a whole when it was made.
-            unsafe { byte.assume_init() }
-        }).collect();
+        let said: Vec<u8> = room
+            .iter()
+            .take(used)
+            .map(|byte| {
+                // SAFETY: the room was written as a whole when it was made.
+                unsafe { byte.assume_init() }
+            })
+            .collect();
         assert_eq!(said, b"a fault of the library: index 7 of 3");
         assert_eq!(guarded(&mut Text::new(&mut []), || Ok(())), PhytureStatus::Ok);
     }
@@ -262,7 +262,10 @@ mod tests {
             let refused = |found: Result<&[f64], Fault>| found.err().map(|fault| (fault.status(), fault.to_string()));
             let length = Some((PhytureStatus::Length, "`state` has 3 numbers, expected 16".to_owned()));
             assert_eq!(refused(numbers(three.as_ptr(), 3, 16, "state")), length);
-            assert_eq!(refused(numbers(std::ptr::null(), 16, 16, "state")), Some((PhytureStatus::Null, "`state` is NULL".to_owned())));
+            assert_eq!(
+                refused(numbers(std::ptr::null(), 16, 16, "state")),
+                Some((PhytureStatus::Null, "`state` is NULL".to_owned()))
+            );
             assert!(numbers(std::ptr::null(), 0, 0, "own").is_ok_and(<[f64]>::is_empty));
             assert!(shared::<f64>(std::ptr::null(), "model").is_err());
             assert!(path(std::ptr::null()).is_err());

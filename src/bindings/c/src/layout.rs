@@ -76,7 +76,7 @@ pub struct PhyturePrediction {
     pub linear: [f64; PHYTURE_ACCELERATIONS],
     /// What the network says; 0 where there is none, NaN while the prediction is not complete.
     pub network: [f64; PHYTURE_ACCELERATIONS],
-    /// Whether the network has its history: from sample phyture_stream_history on. A model without a network is always complete.
+    /// Whether the network has its history: from the phyture_stream_history-th sample on. A model without a network is always complete.
     pub complete: bool,
 }
 

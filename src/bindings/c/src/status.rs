@@ -16,7 +16,7 @@ pub enum PhytureStatus {
     File = 3,
     /// The model cannot be streamed like this: another step than the trained one, a formula that does not fit.
     Model = 4,
-    /// A number that was given is not finite. The sample was not taken.
+    /// A number that was given is not finite. Nothing was taken.
     NotFinite = 5,
     /// The predicted accelerations are not finite. The sample was taken.
     Prediction = 6,
@@ -25,16 +25,8 @@ pub enum PhytureStatus {
 }
 
 impl PhytureStatus {
-    const ALL: [Self; 8] = [
-        Self::Ok,
-        Self::Null,
-        Self::Length,
-        Self::File,
-        Self::Model,
-        Self::NotFinite,
-        Self::Prediction,
-        Self::Panic,
-    ];
+    const ALL: [Self; 8] =
+        [Self::Ok, Self::Null, Self::Length, Self::File, Self::Model, Self::NotFinite, Self::Prediction, Self::Panic];
 
     const fn text(self) -> &'static CStr {
         match self {

@@ -180,9 +180,8 @@ pub unsafe extern "C" fn phyture_stream_push(
     let Some(stream) = (unsafe { stream.as_mut() }) else { return PhytureStatus::Null };
     stream.call(|streaming, own_count| {
         // SAFETY: the caller keeps the contract above.
-        let (state, own) = unsafe {
-            (numbers(state, state_length, PHYTURE_STATES, "state")?, numbers(own, own_length, own_count, "own")?)
-        };
+        let (state, own) =
+            unsafe { (numbers(state, state_length, PHYTURE_STATES, "state")?, numbers(own, own_length, own_count, "own")?) };
         if out.is_null() {
             return Err(Fault::Null("out"));
         }

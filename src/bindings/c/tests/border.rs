@@ -89,9 +89,9 @@ fn a_hybrid_says_what_the_library_says_part_by_part_and_again_after_a_reset() ->
             };
             assert_eq!(found.acceleration, stages.hybrid[window].into_array());
             let with_linear = stages.with_linear.as_ref().expect("it has a linear history")[window].into_array();
-            for channel in 0..6 {
-                assert_eq!(found.physics[channel] + found.linear[channel], with_linear[channel]);
-                assert_eq!(found.acceleration[channel], with_linear[channel] + found.network[channel]);
+            for (channel, baseline) in with_linear.into_iter().enumerate() {
+                assert_eq!(found.physics[channel] + found.linear[channel], baseline);
+                assert_eq!(found.acceleration[channel], baseline + found.network[channel]);
             }
         }
     }
