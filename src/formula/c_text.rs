@@ -21,6 +21,8 @@ pub(crate) struct Statements {
     pub members: Vec<String>,
     /// Functions that are called.
     pub helpers: BTreeSet<Helper>,
+    /// Whether all numbers in it are numbers in single precision, too, neither too large nor too small.
+    pub fits_single: bool,
 }
 
 /// How tightly the outermost operator of an expression binds, loosest first.
@@ -69,6 +71,10 @@ fn number(value: f64) -> Result<String, String> {
     }
 }
 
+fn is_single(value: f64) -> bool {
+    value == 0.0 || (f64::from(f32::MIN_POSITIVE)..=f64::from(f32::MAX)).contains(&value.abs())
+}
+
 /// The statements for some values, every symbol at its own value. `input` gives for each column that is read the name of a variable
 /// and its value.
 ///
@@ -91,8 +97,10 @@ pub(crate) fn statements(
             _ => graph.operands(node).for_each(|operand| used(operand, 1)),
         }
     }
+    let read = behind.iter().flat_map(|node| graph.operands(*node)).chain(roots.iter().copied());
+    let fits_single = read.filter_map(|node| graph.uniform(node)).chain([step_s]).all(is_single);
     let known = vec![None; graph.nodes.len()];
-    let mut writer = Writer { graph, step_s, uses, known, variables: 0, made: Statements::default() };
+    let mut writer = Writer { graph, step_s, uses, known, variables: 0, made: Statements { fits_single, ..Statements::default() } };
     for node in behind {
         let expression = writer.expression(node, input)?;
         writer.known[node.0 as usize] = Some(expression);
@@ -315,6 +323,14 @@ mod tests {
         assert!(
             made.lines.iter().any(|line| line.ends_with("@_delay(memory->delay_1, 4ul, &memory->newest_1, first, x, R(0.5));"))
         );
+        Ok(())
+    }
+
+    #[test]
+    fn numbers_beyond_single_precision_are_seen() -> Result<(), String> {
+        for (formula, fits) in [("1 / max(x, 1e-9)", true), ("1 / max(x, 1e-50)", false), ("x * 1e40", false), ("x + 0", true)] {
+            assert_eq!(written(formula)?.fits_single, fits, "{formula}");
+        }
         Ok(())
     }
 

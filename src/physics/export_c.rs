@@ -243,6 +243,9 @@ impl Export<'_> {
         self.made.helpers.iter().for_each(|helper| {
             let _ = writeln!(text, "{}", helper.definition());
         });
+        if !self.made.fits_single {
+            text.push_str("#ifdef PHYTURE_SINGLE\n#error a number of this model is too large or too small for float\n#endif\n\n");
+        }
         let _ = writeln!(text, "{reset}\n{{\n    memory->started = 0;");
         if self.reads_time {
             text.push_str("    memory->samples = 0;\n    memory->start_s = start_s;\n");
