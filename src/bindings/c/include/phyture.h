@@ -14,7 +14,7 @@
  * Threads: there is no global state. A PhytureModel may be used by several threads at once; a PhytureStream by one thread at a time,
  * not always the same one. Nothing is freed while a call uses it.
  *
- * Real time: phyture_stream_push works on the calling thread, takes no lock and allocates nothing, unless it fails with
+ * Real time: phyture_stream_push works on the calling thread, waits for no other one, and allocates nothing, unless it fails with
  * PHYTURE_STATUS_MODEL, PHYTURE_STATUS_PREDICTION or PHYTURE_STATUS_PANIC, whose sentences are made on the heap.
  *
  * Written by cbindgen from src/bindings/c; do not edit. */
@@ -62,7 +62,7 @@ typedef enum PhytureStatus {
    */
   PHYTURE_STATUS_MODEL = 4,
   /*
-   A number that was given is not finite. The sample was not taken.
+   A number that was given is not finite. Nothing was taken.
    */
   PHYTURE_STATUS_NOT_FINITE = 5,
   /*
@@ -207,7 +207,7 @@ typedef struct PhyturePrediction {
    */
   double network[PHYTURE_ACCELERATIONS];
   /*
-   Whether the network has its history: from sample phyture_stream_history on. A model without a network is always complete.
+   Whether the network has its history: from the phyture_stream_history-th sample on. A model without a network is always complete.
    */
   bool complete;
 } PhyturePrediction;
