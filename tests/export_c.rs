@@ -197,7 +197,7 @@ fn with_everything() -> Result<Model> {
     ];
     for (index, (channel, formula)) in formulas.into_iter().enumerate() {
         let channel = Channel::from_name(channel).ok_or_else(|| Error::Undetermined("a channel".into()))?;
-        model.effects.push(Effect::formula(&format!("formula_{index}"), channel, formula, 0.7)?);
+        model.effects.push(Effect::formula(format!("formula_{index}"), channel, formula, 0.7)?);
     }
     // One that changes what others read.
     let mut effect = Effect::formula("late_thrust", Channel::VzDot, "0 * vx", 0.0)?;
