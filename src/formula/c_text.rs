@@ -64,11 +64,7 @@ struct Writer<'a> {
 
 /// A number of the file's type.
 fn number(value: f64) -> Result<String, String> {
-    if value.is_finite() {
-        Ok(format!("R({value:?})"))
-    } else {
-        Err(format!("a number of it is {value}, which C has no constant for"))
-    }
+    if value.is_finite() { Ok(format!("R({value:?})")) } else { Err(format!("{value}, which C has no constant for")) }
 }
 
 fn is_single(value: f64) -> bool {

@@ -69,7 +69,7 @@ impl LinearConfig {
     }
 
     /// Numbers that a prediction is a sum over, the constant included. At most [`MOST_FEATURES`] once checked.
-    pub(super) fn features(&self) -> usize {
+    pub fn features(&self) -> usize {
         self.lags * self.inputs.len() + 1
     }
 }

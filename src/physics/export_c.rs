@@ -291,7 +291,7 @@ mod tests {
         let mut model = Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8);
         let file = model.export_c(None, None)?;
         assert!(!file.of_one_step && file.prefix == "n9" && file.text.contains("void n9_step("));
-        assert!(!file.text.contains('@') && !file.text.contains("first"), "{}", file.text);
+        assert!(!file.text.contains('@') && !file.text.contains("int first"), "{}", file.text);
         let refused = |model: &Model, prefix: Option<&str>, step_s: Option<f64>| {
             model.export_c(prefix, step_s).map_err(|error| error.to_string()).err().unwrap_or_default()
         };
@@ -304,7 +304,7 @@ mod tests {
         model.effects.push(Effect::formula("clock", Channel::WzDot, "sin(t)", 1.0)?);
         assert!(refused(&model, None, None).contains("reads the time"));
         model.effects.push(Effect::formula("endless", Channel::WzDot, "vx * (1 / 0)", 1.0)?);
-        assert!(refused(&model, None, Some(0.01)).contains("a number of it is inf, which C has no constant for"));
+        assert!(refused(&model, None, Some(0.01)).contains("`number` is inf, which C has no constant for"));
         Ok(())
     }
 }
