@@ -75,7 +75,7 @@ fn is_single(value: f64) -> bool {
 /// and its value.
 ///
 /// # Errors
-/// What cannot be said in C, as the end of a sentence about the model.
+/// The number that C cannot write, as the end of a sentence.
 pub(crate) fn statements(
     graph: &Graph,
     roots: &[Node],
