@@ -68,7 +68,7 @@ impl LinearConfig {
         inputs::parse(&self.inputs).map(|_| ())
     }
 
-    /// Numbers that a prediction is a sum over, the constant included. At most [`MOST_FEATURES`] once checked.
+    /// Numbers that a prediction is a sum over, the constant included. Few enough for its matrices once checked.
     pub fn features(&self) -> usize {
         self.lags * self.inputs.len() + 1
     }
