@@ -245,6 +245,38 @@ fn completions_manual_pages_and_the_language_of_formulas_come_from_the_program_i
 }
 
 #[test]
+fn a_model_is_exported_to_c_for_the_rate_that_it_needs() -> Result<()> {
+    let place = folder()?;
+    let write = |name: &str, text: &str| std::fs::write(place.path().join(name), text).map_err(Error::io(name.to_owned()));
+    let model =
+        "[model]\nname = \"n9\"\nmass_kg = 4.58\ninertia = [0.18, 0.34, 0.28]\nrotor_radius_m = 0.8\nbaseline = \"paper\"\n";
+    write("plain.toml", model)?;
+    write("late.toml", &format!("{model}[data]\ncontrol_delay_s = 0.02\n"))?;
+    let json = |arguments: &[&str]| -> Result<serde_json::Value> {
+        let output = phyture(place.path(), &[arguments, &["--json", "-"]].concat())?;
+        serde_json::from_slice(&output.stdout).map_err(|error| Error::Undetermined(format!("{arguments:?}: {error}")))
+    };
+    let plain = json(&["export-c", "plain.toml", "-o", "plain.c", "--name", "heli"])?;
+    assert_eq!((plain["name"].as_str(), plain["step_s"].is_null()), (Some("heli"), true), "{plain}");
+    let file = std::fs::read_to_string(place.path().join("plain.c")).map_err(Error::io("plain.c"))?;
+    assert!(file.contains("void heli_step(heli_memory *memory, const heli_real state[16], heli_real acceleration[6]);"), "{file}");
+    let late = json(&["export-c", "late.toml", "-o", "late.c", "--hz", "50"])?;
+    assert_eq!((late["name"].as_str(), late["step_s"].as_f64()), (Some("n9"), Some(0.02)), "{late}");
+    for (arguments, part) in [
+        (&["late.toml", "-o", "no.c"][..], "`--hz`"),
+        (&["late.toml", "-o", "no.c", "--hz", "-50"], "expected a number above 0"),
+        (&["late.toml", "-o", "no.c", "--hz", "50", "--name", "9"], "a letter first"),
+        (&["none.toml", "-o", "no.c"], "none.toml"),
+    ] {
+        let output = phyture(place.path(), &[&["export-c"], arguments].concat())?;
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.code() == Some(2) && text.contains(part), "{arguments:?}: {text}");
+    }
+    assert!(!place.path().join("no.c").exists());
+    Ok(())
+}
+
+#[test]
 fn a_failure_is_json_where_json_was_asked_for() -> Result<()> {
     let place = folder()?;
     for (arguments, kind) in [

@@ -44,6 +44,7 @@ fn every_command_refuses_what_is_there_and_leaves_it_to_the_byte() -> Result<()>
         &["train", "flights", "-m", "model.toml", "-o", "run", "--config", "small.toml"],
         &["predict", "flights", "-n", "run", "-o", "hybrid.csv", "--stride", "100"],
         &["implant", "flights", "implanted", "--effect", "quad_drag", "-m", "model.toml"],
+        &["export-c", "model.toml", "-o", "model.c", "--hz", "100"],
     ];
     for arguments in commands {
         done(at, arguments)?;

@@ -51,21 +51,26 @@ impl Derived {
         Self::ALL.into_iter().find(|derived| derived.name() == name)
     }
 
+    /// The value at a sample; `of` gives the columns that [`Derived::reads`] names.
+    pub fn at(self, of: impl Fn(Column) -> f64, time_s: impl FnOnce() -> f64) -> f64 {
+        let [vx, vy, vz] = [Column::Vx, Column::Vy, Column::Vz];
+        let gravity = |axis: usize| gravity_body(of(Column::Roll), of(Column::Pitch))[axis];
+        match self {
+            Self::Time => time_s(),
+            Self::Height => -of(Column::Z),
+            Self::Airspeed => of(vx).hypot(of(vy)).hypot(of(vz)),
+            Self::Alpha => of(vz).atan2(of(vx)),
+            Self::Beta => of(vy).atan2(of(vx).hypot(of(vz))),
+            Self::GravityX => gravity(0),
+            Self::GravityY => gravity(1),
+            Self::GravityZ => gravity(2),
+        }
+    }
+
     /// Appends the values at consecutive samples to `out`; `state` holds their columns in the order of [`Column::STATE`].
     pub fn extend(self, state: &[&[f64]; 16], time_s: &dyn Fn(usize) -> f64, samples: usize, out: &mut Vec<f64>) {
-        let of = |column: Column| state.get(column as usize).copied().unwrap_or_default().iter().copied();
-        let velocity = || of(Column::Vx).zip(of(Column::Vy)).zip(of(Column::Vz));
-        let attitude = || of(Column::Roll).zip(of(Column::Pitch));
-        match self {
-            Self::Time => out.extend((0..samples).map(time_s)),
-            Self::Height => out.extend(of(Column::Z).map(|z| -z)),
-            Self::Airspeed => out.extend(velocity().map(|((vx, vy), vz)| vx.hypot(vy).hypot(vz))),
-            Self::Alpha => out.extend(velocity().map(|((vx, _), vz)| vz.atan2(vx))),
-            Self::Beta => out.extend(velocity().map(|((vx, vy), vz)| vy.atan2(vx.hypot(vz)))),
-            Self::GravityX => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[0])),
-            Self::GravityY => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[1])),
-            Self::GravityZ => out.extend(attitude().map(|(roll, pitch)| gravity_body(roll, pitch)[2])),
-        }
+        let at = |sample: usize| self.at(|column| state[column as usize][sample], || time_s(sample));
+        out.extend((0..samples).map(at));
     }
 
     /// Columns it is made from.

@@ -51,7 +51,7 @@ pub(super) enum Memory {
 
 /// `1 - a` and `ramp` of a lag.
 #[inline]
-fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
+pub(super) fn lag_coefficients(tau_s: f64, step_s: f64) -> [f64; 2] {
     if tau_s <= 0.0 {
         return [1.0, 1.0];
     }
@@ -72,10 +72,15 @@ fn lag_slopes(tau_s: f64, step_s: f64) -> [[f64; 2]; 2] {
 }
 
 /// The latest samples of a signal, the newest at the back; before the first one it was at rest.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Past(Vec<f64>);
 
 impl Past {
+    /// With room for all that it ever keeps while samples come one at a time: taking them allocates nothing.
+    fn new(whole: usize) -> Self {
+        Self(Vec::with_capacity(2 * (whole + 1) + SPARE + 1))
+    }
+
     /// Takes the next samples; gives, for each of them, the ones that lie so far back, and those before these.
     fn delayed<'a>(&'a mut self, whole: usize, next: &'a [f64]) -> (&'a [f64], &'a [f64]) {
         let Self(samples) = self;
@@ -116,9 +121,9 @@ impl Memory {
                 Self::LagByTime { approach, ramp, slopes, last: None }
             }
             Recall::History(History::Delay) => {
-                Self::Delay { whole: whole as usize, part: number / step_s - whole, past: Past::default() }
+                Self::Delay { whole: whole as usize, part: number / step_s - whole, past: Past::new(whole as usize) }
             }
-            Recall::DelayByTime => Self::DelayByTime { whole: whole as usize, step_s, past: Past::default() },
+            Recall::DelayByTime => Self::DelayByTime { whole: whole as usize, step_s, past: Past::new(whole as usize) },
             Recall::History(History::Rate) => Self::Rate { step_s, last: None },
             Recall::History(History::Slew) => Self::Slew { limit: number * step_s, last: None },
             Recall::SlewTangent => Self::SlewTangent { limit: number * step_s, step_s, last: None },

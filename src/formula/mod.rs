@@ -18,6 +18,10 @@
 //! arguments of `delay` and `slew` are numbers or parameters, never columns; the time constant of a `lag` may vary from step to step, and where it
 //! is not above 0 nothing lags.
 
+#[cfg(feature = "files")]
+mod c_helpers;
+#[cfg(feature = "files")]
+pub(crate) mod c_text;
 mod derivative;
 mod graph;
 mod lanes;

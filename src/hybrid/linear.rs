@@ -68,8 +68,8 @@ impl LinearConfig {
         inputs::parse(&self.inputs).map(|_| ())
     }
 
-    /// Numbers that a prediction is a sum over, the constant included. At most [`MOST_FEATURES`] once checked.
-    fn features(&self) -> usize {
+    /// Numbers that a prediction is a sum over, the constant included. Few enough for its matrices once checked.
+    pub fn features(&self) -> usize {
         self.lags * self.inputs.len() + 1
     }
 }
@@ -184,20 +184,20 @@ impl Linear {
         }
     }
 
-    /// The six values at `sample`; `row(lag)` is the row of inputs so many samples ago.
-    pub fn predict<'a>(&self, row: impl Fn(usize) -> &'a [f64]) -> PerChannel<f64> {
+    /// The six values at a sample; `row(lag)` is the row of inputs so many samples ago. `values` holds [`LinearConfig::features`] numbers
+    /// to work on.
+    pub fn predict<'a>(&self, row: impl Fn(usize) -> &'a [f64], values: &mut [f64]) -> PerChannel<f64> {
         let features = self.config.features();
-        let mut values = vec![0.0; features];
-        self.features(row, &mut values);
+        self.features(row, values);
         PerChannel::from_fn(|channel| {
             let weights = &self.weights[channel.index() * features..][..features];
-            weights.iter().zip(&values).map(|(weight, value)| weight * value).sum()
+            weights.iter().zip(&*values).map(|(weight, value)| weight * value).sum()
         })
     }
 
     /// The six values at a sample of a flight. Before the flight's first row, its first row stands in.
     pub fn at(&self, signals: &Signals, sample: usize) -> PerChannel<f64> {
-        self.predict(|lag| signals.row(sample, lag))
+        self.predict(|lag| signals.row(sample, lag), &mut vec![0.0; self.config.features()])
     }
 
     /// What it sees.

@@ -17,7 +17,7 @@ use linear::Linear;
 pub use rollout::HybridRollout;
 pub use scaling::{Scale, Scaling};
 pub use stages::Stages;
-pub use stream::StreamingHybrid;
+pub use stream::{Streamed, StreamingHybrid};
 pub use target::{NetworkTarget, network_target};
 
 use crate::blocks::Blocks;
@@ -29,6 +29,7 @@ use crate::physics::Model;
 use crate::tape::{Parameter, Session, Threads};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 
 /// Windows predicted at a time: enough for every worker, few enough to keep memory small.
 const CHUNK: usize = 64;
@@ -125,9 +126,14 @@ impl Description {
         }
     }
 
+    /// Whether samples so many seconds apart are as far apart as those of the training data, but for the jitter of a log's clock.
+    pub fn is_trained_at(&self, step_s: f64) -> bool {
+        (step_s / self.step_s - 1.0).abs() <= STEP_TOLERANCE
+    }
+
     /// Refuses a flight sampled at another step than the training data.
     fn check_step(&self, flight: &Flight) -> Result<()> {
-        if (flight.step_s / self.step_s - 1.0).abs() <= STEP_TOLERANCE {
+        if self.is_trained_at(flight.step_s) {
             return Ok(());
         }
         Err(Error::Config {
@@ -290,7 +296,7 @@ impl Hybrid {
             };
             session.predict(chunk.len(), &fill, &mut |sample, output| {
                 let window = chunk[sample];
-                predicted.push(self.complete(sequences[window.flight].baseline(window.last), output));
+                predicted.push(self.complete(sequences[window.flight].baseline(window.last), self.learned(output)));
             })?;
         }
         for (window, values) in windows.iter().zip(&predicted) {
@@ -299,10 +305,9 @@ impl Hybrid {
         Ok(predicted)
     }
 
-    /// The network's last row, on top of the baseline where it is a residual.
-    fn complete(&self, baseline: PerChannel<f64>, output: &[f32]) -> PerChannel<f64> {
+    /// What the network says, on top of the baseline where it is a residual.
+    fn complete(&self, baseline: PerChannel<f64>, learned: PerChannel<f64>) -> PerChannel<f64> {
         let residual = self.description.config.predicts_residual();
-        let learned = self.learned(output);
         PerChannel::from_fn(|channel| if residual { baseline[channel] + learned[channel] } else { learned[channel] })
     }
 
@@ -318,7 +323,15 @@ impl Hybrid {
     ///
     /// # Errors
     /// As [`Model::stream`].
-    pub fn stream(&self) -> Result<StreamingHybrid<'_>> {
+    pub fn stream(&self) -> Result<StreamingHybrid<&Self>> {
+        StreamingHybrid::new(self)
+    }
+
+    /// As [`Hybrid::stream`], for a stream that outlives the place where it is made.
+    ///
+    /// # Errors
+    /// As [`Hybrid::stream`].
+    pub fn into_stream(self: Arc<Self>) -> Result<StreamingHybrid<Arc<Self>>> {
         StreamingHybrid::new(self)
     }
 }

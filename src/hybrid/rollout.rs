@@ -99,12 +99,13 @@ impl<'a> Added<'a> {
     fn filtered(&mut self, step: usize, inputs: &[Vec<f64>]) -> Option<Vec<PerChannel<f64>>> {
         let linear = self.linear?;
         let (count, lags) = (inputs.len(), linear.config().lags);
+        let mut features = vec![0.0; linear.config().features()];
         let one = |(lane, rows): (usize, &mut Vec<f64>)| {
             // The row of the start is there already, as it was measured.
             rows.truncate((lags - 1 + step) * count);
             rows.extend(inputs.iter().map(|input| input[lane]));
             let last = lags - 1 + step;
-            linear.predict(|lag| &rows[(last - lag) * count..][..count])
+            linear.predict(|lag| &rows[(last - lag) * count..][..count], &mut features)
         };
         Some(self.signals.iter_mut().enumerate().map(one).collect())
     }

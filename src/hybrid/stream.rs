@@ -1,4 +1,5 @@
-//! The hybrid in real time: one sample in, one prediction out, on the calling thread.
+//! The hybrid in real time: one sample in, one prediction out, on the calling thread. Once a stream is made, taking samples allocates
+//! nothing; only an error does, for its text.
 
 use super::Hybrid;
 use super::inputs;
@@ -8,11 +9,27 @@ use crate::flight::PerChannel;
 use crate::formula::{Formula, StreamingFormula};
 use crate::physics::{StreamingModel, quantity_at};
 use crate::tape::{Session, Threads};
-use std::collections::BTreeSet;
+use std::borrow::Borrow;
+use std::collections::{BTreeSet, VecDeque};
 
-/// A hybrid that takes samples in order, one step apart; it gives what [`Hybrid::predict`] gives on the same flight.
-pub struct StreamingHybrid<'a> {
-    hybrid: &'a Hybrid,
+/// A prediction part by part, m/s² and rad/s².
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Streamed {
+    /// The calibrated model alone, a^p: there from the first sample.
+    pub physics: PerChannel<f64>,
+    /// What the linear history says on top; zero where there is none.
+    pub linear: PerChannel<f64>,
+    /// What the network says, behind its gate; `None` until the history is full.
+    pub network: Option<PerChannel<f64>>,
+    /// The prediction: the sum of the three, or for a network that does not learn a residual what it says alone; `None` until the
+    /// history is full.
+    pub acceleration: Option<PerChannel<f64>>,
+}
+
+/// A hybrid that takes samples in order, one step apart; it gives what [`Hybrid::predict`] gives on the same flight. `H` is what holds the
+/// hybrid: a reference, or an `Arc` for a stream that goes where it likes.
+pub struct StreamingHybrid<H: Borrow<Hybrid>> {
+    hybrid: H,
     model: StreamingModel,
     linear: Option<StreamingLinear>,
     inputs: Vec<StreamingFormula>,
@@ -20,6 +37,7 @@ pub struct StreamingHybrid<'a> {
     /// The last H rows, scaled, oldest first.
     state: Vec<f32>,
     physics: Vec<f32>,
+    start_s: f64,
     samples: usize,
     values: Vec<f64>,
     /// Columns of the log's own that physics, linear history or network read.
@@ -58,39 +76,57 @@ fn own_names(formula: &Formula) -> Vec<String> {
     formula.names().into_iter().filter(is_own).map(str::to_owned).collect()
 }
 
-impl<'a> StreamingHybrid<'a> {
-    pub(super) fn new(hybrid: &'a Hybrid) -> Result<Self> {
+impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
+    pub(super) fn new(holder: H) -> Result<Self> {
+        let hybrid = holder.borrow();
         let description = hybrid.description();
         let formulas = inputs::parse(&description.inputs)?;
         let of_linear = description.linear.as_ref().map_or(Ok(Vec::new()), |linear| inputs::parse(&linear.config().inputs))?;
         let model = description.model.stream(description.step_s)?;
         let read = formulas.iter().chain(&of_linear).flat_map(own_names).chain(model.extra_inputs().iter().cloned());
         let own: Vec<String> = read.collect::<BTreeSet<String>>().into_iter().collect();
-        let of_model = model.extra_inputs().iter().filter_map(|name| own.binary_search(name).ok()).collect();
+        let of_model: Vec<usize> = model.extra_inputs().iter().filter_map(|name| own.binary_search(name).ok()).collect();
         let linear = description.linear.as_ref().map(|linear| StreamingLinear::new(&of_linear, linear, description.step_s));
         let history = description.config.history();
         let mut session = Session::infer(hybrid.network.graph(), &[hybrid.network.output()], Threads(1))?;
         session.load(&hybrid.parameters)?;
+        // A session asks for the memory of its results when it first predicts; here, not in flight.
+        session.predict(1, &|_, slabs| slabs.iter_mut().for_each(|slab| slab.fill(0.0)), &mut |_, _| ())?;
+        let most_names = formulas.iter().chain(&of_linear).map(|formula| formula.names().len()).max().unwrap_or(0);
         Ok(Self {
-            hybrid,
             model,
             linear: linear.transpose()?,
             inputs: formulas.iter().map(|formula| formula.stream(description.step_s)).collect::<Result<_>>()?,
             session,
             state: vec![0.0; history * description.inputs.len()],
             physics: vec![0.0; history * 6],
+            start_s: 0.0,
             samples: 0,
-            values: Vec::new(),
+            values: Vec::with_capacity(most_names),
+            model_values: Vec::with_capacity(of_model.len()),
             own,
             of_model,
-            model_values: Vec::new(),
+            hybrid: holder,
         })
+    }
+
+    /// Starts anew: the next sample is the first one, at time `start_s`, and the history is empty.
+    pub fn reset(&mut self, start_s: f64) {
+        self.model.reset(start_s);
+        self.linear.iter_mut().for_each(StreamingLinear::reset);
+        self.inputs.iter_mut().for_each(StreamingFormula::reset);
+        (self.start_s, self.samples) = (start_s, 0);
     }
 
     /// Names of the log's own columns (motor commands, rotor speeds) that the hybrid reads besides state and controls;
     /// [`StreamingHybrid::push_with`] takes them in this order, in the units of the log. Empty for most hybrids.
     pub fn own_columns(&self) -> &[String] {
         &self.own
+    }
+
+    /// Samples until the history is full and there is a prediction.
+    pub fn history(&self) -> usize {
+        self.hybrid.borrow().description().config.history()
     }
 
     /// Takes the next sample, in the order of [`crate::flight::Column::STATE`], and predicts its accelerations (m/s², rad/s²); `None` until the history is full.
@@ -106,27 +142,27 @@ impl<'a> StreamingHybrid<'a> {
     /// # Errors
     /// As [`StreamingHybrid::push`]; [`Error::Shape`] if their count differs.
     pub fn push_with(&mut self, state: &[f64; 16], own: &[f64]) -> Result<Option<PerChannel<f64>>> {
-        if own.len() != self.own.len() {
-            let message = format!("{} values for the log's own columns, which are {:?}", own.len(), self.own);
-            return Err(Error::Shape { operation: "streaming hybrid", message });
-        }
-        if let Some(place) = own.iter().position(|value| !value.is_finite()) {
-            let (name, value) = (&self.own[place], own[place]);
-            return Err(Error::Undetermined(format!("sample {}: `{name}` is {value}, not a finite number", self.samples)));
-        }
-        if let Some(index) = state.iter().position(|value| !value.is_finite()) {
-            let name = crate::flight::Column::STATE[index].name();
-            return Err(Error::Undetermined(format!("sample {}: `{name}` is {}, not a finite number", self.samples, state[index])));
-        }
-        let description = self.hybrid.description();
+        Ok(self.push_parts(state, own)?.acceleration)
+    }
+
+    /// As [`StreamingHybrid::push_with`], part by part; the physics is there from the first sample.
+    ///
+    /// # Errors
+    /// As [`StreamingHybrid::push_with`].
+    pub fn push_parts(&mut self, state: &[f64; 16], own: &[f64]) -> Result<Streamed> {
+        self.check(state, own)?;
+        let hybrid: &Hybrid = self.hybrid.borrow();
+        let description = hybrid.description();
         self.model_values.clear();
         self.model_values.extend(self.of_model.iter().map(|place| own[*place]));
-        let mut baseline = self.model.push_with(state, &self.model_values)?;
-        let sample = Sample { state, time_s: description.step_s * self.samples as f64, names: &self.own, own };
-        if let (Some(stream), Some(linear)) = (&mut self.linear, &description.linear) {
-            let filtered = stream.push(linear, &sample)?;
-            baseline.iter_mut().zip(filtered).for_each(|(sum, value)| *sum += value);
-        }
+        let physics = self.model.push_with(state, &self.model_values)?;
+        let time_s = self.start_s + description.step_s * self.samples as f64;
+        let sample = Sample { state, time_s, names: &self.own, own };
+        let linear = match (&mut self.linear, &description.linear) {
+            (Some(stream), Some(linear)) => stream.push(linear, &sample, &mut self.values)?,
+            _ => PerChannel::splat(0.0),
+        };
+        let baseline = PerChannel::from_fn(|channel| physics[channel] + linear[channel]);
         let channels = self.inputs.len();
         self.state.copy_within(channels.., 0);
         self.physics.copy_within(6.., 0);
@@ -140,47 +176,75 @@ impl<'a> StreamingHybrid<'a> {
         }
         self.samples += 1;
         if self.samples < rows {
-            return Ok(None);
+            return Ok(Streamed { physics, linear, network: None, acceleration: None });
         }
-        let (state, physics) = (&self.state, &self.physics);
+        let (state, physics_rows) = (&self.state, &self.physics);
         let fill = |_: usize, slabs: &mut [&mut [f32]]| {
             if let [state_slab, physics_slab, ..] = slabs {
                 state_slab.copy_from_slice(state);
-                physics_slab.copy_from_slice(physics);
+                physics_slab.copy_from_slice(physics_rows);
             }
         };
-        let mut predicted = PerChannel::splat(f64::NAN);
-        self.session.predict(1, &fill, &mut |_, output| predicted = self.hybrid.complete(baseline, output))?;
-        if predicted.iter().any(|value| !value.is_finite()) {
+        let mut network = PerChannel::splat(f64::NAN);
+        self.session.predict(1, &fill, &mut |_, output| network = hybrid.learned(output))?;
+        let acceleration = hybrid.complete(baseline, network);
+        if acceleration.iter().any(|value| !value.is_finite()) {
             return Err(Error::Undetermined(format!("sample {}: the prediction is not finite", self.samples - 1)));
         }
-        Ok(Some(predicted))
+        Ok(Streamed { physics, linear, network: Some(network), acceleration: Some(acceleration) })
+    }
+
+    /// Refuses what is no finite number, before anything is taken.
+    fn check(&self, state: &[f64; 16], own: &[f64]) -> Result<()> {
+        if own.len() != self.own.len() {
+            let message = format!("{} values for the log's own columns, which are {:?}", own.len(), self.own);
+            return Err(Error::Shape { operation: "streaming hybrid", message });
+        }
+        let refused = |name: &str, value: f64| {
+            Err(Error::Undetermined(format!("sample {}: `{name}` is {value}, not a finite number", self.samples)))
+        };
+        if let Some(place) = own.iter().position(|value| !value.is_finite()) {
+            return refused(&self.own[place], own[place]);
+        }
+        match state.iter().position(|value| !value.is_finite()) {
+            Some(index) => refused(crate::flight::Column::STATE[index].name(), state[index]),
+            None => Ok(()),
+        }
     }
 }
 
 /// The linear history's inputs and its last rows, newest first.
 struct StreamingLinear {
     inputs: Vec<StreamingFormula>,
-    rows: std::collections::VecDeque<Vec<f64>>,
-    lags: usize,
-    values: Vec<f64>,
+    /// As many as there are lags; those that are not filled yet are the last.
+    rows: VecDeque<Vec<f64>>,
+    filled: usize,
+    /// Numbers that the prediction is a sum over.
+    features: Vec<f64>,
 }
 
 impl StreamingLinear {
     fn new(formulas: &[Formula], linear: &Linear, step_s: f64) -> Result<Self> {
-        let inputs = formulas.iter().map(|formula| formula.stream(step_s)).collect::<Result<_>>()?;
-        Ok(Self { inputs, rows: std::collections::VecDeque::new(), lags: linear.config().lags, values: Vec::new() })
+        let inputs: Vec<StreamingFormula> = formulas.iter().map(|formula| formula.stream(step_s)).collect::<Result<_>>()?;
+        let rows = (0..linear.config().lags).map(|_| Vec::with_capacity(inputs.len())).collect();
+        Ok(Self { inputs, rows, filled: 0, features: vec![0.0; linear.config().features()] })
     }
 
-    fn push(&mut self, linear: &Linear, sample: &Sample) -> Result<PerChannel<f64>> {
-        let mut row = if self.rows.len() == self.lags { self.rows.pop_back().unwrap_or_default() } else { Vec::new() };
+    fn reset(&mut self) {
+        self.inputs.iter_mut().for_each(StreamingFormula::reset);
+        self.filled = 0;
+    }
+
+    fn push(&mut self, linear: &Linear, sample: &Sample, values: &mut Vec<f64>) -> Result<PerChannel<f64>> {
+        let mut row = self.rows.pop_back().expect("a linear history has a lag at least");
         row.clear();
         for formula in &mut self.inputs {
-            sample.read(formula, &mut self.values);
-            row.push(formula.push(&self.values)?);
+            sample.read(formula, values);
+            row.push(formula.push(values)?);
         }
         self.rows.push_front(row);
-        let last = self.rows.len() - 1;
-        Ok(linear.predict(|lag| &self.rows[lag.min(last)]))
+        self.filled = (self.filled + 1).min(self.rows.len());
+        let Self { rows, filled, features, .. } = self;
+        Ok(linear.predict(|lag| &rows[lag.min(*filled - 1)], features))
     }
 }

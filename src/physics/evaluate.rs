@@ -32,11 +32,7 @@ pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
     if let Some(column) = Column::STATE.iter().find(|column| column.name() == name) {
         return state.get(*column as usize).copied();
     }
-    let derived = Derived::from_name(name)?;
-    let columns = std::array::from_fn(|index| state.get(index..=index).unwrap_or_default());
-    let mut value = Vec::with_capacity(1);
-    derived.extend(&columns, &|_| time_s, 1, &mut value);
-    value.first().copied()
+    Some(Derived::from_name(name)?.at(|column| state[column as usize], || time_s))
 }
 
 /// A formula of standard quantities on a whole flight.
@@ -293,7 +289,7 @@ impl Model {
     }
 }
 
-/// A model that takes one sample at a time, for real-time use. Samples come in order, one step apart.
+/// A model that takes one sample at a time, for real-time use. Samples come in order, one step apart; taking one allocates nothing.
 #[derive(Clone, Debug)]
 pub struct StreamingModel {
     bound: Bound,
@@ -310,7 +306,9 @@ impl StreamingModel {
         let mut composer = Composer::new();
         let composed = composer.add(model, None, false)?;
         let bound = Bound::new(&composer, composed.channels.values(), step_s, None)?;
-        Ok(Self { bound, step_s, start_s: 0.0, samples: 0, values: Vec::new() })
+        // Pushing allocates nothing.
+        let values = Vec::with_capacity(bound.sources.len());
+        Ok(Self { bound, step_s, start_s: 0.0, samples: 0, values })
     }
 
     /// Names of the log's further columns that the model reads; [`StreamingModel::push_with`] takes them in this order. Empty
@@ -346,12 +344,11 @@ impl StreamingModel {
         }
         let time_s = self.start_s + self.step_s * self.samples as f64;
         self.samples += 1;
-        let columns: [&[f64]; 16] = std::array::from_fn(|index| &state[index..=index]);
         self.values.clear();
         for source in sources.iter() {
             match source {
                 Source::State(column) => self.values.push(state[*column as usize]),
-                Source::Derived(derived) => derived.extend(&columns, &|_| time_s, 1, &mut self.values),
+                Source::Derived(derived) => self.values.push(derived.at(|column| state[column as usize], || time_s)),
                 Source::Extra(index) => self.values.push(extra[*index]),
             }
         }

@@ -16,6 +16,8 @@ mod definition;
 mod effect;
 mod effect_check;
 mod evaluate;
+#[cfg(feature = "files")]
+mod export_c;
 mod implant;
 mod layout;
 mod least_squares;
@@ -42,6 +44,8 @@ pub use definition::{
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
 pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
+#[cfg(feature = "files")]
+pub use export_c::CFile;
 pub use implant::{implant, spread_over_flights, typical};
 pub use model::{Entry, Model, ModelData};
 pub use output_error::{OutputError, output_error};

@@ -1,4 +1,5 @@
 //! Made-up flights for the tests: smooth random columns with known numbers behind them, from a seed.
+#![allow(dead_code, reason = "each test program uses its part")]
 
 use phyture::flight::{Channel, Column, Flight, PerChannel, Targets};
 use phyture::{Error, Result};

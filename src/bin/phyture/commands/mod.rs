@@ -8,6 +8,7 @@ mod demo;
 mod diagnose;
 mod effect;
 mod explainable;
+mod export_c;
 mod formula;
 mod implant;
 mod init;
@@ -64,6 +65,7 @@ pub enum Command {
     Effect(effect::Args),
     Implant(implant::Args),
     Benchmark(benchmark::Args),
+    ExportC(export_c::Args),
     Formula(formula::Args),
     Completions(manual::CompletionsArgs),
     Man(manual::Args),
@@ -96,6 +98,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Command::Effect(args) => effect::run(&context, args),
         Command::Implant(args) => implant::run(&context, args),
         Command::Benchmark(args) => benchmark::run(&context, args),
+        Command::ExportC(args) => export_c::run(&context, args),
         Command::Formula(args) => formula::run(&context, args),
         Command::Completions(args) => Ok(manual::completions(args, Arguments::command())),
         Command::Man(args) => manual::run(&context, args, Arguments::command()),
