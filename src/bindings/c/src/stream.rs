@@ -100,7 +100,7 @@ impl Streaming {
 impl PhytureStream {
     fn new(loaded: &Loaded, step_s: f64) -> Result<Self> {
         let streaming = Streaming::new(loaded, step_s)?;
-        // Names of formulas are letters, digits and underscores.
+        // Names are those of columns, in which nothing but a zero byte has no place in C.
         let own = streaming.own_columns().iter().map(|name| CString::new(name.as_str()).unwrap_or_default()).collect();
         Ok(Self { streaming, own, message: [MaybeUninit::new(0); MESSAGE], broken: false })
     }
