@@ -2,11 +2,11 @@
 """Many effects missing at once: simulates, runs `phyture loop`, and prints the rows of the table "Tested with much missing at once" of docs/results.md.
 
     cargo build --release --features cli
-    python3 benches/many_effects.py target/release/phyture OUT [SEED...]
+    python3 benches/many_effects.py target/release/phyture OUT [--formulas] [SEED...]
 
 A row for each seed, or for all that are reported: of 72000 to 72002 all mechanisms of the simulator are missing in 30 minutes, of 72010 in 7376 s, of 74400 to 74401
 three of random size, of 74700 to 74701 six, of 75300 to 75301 twelve. A seed with `=N` behind it is a development run of N effects, 0 being all.
-What is there already in OUT is not run again. Nothing is timed that other work on the machine does not slow down.
+`--formulas` goes on to the loop, whose formulas are counted apart. What is there already in OUT is not run again. Nothing is timed that other work on the machine does not slow down.
 """
 
 import json
@@ -50,7 +50,7 @@ def run(command):
     return usage.ru_maxrss / 1000, time.monotonic() - start
 
 
-def case(binary, folder, seed, count):
+def case(binary, folder, seed, count, options):
     """The result of a seed, from its file if it is there."""
     kept = folder / f"{seed}.json"
     if kept.exists():
@@ -62,7 +62,7 @@ def case(binary, folder, seed, count):
     level = ["--level", "2"] if count > 0 else []
     run([binary, "simulate", flights, "--explainable", floor, "--seed", seed, "--force", "--quiet", *size, *hidden, *level])
     answer = folder / f"{seed}-loop.json"
-    loop = [binary, "loop", flights, "-m", flights / "model.toml", "-o", amended, "--explainable", floor]
+    loop = [binary, "loop", flights, "-m", flights / "model.toml", "-o", amended, "--explainable", floor, *options]
     memory, seconds = run([*loop, "--json", answer, "--force", "--quiet"])
     result = {"truth": scales, "memory_mb": memory, "seconds": seconds, **json.loads(answer.read_text())["together"]}
     kept.write_text(json.dumps(result))
@@ -71,7 +71,8 @@ def case(binary, folder, seed, count):
 
 def row(seed, count, result):
     """The row of the table."""
-    truth, named = set(result["truth"]), set(result["accepted"])
+    formulas = {effect for effect in result["accepted"] if effect.startswith("suggested_")}
+    truth, named = set(result["truth"]), set(result["accepted"]) - formulas
     rises = {entry["effect"]: max(entry["rise"].values()) for entry in result["worth"]}
     left = {entry["effect"]: max([*entry["held_out_mse_fall"].values(), 0.0]) for entry in result["candidates"] if entry["status"] != "accepted"}
     worth = {effect for effect in truth & named if rises.get(effect, 0.0) >= WORTH}
@@ -83,20 +84,21 @@ def row(seed, count, result):
     false = ", ".join(f"`{effect}`" for effect in sorted(named - truth)) or "0"
     return (
         f"| {what} | {seed} | {len(truth & named)} of {len(truth)} | {false} | {len(worth)} of {len(worth | missed)} | {shown} "
-        f"| {100 * removed['mean']:.0f} | {bars} | {result['memory_mb']:.0f} MB | {result['seconds']:.0f} s |"
+        f"| {100 * removed['mean']:.0f} | {bars} | {', '.join(sorted(formulas)) or 0} | {result['memory_mb']:.0f} MB | {result['seconds']:.0f} s |"
     )
 
 
 def main():
     binary, folder, *chosen = sys.argv[1:]
+    options = [word for word in chosen if word == "--formulas"]
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    pairs = [word.split("=") for word in chosen]
+    pairs = [word.split("=") for word in chosen if word not in options]
     asked = {int(seed): int(count[0]) if count else REPORTED[int(seed)] for seed, *count in pairs} or REPORTED
-    print("| missing | seed | named, right | not in the truth | of those worth 2 % | removable: vx vy vz wx wy wz, % | mean | bars that rise | memory | time |")
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    print("| missing | seed | named, right | not in the truth | of those worth 2 % | removable: vx vy vz wx wy wz, % | mean | bars that rise | formulas | memory | time |")
+    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     for seed, count in asked.items():
-        print(row(seed, count, case(binary, folder, seed, count)), flush=True)
+        print(row(seed, count, case(binary, folder, seed, count, options)), flush=True)
 
 
 if __name__ == "__main__":

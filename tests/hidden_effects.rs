@@ -12,7 +12,7 @@ mod cases;
 
 use cases::SINGLES;
 use phyture::Result;
-use phyture::critique::diagnose::{Diagnosis, Options, Verdict, diagnose};
+use phyture::critique::diagnose::{Diagnosis, Options, Verdict, amend, calibrated, diagnose, together};
 use phyture::critique::floor_of_spans;
 use phyture::flight::split::Split;
 use phyture::flight::{Column, Flight};
@@ -185,5 +185,28 @@ fn an_effect_outside_the_catalogue_gets_no_name_but_its_variable() -> Result<()>
         let first = unknown.and_then(|unknown| unknown.depends_on.first()).map(|on| on.variable.as_str());
         assert_eq!(first, Some(variable), "{diagnosis}");
     }
+    Ok(())
+}
+
+/// The main rotor's wake sweeps over the tail at 7 m/s against the air, 4 rad/s² within 2 m/s, in a wind that blurs it over ground: no effect of the
+/// catalogue, but a loop that may add formulas finds where it is, and removes most of what it did.
+#[test]
+fn a_bump_against_the_air_is_added_as_a_formula() -> Result<()> {
+    let (set, explainable) = simulate_with_explainable(&simulation(20.0, &["tail_wake"], Level::TWO, 1194)?)?;
+    let split = Split::for_search(&set.flights, 1194);
+    let model = Model::paper("sim", MASS_KG, INERTIA_KG_M2, ROTOR_RADIUS_M);
+    let before = calibrated(&model, &set.flights, &split)?;
+    let options = Options { seed: 1194, formulas: true, ..Options::default() };
+    let amended = amend(&set.flights, &model, &split, &options, &mut |_, _| Ok(()))?;
+    let mut whole = together(&set.flights, &before, &amended, &split)?;
+    assert_eq!(whole.accepted, ["wind", "suggested_wy_dot"], "{whole}");
+    let added = amended.model.effect("suggested_wy_dot").expect("it was accepted");
+    let formula = added.terms[0].regressor.to_string();
+    assert!(added.enabled && formula.starts_with("exp(") && formula.contains("air_vx"), "{formula}");
+    assert!(added.coefficients[0].value > 2.0, "{added}");
+    let locked = whole.locked.as_mut().expect("a part is kept");
+    locked.set_floor(floor_of_spans(&set.flights, &locked.spans, &explainable.flights)?);
+    let removed = locked.removable_removed.as_ref().expect("a floor was set");
+    assert!(removed.wy_dot.is_some_and(|share| share > 0.7), "{removed:?}");
     Ok(())
 }

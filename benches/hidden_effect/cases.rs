@@ -137,5 +137,7 @@ pub const ALIENS: &[(&str, &str, &str)] = &[
 ];
 
 /// Mechanisms of the simulator that no entry of the catalogue describes, and the variables either of which is right.
-pub const FOREIGN: &[(&str, &[&str])] =
-    &[("tail_wake", &["vx", "airspeed", "hypot(vx, vy)"]), ("fuselage_wake", &["u4", "vx", "vy", "vz", "airspeed"])];
+pub const FOREIGN: &[(&str, &[&str])] = &[
+    ("tail_wake", &["vx", "air_vx", "airspeed", "hypot(vx, vy)", "hypot(air_vx, air_vy)"]),
+    ("fuselage_wake", &["u4", "vx", "vy", "vz", "air_vx", "air_vy", "air_vz", "airspeed"]),
+];

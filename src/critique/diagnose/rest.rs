@@ -19,7 +19,7 @@ pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], blo
         }
         Ok(residual)
     };
-    // What blows on the aircraft is the air: beside a wind, velocities over ground blur a dependence on them.
+    // What blows on the aircraft is the air: in a wind, velocities over ground blur a dependence on it.
     let air = |flight: usize| flights.get(flight).map_or(Ok(None), |flight| model.air_velocity(flight));
     let table = ResidualTable::against_air(flights, spans, &residual, &air, block_s)?;
     match unknown(&table, &UnknownOptions { seed, ..UnknownOptions::default() }) {

@@ -20,7 +20,7 @@ pub type AirOf<'a> = &'a dyn Fn(usize) -> Result<Option<[Vec<f64>; 3]>>;
 /// Residuals and what was measured with them, one row a short stretch.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualTable {
-    /// Features, as formulas (`vx` or, where the wind is known, `air_vx`; `hypot(vx, vy)`, `sin(yaw)`, `lag(u4, 0.1)`); `time_in_flight` is none.
+    /// Features, as formulas (`vx`, where the wind is known `air_vx`, too; `hypot(vx, vy)`, `sin(yaw)`, `lag(u4, 0.1)`); `time_in_flight` is none.
     pub names: Vec<String>,
     /// SI units of the features.
     pub units: Vec<String>,
@@ -47,20 +47,19 @@ struct Candidate {
     reads: &'static [Column],
 }
 
-/// All features in the order of [`ResidualTable::names`], except time. Velocities are those against the air where that is known.
+/// All features in the order of [`ResidualTable::names`], except time; velocities against the air only where they are known.
 fn candidates(air: bool) -> Vec<Candidate> {
     use Column::{Pitch, Roll, U1, U2, U3, U4, Vx, Vy, Vz, Wx, Wy, Wz, Yaw, Z};
     const PLAIN: [&[Column]; 12] = [&[Vx], &[Vy], &[Vz], &[Wx], &[Wy], &[Wz], &[U1], &[U2], &[U3], &[U4], &[Roll], &[Pitch]];
     let plain = PLAIN.into_iter().filter_map(|reads| {
         let column = reads.first()?;
-        let name = if air && matches!(column, Vx | Vy | Vz) { format!("air_{}", column.name()) } else { column.name().into() };
-        Some(Candidate { name, unit: column.unit(), reads })
+        Some(Candidate { name: column.name().into(), unit: column.unit(), reads })
     });
     let made = |name: &str, unit, reads| Candidate { name: name.into(), unit, reads };
     let further = [
         made("height", "m", &[Z][..]),
         made("airspeed", "m/s", &[Vx, Vy, Vz]),
-        made(if air { "hypot(air_vx, air_vy)" } else { "hypot(vx, vy)" }, "m/s", &[Vx, Vy]),
+        made("hypot(vx, vy)", "m/s", &[Vx, Vy]),
         made("sin(yaw)", "1", &[Yaw]),
         made("cos(yaw)", "1", &[Yaw]),
     ];
@@ -69,7 +68,8 @@ fn candidates(air: bool) -> Vec<Candidate> {
         let stick = reads.first().map_or("", |column| column.name());
         ["0.1", "0.4"].map(|tau_s| Candidate { name: format!("lag({stick}, {tau_s})"), unit: "1", reads })
     });
-    plain.chain(further).chain(lagged).collect()
+    let of_air = ["air_vx", "air_vy", "air_vz", "hypot(air_vx, air_vy)"].map(|name| made(name, "m/s", &[Vx, Vy, Vz]));
+    plain.chain(further).chain(lagged).chain(of_air.into_iter().filter(|_| air)).collect()
 }
 
 impl ResidualTable {
@@ -93,7 +93,8 @@ impl ResidualTable {
         Self::with_rows(flights, spans, residuals, block_s, rows_max, ROW_S)
     }
 
-    /// As [`ResidualTable::new`], with velocity against the air in the place of that over ground in all flights if `air` gives it for any.
+    /// As [`ResidualTable::new`], with velocities against the air beside those over ground if `air` gives them for any flight; `airspeed` is then
+    /// theirs, as in formulas of a model with wind.
     ///
     /// # Errors
     /// As [`ResidualTable::new`], and whatever `air` gives.
