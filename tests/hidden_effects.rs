@@ -4,7 +4,7 @@
 //! Seeds 31 to 39 and from 1100 on; the search is deterministic, so a count that holds here holds on every run. What chance has a part
 //! in is counted all the same, so that a harmless change of the simulator or of the search does not hang on one data set: the
 //! reasoning stands at each count.
-#![cfg(feature = "sim")]
+#![cfg(all(feature = "files", feature = "sim"))]
 
 #[allow(dead_code, reason = "the benchmark uses the rest")]
 #[path = "../benches/hidden_effect/cases.rs"]
@@ -204,6 +204,8 @@ fn a_bump_against_the_air_is_added_as_a_formula() -> Result<()> {
     let formula = added.terms[0].regressor.to_string();
     assert!(added.enabled && formula.starts_with("exp(") && formula.contains("air_vx"), "{formula}");
     assert!(added.coefficients[0].value > 2.0, "{added}");
+    let written = Model::from_toml(&amended.model.to_toml()?, "amended.toml".as_ref())?;
+    assert_eq!(written.effect("suggested_wy_dot").map(ToString::to_string), Some(added.to_string()), "a model file holds it");
     let locked = whole.locked.as_mut().expect("a part is kept");
     locked.set_floor(floor_of_spans(&set.flights, &locked.spans, &explainable.flights)?);
     let removed = locked.removable_removed.as_ref().expect("a floor was set");

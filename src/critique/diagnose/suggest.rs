@@ -45,8 +45,7 @@ pub(super) fn standing(unknown: &[UnknownChannel], model: &Model) -> Result<Vec<
         let numbered = (2..).map(|number| format!("{plain}_{number}"));
         let free = std::iter::once(plain.clone()).chain(numbered).find(|name| model.effect(name).is_none())?;
         let made = Effect::formula(free, channel, formula, coefficient);
-        let meaning = format!("no physics with a name: {}, which the rest of the error suggested", unknown.shape);
-        Some(made.map(|effect| Effect { enabled: false, added_by: Some(FOUND.into()), meaning, ..effect }))
+        Some(made.map(|effect| Effect { enabled: false, added_by: Some(FOUND.into()), ..effect }))
     };
     unknown.iter().filter_map(effect).collect()
 }
