@@ -4,34 +4,15 @@
 //!
 //! A file of its own, because the allocator counts for the whole program.
 
+mod counting;
+
+use counting::REQUESTS;
 use phyture::Result;
 use phyture::nn::peers::InformerConfig;
 use phyture::nn::{Architecture, Network, OutputScale, PhyTureConfig};
 use phyture::tape::{DropoutKey, Session, Threads};
 use phyture_kernels::adam::Adam;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-static REQUESTS: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-// SAFETY: every call is passed on to the system's allocator unchanged; counting touches no memory of theirs.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        REQUESTS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`, which is the system allocator's.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from `alloc` above, so from the system's allocator, with this layout.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use std::sync::atomic::Ordering;
 
 /// Steps in a row that have to be without a request.
 const QUIET: usize = 8;

@@ -80,6 +80,20 @@ pub(super) fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).trim().to_owned()
 }
 
+/// Reads a log cut off at every place. Every error has its place; how often there is none, since a message has just ended.
+#[cfg(test)]
+pub(super) fn ends_between_messages<T>(log: &[u8], read: impl Fn(&[u8]) -> Result<T>) -> usize {
+    let ends = |length: &usize| match read(&log[..*length]) {
+        Ok(_) => true,
+        Err(Error::Log { found, .. }) => {
+            assert!(found.contains("at byte") || found.contains("does not begin"), "{length}: {found}");
+            false
+        }
+        Err(other) => panic!("{length}: {other}"),
+    };
+    (0..log.len()).filter(ends).count()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

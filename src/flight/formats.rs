@@ -3,11 +3,13 @@
 //! Listing, messages and reading ask this list. What a file holds is the business of the format's own file.
 
 use super::assemble::{Assembled, Cuts, assemble};
+use super::join::{Joined, Stream, Turn, join};
 use super::listing::Log;
 use super::schema::Schema;
+use super::source::Read;
 use super::table::{RawTable, fault};
 use super::{Description, stanford, table};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use std::path::Path;
 
 /// Where a log of a format lies.
@@ -21,10 +23,15 @@ pub(super) enum Place {
 /// What reads those columns of a table that are wanted.
 pub(super) type ReadTable = fn(&Path, &dyn Fn(&str) -> bool) -> Result<RawTable>;
 
+/// What finds the streams of a binary log that a description names, and says what of it is damaged.
+pub(super) type ParseStreams = fn(&Path, &[u8], &Schema) -> Result<(Vec<Stream>, Option<String>)>;
+
 /// What reads a log.
 pub(super) enum Reader {
     /// This function, of a log that is one table.
     Table(ReadTable),
+    /// The streams that this function finds, joined on one clock; attitudes among them, by the name of the stream.
+    Streams { parse: ParseStreams, turns: &'static [(&'static str, Turn)] },
     /// This function.
     Of(fn(&Log, &Schema, Cuts) -> Result<Assembled>),
     /// Nothing, as the program was built without this feature.
@@ -69,6 +76,16 @@ impl Format {
             Reader::Table(read) => {
                 let table = read(&log.path, &|name| schema.wants(name))?;
                 assemble(table, &log.name, &log.manoeuvre, schema, cuts)
+            }
+            Reader::Streams { parse, turns } => {
+                let bytes = std::fs::read(&log.path).map_err(Error::io(&log.path))?;
+                let (streams, damage) = parse(&log.path, &bytes, schema)?;
+                let read = Read::of(&log.path, &bytes);
+                let Joined { table, note } = join(&log.path, streams, turns, schema, cuts.split_at_gaps, read)?;
+                let joined = Schema { resample_hz: None, ..schema.clone() };
+                let mut done = assemble(table, &log.name, &log.manoeuvre, &joined, cuts)?;
+                done.own_notes.extend([Some(note), damage].into_iter().flatten().map(|note| format!("`{}`: {note}", log.name)));
+                Ok(done)
             }
             Reader::Of(read) => read(log, schema, cuts),
             #[cfg(not(feature = "parquet"))]

@@ -30,6 +30,8 @@ mod hypotheses;
 #[cfg(feature = "files")]
 mod join;
 #[cfg(feature = "files")]
+mod keys;
+#[cfg(feature = "files")]
 mod late;
 #[cfg(feature = "files")]
 mod listing;

@@ -36,8 +36,8 @@ pub struct ReadOptions {
 const LARGEST_HELD: usize = 256 << 20;
 
 /// Reads a data set. `path` is a folder `DATA/<manoeuvre>/<flight>.csv`, a folder of logs (one class, named after it), a single
-/// log, or a folder in the Stanford layout (one folder a flight, or class folders of these). Parquet, PX4 and ArduPilot logs are read
-/// beside CSV with the features `parquet`, `ulog` and `dataflash`. A `dataset.toml` in the folder, or else in the one above it, describes logs that differ from the
+/// log, or a folder in the Stanford layout (one folder a flight, or class folders of these). PX4 and ArduPilot logs are read beside
+/// CSV, and Parquet with the feature `parquet`. A `dataset.toml` in the folder, or else in the one above it, describes logs that differ from the
 /// canonical form.
 ///
 /// # Errors

@@ -35,8 +35,10 @@ pub(super) struct Composed {
     pub channels: PerChannel<Node>,
     /// The numbers with their symbols.
     pub numbers: Vec<(Free, Node)>,
-    /// Velocity against the air, where some effect makes it another than that over ground.
-    pub air: Option<[Node; 3]>,
+    /// Velocity against the air.
+    pub air: [Node; 3],
+    /// Whether some effect makes it another than that over ground.
+    pub feels_wind: bool,
 }
 
 /// Puts models into one graph, in which what they share is one.
@@ -80,7 +82,7 @@ impl Composer {
         let numbers = std::mem::take(&mut chain.numbers).into_iter().collect();
         let channels = PerChannel::from_fn(|channel| sum(&mut self.graph, &summands, channel));
         let ground = ["vx", "vy", "vz"].map(|name| self.graph.input(name));
-        Ok(Composed { summands, channels, numbers, air: (air != ground).then_some(air) })
+        Ok(Composed { summands, channels, numbers, air, feels_wind: air != ground })
     }
 
     /// The symbol of a number; one for each value that it has among the models.

@@ -236,19 +236,26 @@ impl Model {
         predict(self, flight)
     }
 
-    /// Velocity against the air along the body axes, as the model's effects (wind) make it of that over ground, m/s; `None` where none does.
+    /// Whether an effect (wind) makes the velocity against the air another than that over ground.
+    ///
+    /// # Errors
+    /// As [`Model::predict`], where it does not depend on a flight.
+    pub fn feels_wind(&self) -> Result<bool> {
+        Ok(Composer::new().add(self, None, false)?.feels_wind)
+    }
+
+    /// Velocity against the air along the body axes, as the model's effects make it of that over ground, m/s.
     ///
     /// # Errors
     /// As [`Model::predict`].
-    pub fn air_velocity(&self, flight: &Flight) -> Result<Option<[Vec<f64>; 3]>> {
+    pub fn air_velocity(&self, flight: &Flight) -> Result<[Vec<f64>; 3]> {
         let (composer, composed) = composed_for(self, flight)?;
-        let Some(nodes) = composed.air else { return Ok(None) };
         let mut velocity = [(); 3].map(|()| Vec::with_capacity(flight.len()));
-        Bound::new(&composer, &nodes, flight.step_s, Some(flight))?.run(flight, flight.len(), &mut |_, block| {
+        Bound::new(&composer, &composed.air, flight.step_s, Some(flight))?.run(flight, flight.len(), &mut |_, block| {
             velocity.iter_mut().enumerate().for_each(|(axis, values)| values.extend_from_slice(block.column(axis)));
             Ok(())
         })?;
-        Ok(Some(velocity))
+        Ok(velocity)
     }
 
     /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.

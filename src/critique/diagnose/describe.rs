@@ -1,6 +1,6 @@
 //! From what a search found to what is said of it. No measuring here.
 
-use super::candidate::Candidate;
+use super::candidate::{Candidate, is_found};
 use super::engine::Trial;
 use super::found::Found;
 use super::gates::SMALLEST_FALL;
@@ -12,7 +12,7 @@ use super::scored::Scored;
 use super::search::Search;
 use super::sentences;
 use crate::flight::{Channel, Column, PerChannel};
-use crate::physics::{Coefficient, Definition, Effect, Parameter, catalogue};
+use crate::physics::{Coefficient, Definition, Effect, FORMULA_KIND, Parameter, catalogue};
 use std::collections::BTreeMap;
 
 impl Search<'_> {
@@ -159,7 +159,7 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
     let worthy = falls.iter().filter(|(_, fall)| **fall >= SMALLEST_FALL);
     Step {
         effect: effect.name.clone(),
-        meaning: effect.meaning.clone(),
+        meaning: if effect.kind == FORMULA_KIND && is_found(effect) { sentences::SUGGESTED.into() } else { effect.meaning.clone() },
         channels: worthy.map(|(&channel, _)| channel.name().to_owned()).collect(),
         held_out_mse_fall: falls.iter().map(|(&channel, &fall)| (channel.name().to_owned(), fall)).collect(),
         coefficients: effect.coefficients.iter().map(number).collect(),

@@ -4,7 +4,7 @@
 //! worth while, the rest depends on a variable that the effect reads, and more of the error depends so than the effect removed.
 
 use super::report::{DependsOn, TriedFormula, UnknownChannel};
-use crate::critique::unknown::{ResidualTable, Unknown, UnknownOptions, unknown};
+use crate::critique::unknown::{ROWS_MAX, ResidualTable, Unknown, UnknownOptions, unknown};
 use crate::error::Result;
 use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel, Span};
 use crate::physics::{Effect, Model};
@@ -19,9 +19,13 @@ pub(super) fn dependences(flights: &[Flight], model: &Model, spans: &[Span], blo
         }
         Ok(residual)
     };
-    // What blows on the aircraft is the air: in a wind, velocities over ground blur a dependence on it.
-    let air = |flight: usize| flights.get(flight).map_or(Ok(None), |flight| model.air_velocity(flight));
-    let table = ResidualTable::against_air(flights, spans, &residual, &air, block_s)?;
+    let table = if model.feels_wind()? {
+        // What blows on the aircraft is the air: in a wind, velocities over ground blur a dependence on it.
+        let air = |flight: usize| model.air_velocity(&flights[flight]);
+        ResidualTable::against_air(flights, spans, &residual, &air, block_s)?
+    } else {
+        ResidualTable::new(flights, spans, &residual, block_s, ROWS_MAX)?
+    };
     match unknown(&table, &UnknownOptions { seed, ..UnknownOptions::default() }) {
         Err(crate::Error::Undetermined(_)) => Ok(Vec::new()),
         found => Ok(found?.into_iter().filter(|unknown| unknown.r2 >= least(unknown)).collect()),

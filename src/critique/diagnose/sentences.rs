@@ -193,6 +193,9 @@ pub fn effects(diagnosis: &Diagnosis, confirmation: Confirmation) -> String {
     }
 }
 
+/// What a suggested formula is, in the place of an effect's meaning.
+pub const SUGGESTED: &str = "no physics with a name: a formula that the rest of the error suggested";
+
 /// What could be wrong with the log in the place of an effect.
 pub fn or_the_log(fault: &str) -> String {
     format!("or a fault of the log: {fault}")

@@ -14,8 +14,8 @@ const LEAD_S: f64 = 0.03;
 /// Most rows, if the caller has no other wish.
 pub const ROWS_MAX: usize = 24_000;
 
-/// Velocity of a flight against the air along the body axes, m/s, where it is known to be another than that over ground.
-pub type AirOf<'a> = &'a dyn Fn(usize) -> Result<Option<[Vec<f64>; 3]>>;
+/// Gives a flight's velocity against the air along the body axes, m/s.
+pub type AirOf<'a> = &'a dyn Fn(usize) -> Result<[Vec<f64>; 3]>;
 
 /// Residuals and what was measured with them, one row a short stretch.
 #[derive(Clone, Debug, Default)]
@@ -93,8 +93,8 @@ impl ResidualTable {
         Self::with_rows(flights, spans, residuals, block_s, rows_max, ROW_S)
     }
 
-    /// As [`ResidualTable::new`], with velocities against the air beside those over ground if `air` gives them for any flight; `airspeed` is then
-    /// theirs, as in formulas of a model with wind.
+    /// As [`ResidualTable::new`], with velocities against the air beside those over ground; `airspeed` is theirs, as in formulas of a model with
+    /// wind.
     ///
     /// # Errors
     /// As [`ResidualTable::new`], and whatever `air` gives.
@@ -142,11 +142,7 @@ impl ResidualTable {
         let used = |flight: &usize| spans.iter().any(|span| span.flight == *flight);
         let of_spans: Vec<usize> = (0..flights.len()).filter(used).collect();
         let absent = |column: &Column| of_spans.iter().any(|flight| flights[*flight].absent.contains(column));
-        let mut against_air = false;
-        for &flight in &of_spans {
-            against_air = against_air || air.map_or(Ok(None), |air| air(flight))?.is_some();
-        }
-        let mut candidates = candidates(against_air);
+        let mut candidates = candidates(air.is_some());
         candidates.retain(|candidate| !candidate.reads.iter().any(absent));
         let mut table = Self::default();
         table.features.resize(candidates.len() + 1, Vec::new());
@@ -158,7 +154,7 @@ impl ResidualTable {
             if let Some(bad) = residual.iter().find(|column| column.len() != flight.len()) {
                 return Err(shape(format!("{} residuals for {} samples of `{}`", bad.len(), flight.len(), flight.name)));
             }
-            let known = if against_air { Some(air_or_ground(flight, air.map_or(Ok(None), |air| air(index))?)) } else { None };
+            let known = air.map(|air| air(index)).transpose()?;
             let columns: Vec<Vec<f64>> =
                 candidates.iter().map(|candidate| column(flight, &candidate.name, known.as_ref())).collect::<Result<_>>()?;
             let samples = (row_s / flight.step_s - 1e-9).ceil().max(1.0) as usize;
@@ -231,11 +227,6 @@ impl ResidualTable {
     pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
         super::runs(&self.block)
     }
-}
-
-/// Velocity against the air; that over ground in a flight without wind.
-fn air_or_ground(flight: &Flight, air: Option<[Vec<f64>; 3]>) -> [Vec<f64>; 3] {
-    air.unwrap_or_else(|| [Column::Vx, Column::Vy, Column::Vz].map(|column| flight.column(column).to_vec()))
 }
 
 /// A feature of a whole flight, whose velocity against the air may be known.

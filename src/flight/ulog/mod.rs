@@ -7,12 +7,10 @@
 
 mod format;
 
-use super::assemble::assemble;
 use super::bytes::{Bytes, text, unsigned};
 use super::formats::{Format, Place, Reader};
-use super::join::{Joined, Stream, Turn, join};
+use super::join::{Stream, Turn};
 use super::schema::{Damaged, Schema};
-use super::source::Read;
 use crate::error::{Error, Result};
 use format::{Formats, Leaf};
 use std::collections::{BTreeMap, HashMap};
@@ -23,16 +21,7 @@ pub(super) const ULOG: Format = Format {
     kind: "a PX4 log",
     place: Place::File("ulg"),
     description: Some(include_str!("description.toml")),
-    reader: Reader::Of(|log, schema, cuts| {
-        let bytes = std::fs::read(&log.path).map_err(Error::io(&log.path))?;
-        let (streams, damage) = streams(&log.path, &bytes, schema)?;
-        let read = Read::of(&log.path, &bytes);
-        let Joined { table, note } = join(&log.path, streams, TURNS, schema, cuts.split_at_gaps, read)?;
-        let joined = Schema { resample_hz: None, ..schema.clone() };
-        let mut done = assemble(table, &log.name, &log.manoeuvre, &joined, cuts)?;
-        done.own_notes.extend([Some(note), damage].into_iter().flatten().map(|note| format!("`{}`: {note}", log.name)));
-        Ok(done)
-    }),
+    reader: Reader::Streams { parse: streams, turns: TURNS },
 };
 
 /// What turns in these topics.

@@ -1,3 +1,4 @@
+use super::super::bytes::ends_between_messages;
 use super::*;
 use proptest::prelude::*;
 
@@ -61,18 +62,7 @@ fn topics_and_their_instances_are_streams() -> Result<()> {
 #[test]
 fn every_truncation_is_an_error_with_its_place_or_stops_there() -> Result<()> {
     let whole = log();
-    let mut ends = 0;
-    for length in 0..whole.len() {
-        match read(&whole[..length], "") {
-            Ok(_) => ends += 1,
-            Err(Error::Log { found, .. }) => {
-                assert!(length < HEADER || found.contains("at byte") || found.contains("does not begin"), "{length}: {found}");
-            }
-            Err(other) => panic!("{length}: {other}"),
-        }
-    }
-    // Between two messages a file may end.
-    assert_eq!(ends, 25 - 1);
+    assert_eq!(ends_between_messages(&whole, |cut| read(cut, "")), 25 - 1);
     let (streams, damage) = read(&whole[..whole.len() - 1], "damaged = \"stop\"")?;
     assert_eq!(streams[0].time_s.len() + streams[1].time_s.len(), 19);
     assert!(damage.is_some_and(|note| note.contains("at byte")));

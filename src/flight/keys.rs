@@ -1,0 +1,133 @@
+//! The keys of a TOML table, taken one by one: of the right kind, or an error that names the key. Which keys there are is `schema`'s.
+
+use super::{Column, units};
+use crate::error::{Error, Result};
+use crate::suggest::did_you_mean;
+use std::collections::BTreeMap;
+use toml::{Table, Value};
+
+/// Largest time by which a stream can be late or early, s.
+const LATEST_S: f64 = 1.0;
+
+/// A TOML table whose keys are taken one by one; what is left at the end is unknown.
+pub(super) struct Keys {
+    /// What errors name as the place.
+    pub place: String,
+    prefix: &'static str,
+    table: Table,
+    known: Vec<&'static str>,
+}
+
+impl Keys {
+    pub fn new(place: &str, prefix: &'static str, table: Table) -> Self {
+        Self { place: place.into(), prefix, table, known: Vec::new() }
+    }
+
+    pub fn fault(&self, key: &str, found: String, expected: String) -> Error {
+        Error::Config { place: self.place.clone(), field: format!("{}{key}", self.prefix), found, expected }
+    }
+
+    pub fn take(&mut self, key: &'static str) -> Option<Value> {
+        self.known.push(key);
+        self.table.remove(key)
+    }
+
+    pub fn text(&mut self, key: &'static str) -> Result<Option<String>> {
+        match self.take(key) {
+            None => Ok(None),
+            Some(Value::String(text)) => Ok(Some(text)),
+            Some(other) => Err(self.fault(key, other.to_string(), "a text in quotes".into())),
+        }
+    }
+
+    pub fn texts(&mut self, key: &'static str) -> Result<Option<Vec<String>>> {
+        let value = self.take(key);
+        let one = |value| match value {
+            Value::String(text) => Ok(text),
+            other => Err(self.fault(key, other.to_string(), "a text in quotes, or a list of such".into())),
+        };
+        match value {
+            None => Ok(None),
+            Some(Value::Array(values)) => values.into_iter().map(one).collect::<Result<_>>().map(Some),
+            Some(value) => Ok(Some(vec![one(value)?])),
+        }
+    }
+
+    pub fn number(&mut self, key: &'static str, least: f64) -> Result<Option<f64>> {
+        let number = match self.take(key) {
+            None => return Ok(None),
+            Some(Value::Float(number)) => number,
+            Some(Value::Integer(number)) => number as f64,
+            Some(other) => return Err(self.fault(key, other.to_string(), "a number".into())),
+        };
+        if number.is_finite() && number >= least {
+            return Ok(Some(number));
+        }
+        let expected = if least == f64::MIN_POSITIVE { "a number above 0".into() } else { format!("a number of at least {least}") };
+        Err(self.fault(key, number.to_string(), expected))
+    }
+
+    /// Times by stream: a group's word first, a single column's time over it.
+    pub fn times(&mut self) -> Result<BTreeMap<Column, f64>> {
+        let mut late = BTreeMap::new();
+        for single in [false, true] {
+            for group in units::GROUPS {
+                let words: &[&'static str] = if single { group.columns } else { &[group.name] };
+                for &word in words {
+                    let columns: &[&'static str] = if single { &[word] } else { group.columns };
+                    let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
+                    // Time and quaternions are no canonical columns; `finish` refuses them.
+                    let Some(late_s) = (if columns.is_empty() { None } else { self.number(word, -LATEST_S)? }) else { continue };
+                    if late_s > LATEST_S {
+                        return Err(self.fault(word, late_s.to_string(), format!("a time from -{LATEST_S} to {LATEST_S} s")));
+                    }
+                    late.extend(columns.into_iter().map(|column| (column, late_s)));
+                }
+            }
+        }
+        Ok(late)
+    }
+
+    pub fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> Result<Option<T>> {
+        let Some(text) = self.text(key)? else { return Ok(None) };
+        if let Some(choice) = choices.iter().find(|choice| choice.0 == text) {
+            return Ok(Some(choice.1));
+        }
+        let names: Vec<&str> = choices.iter().map(|choice| choice.0).collect();
+        let hint = did_you_mean(&text, names.iter().copied());
+        Err(self.fault(key, format!("`{text}`"), format!("one of {}{hint}", names.join(", "))))
+    }
+
+    pub fn section(&mut self, key: &'static str) -> Result<Option<Self>> {
+        let prefix = match key {
+            "columns" => "columns.",
+            "units" => "units.",
+            "late" => "late.",
+            "late_in" => "late_in.",
+            _ => "repair.",
+        };
+        match self.take(key) {
+            None => Ok(None),
+            Some(Value::Table(table)) => Ok(Some(Self::new(&self.place, prefix, table))),
+            Some(other) => Err(self.fault(key, other.to_string(), format!("a table, [{key}]"))),
+        }
+    }
+
+    /// `[[key]]`, any number of times, or `[key]` once.
+    pub fn sections(&mut self, key: &'static str) -> Result<Vec<Self>> {
+        let values = match self.take(key) {
+            None => Vec::new(),
+            Some(Value::Array(values)) => values,
+            Some(value) => vec![value],
+        };
+        let single = |value| Self::new(&self.place, "", Table::from_iter([(key.to_owned(), value)])).section(key);
+        values.into_iter().filter_map(|value| single(value).transpose()).collect()
+    }
+
+    pub fn finish(self) -> Result<()> {
+        let Some(key) = self.table.keys().next() else { return Ok(()) };
+        let hint = did_you_mean(key, self.known.iter().copied());
+        let expected = format!("one of {}{hint}", self.known.join(", "));
+        Err(self.fault(key, "an unknown key".into(), expected))
+    }
+}
