@@ -42,6 +42,8 @@ fn hybrid(model: Model, flights: &[Flight], gate: f64, linear: bool) -> Result<H
     let config_of_linear = LinearConfig { lags: 4, inputs: ["wx", "vz", "u2", "rate(vx)"].map(str::to_owned).into() };
     let linear = if linear { Some(sequence::linear(flights, &spans, &model, &config_of_linear)?) } else { None };
     let description = Description {
+        envelope: None,
+        intervals: None,
         scaling: sequence::scaling(flights, &spans, &model, &inputs, linear.as_ref(), &config)?,
         model,
         config,

@@ -63,6 +63,8 @@ fn job_of(set: DataSet, model: &Model, inputs: Vec<String>, linear: LinearConfig
     };
     let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
     let description = Description {
+        envelope: None,
+        intervals: None,
         scaling: sequence::scaling(&set.flights, &split.training, &model, &config.inputs, Some(&linear), &config.network)?,
         model,
         config: config.network.clone(),

@@ -8,6 +8,7 @@ use super::contest::{self, Best, Difference, RowSums};
 use super::predictions::{Row, check_row, measured, variation};
 use super::regime::Regime;
 use super::shares::Shares;
+use super::coverage::Coverage;
 use super::uncertainty::Uncertainty;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;
@@ -93,6 +94,9 @@ pub struct Comparison {
     /// Who explains what, one entry a trained network; added by whoever has the network (see [`mod@super::shares`]).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub shares: Vec<Shares>,
+    /// How the prediction intervals do, one entry a trained network that has some; added by whoever has the network.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub coverage: Vec<Coverage>,
     /// What the uncertainty of the physical coefficients does, one entry a trained network, if it was asked for.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub uncertainty: Vec<Uncertainty>,
@@ -174,6 +178,7 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
         blocks: groups.blocks.len(),
         floor: None,
         shares: Vec::new(),
+        coverage: Vec::new(),
         uncertainty: Vec::new(),
     })
 }

@@ -244,6 +244,7 @@ impl fmt::Display for Comparison {
             writeln!(f, "{}", wrapped("", FLOOR))?;
         }
         self.shares.iter().try_for_each(|shares| writeln!(f, "\n{shares}"))?;
+        self.coverage.iter().try_for_each(|coverage| writeln!(f, "\n{coverage}"))?;
         self.uncertainty.iter().try_for_each(|uncertainty| writeln!(f, "\n{uncertainty}"))?;
         Ok(())
     }

@@ -198,6 +198,14 @@ impl Flight {
         Column::from_name(name).map(|column| self.column(column)).or_else(|| self.extra.get(name).map(Vec::as_slice))
     }
 
+    /// State and controls of a sample, in the order of [`Column::STATE`].
+    ///
+    /// # Panics
+    /// If there is no such sample.
+    pub fn state(&self, sample: usize) -> [f64; 16] {
+        std::array::from_fn(|index| self.column(Column::STATE[index])[sample])
+    }
+
     /// Why a quantity of this name gives one of the six accelerations away, if it does: it is one, it is made of one, or one is made of
     /// it. Nothing that predicts accelerations may read it.
     pub fn gives_target_away(&self, name: &str) -> Option<String> {

@@ -3,7 +3,9 @@
 //! A [`Hybrid`] holds everything a prediction needs (calibrated model, inputs, scales, weights) and is one file. How it was
 //! trained is in `train`.
 
+pub mod envelope;
 pub mod inputs;
+pub mod intervals;
 pub mod linear;
 pub mod rollout;
 pub mod scaling;
@@ -13,6 +15,8 @@ mod stages;
 mod stream;
 mod target;
 
+use envelope::Envelope;
+use intervals::{Intervals, Kept};
 use linear::Linear;
 pub use rollout::HybridRollout;
 pub use scaling::{Scale, Scaling};
@@ -22,12 +26,13 @@ pub use target::{NetworkTarget, network_target};
 
 use crate::blocks::Blocks;
 use crate::error::{Error, Result};
-use crate::flight::{Flight, PerChannel, Window};
+use crate::flight::{Flight, PerChannel, Span, Window};
 use crate::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use crate::nn::{Architecture, Network, OutputScale};
-use crate::physics::Model;
+use crate::physics::{Model, columns_behind};
 use crate::tape::{Parameter, Session, Threads};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -66,6 +71,12 @@ pub struct Description {
     pub gate: PerChannel<f64>,
     /// Sampling step of the training data, s.
     pub step_s: f64,
+    /// Where in state and control it was calibrated and trained; none in files of before there were any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub envelope: Option<Envelope>,
+    /// How far measurements may lie from what it predicts; none where no windows were kept from training.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub intervals: Option<Intervals>,
 }
 
 impl Description {
@@ -120,10 +131,55 @@ impl Description {
             return fault("gate", format!("{:?}", gate.values()), "six factors between 0 and 1".into());
         }
         inputs::parse(inputs)?;
+        self.check_limits()?;
         match linear.as_ref().map_or(Ok(()), Linear::check) {
             Ok(()) => self.model.check(),
             Err(message) => fault("linear", message, "numbers that fit".into()),
         }
+    }
+
+    /// Refuses an envelope or intervals whose numbers cannot be any, or an envelope of what the hybrid does not read.
+    fn check_limits(&self) -> Result<()> {
+        let fault = |field: &str, found: String, expected: &str| {
+            Err(Error::Config { place: "hybrid".into(), field: field.into(), found, expected: expected.into() })
+        };
+        if let Some(envelope) = &self.envelope {
+            if let Err(found) = envelope.check() {
+                return fault("envelope", found, "finite ranges, and samples with a number for each");
+            }
+            let read = self.reads()?;
+            if let Some(range) = envelope.ranges().iter().find(|range| !read.contains(&range.name)) {
+                return fault("envelope", format!("`{}`", range.name), "what physics, linear history or network read");
+            }
+        }
+        match self.intervals.as_ref().map_or(Ok(()), Intervals::check) {
+            Ok(()) => Ok(()),
+            Err(found) => fault("intervals", found, "finite numbers that are not negative, and a coverage between 0 and 1"),
+        }
+    }
+
+    /// Sets the envelope from the samples that it is calibrated and trained on.
+    ///
+    /// # Errors
+    /// As [`Model::stream`]; [`Error::Log`] if a flight lacks a column that the hybrid reads; [`Error::Undetermined`] if the spans hold no sample.
+    pub fn set_envelope(&mut self, flights: &[Flight], training: &[Span]) -> Result<()> {
+        let names: Vec<String> = self.reads()?.into_iter().collect();
+        // What reads nothing but the time has no state to be outside of.
+        self.envelope = if names.is_empty() { None } else { Some(Envelope::new(&names, flights, training)?) };
+        Ok(())
+    }
+
+    /// Columns that physics, linear history and network read: of the state, those behind derived quantities among them, and the log's own.
+    ///
+    /// # Errors
+    /// As [`Model::stream`].
+    pub fn reads(&self) -> Result<BTreeSet<String>> {
+        let mut read = self.model.stream(self.step_s)?.reads();
+        let linear = self.linear.as_ref().map_or(&[][..], |linear| linear.config().inputs.as_slice());
+        for formula in inputs::parse(&self.inputs)?.iter().chain(&inputs::parse(linear)?) {
+            read.extend(formula.names().into_iter().flat_map(columns_behind));
+        }
+        Ok(read)
     }
 
     /// Whether samples so many seconds apart are as far apart as those of the training data, but for the jitter of a log's clock.
@@ -197,6 +253,33 @@ impl Hybrid {
         });
         self.description.gate = gate;
         Ok(gate)
+    }
+
+    /// Sets the intervals from windows that the network was not trained on, with the physics as it is on a flight that it does not know: without the
+    /// numbers (wind, biases) that calibration found for single flights. Windows in fewer than [`intervals::FEWEST_BLOCKS`] blocks give none.
+    ///
+    /// # Errors
+    /// As [`Hybrid::predict`].
+    pub fn set_intervals(&mut self, flights: &[Flight], training: &[Span], windows: &[Window], threads: Threads) -> Result<()> {
+        let predicted = self.predict_unknown(flights, windows, threads)?;
+        let blocks = Blocks::new(flights, windows).of_window;
+        let kept = |((window, predicted), block): ((&Window, &PerChannel<f64>), &usize)| Kept {
+            flight: &flights[window.flight],
+            sample: window.last,
+            predicted: *predicted,
+            block: *block,
+        };
+        let kept: Vec<Kept<'_>> = windows.iter().zip(&predicted).zip(&blocks).map(kept).collect();
+        self.description.intervals = Intervals::new(flights, training, &kept);
+        Ok(())
+    }
+
+    /// As [`Hybrid::predict`], with the physics as a stream has it: each flight one that calibration did not know.
+    ///
+    /// # Errors
+    /// As [`Hybrid::predict`].
+    pub fn predict_unknown(&self, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Vec<PerChannel<f64>>> {
+        self.on(self.description.model.of_unknown_flights())?.predict(flights, windows, threads)
     }
 
     /// The same network on another model, for one that knows more of some flights than the one it was trained on and is equal otherwise.

@@ -2,6 +2,7 @@
 //! nothing; only an error does, for its text.
 
 use super::Hybrid;
+use super::envelope::Place;
 use super::inputs;
 use super::linear::Linear;
 use crate::error::{Error, Result};
@@ -11,6 +12,7 @@ use crate::physics::{StreamingModel, quantity_at};
 use crate::tape::{Session, Threads};
 use std::borrow::Borrow;
 use std::collections::{BTreeSet, VecDeque};
+use std::num::NonZeroUsize;
 
 /// A prediction part by part, m/s² and rad/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +26,13 @@ pub struct Streamed {
     /// The prediction: the sum of the three, or for a network that does not learn a residual what it says alone; `None` until the
     /// history is full.
     pub acceleration: Option<PerChannel<f64>>,
+    /// Half of the interval around the prediction; `None` without a prediction, and where the hybrid has no [`Intervals`].
+    ///
+    /// [`Intervals`]: super::Intervals
+    pub half_width: Option<PerChannel<f64>>,
+    /// Where the sample lies beside what was seen in training; `None` where the hybrid has no [`Envelope`](super::Envelope). Outside of it
+    /// neither prediction nor interval is backed by data.
+    pub place: Option<Place>,
 }
 
 /// A hybrid that takes samples in order, one step apart; it gives what [`Hybrid::predict`] gives on the same flight. `H` is what holds the
@@ -45,6 +54,12 @@ pub struct StreamingHybrid<H: Borrow<Hybrid>> {
     /// Where those of the physics are among them.
     of_model: Vec<usize>,
     model_values: Vec<f64>,
+    /// One number for each range of the envelope.
+    of_envelope: Vec<f64>,
+    /// Samples from one pass of the network to the next.
+    network_every: usize,
+    /// What the network said last.
+    held: PerChannel<f64>,
 }
 
 /// One sample: state and controls, and the log's own columns.
@@ -60,13 +75,14 @@ impl Sample<'_> {
     /// What a formula reads, in the order of its inputs.
     fn read(&self, formula: &StreamingFormula, values: &mut Vec<f64>) {
         values.clear();
-        values.extend(formula.inputs().iter().map(|name| {
-            let own = || self.names.iter().position(|own| own == name).map(|place| self.own[place]);
-            // All names that formulas read were gathered when the stream was made.
-            quantity_at(self.state, self.time_s, name)
-                .or_else(own)
-                .expect("a quantity of the state, or one of the log's own columns")
-        }));
+        values.extend(formula.inputs().iter().map(|name| self.quantity(name)));
+    }
+
+    /// A quantity of the state, or one of the log's own columns.
+    fn quantity(&self, name: &str) -> f64 {
+        let own = || self.names.iter().position(|own| own == name).map(|place| self.own[place]);
+        // All names that are read were gathered when the stream was made.
+        quantity_at(self.state, self.time_s, name).or_else(own).expect("a quantity of the state, or one of the log's own columns")
     }
 }
 
@@ -104,6 +120,9 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
             samples: 0,
             values: Vec::with_capacity(most_names),
             model_values: Vec::with_capacity(of_model.len()),
+            of_envelope: Vec::with_capacity(description.envelope.as_ref().map_or(0, |envelope| envelope.ranges().len())),
+            network_every: 1,
+            held: PerChannel::splat(f64::NAN),
             own,
             of_model,
             hybrid: holder,
@@ -116,6 +135,12 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
         self.linear.iter_mut().for_each(StreamingLinear::reset);
         self.inputs.iter_mut().for_each(StreamingFormula::reset);
         (self.start_s, self.samples) = (start_s, 0);
+    }
+
+    /// Lets the network look at every so many-th sample only, and holds what it said in between: physics and linear history are of each sample
+    /// all the same. For a processor that cannot do the network at the rate of the log. The first prediction has a network of its own.
+    pub fn set_network_every(&mut self, samples: NonZeroUsize) {
+        self.network_every = samples.get();
     }
 
     /// Names of the log's own columns (motor commands, rotor speeds) that the hybrid reads besides state and controls;
@@ -174,24 +199,39 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
         for (channel, scale) in description.scaling.physics.pairs() {
             self.physics[(rows - 1) * 6 + channel.index()] = scale.apply(baseline[channel]) as f32;
         }
+        let place = description.envelope.as_ref().map(|envelope| {
+            self.of_envelope.clear();
+            self.of_envelope.extend(envelope.ranges().iter().map(|range| sample.quantity(&range.name)));
+            envelope.place(&self.of_envelope)
+        });
         self.samples += 1;
         if self.samples < rows {
-            return Ok(Streamed { physics, linear, network: None, acceleration: None });
+            return Ok(Streamed { physics, linear, network: None, acceleration: None, half_width: None, place });
         }
-        let (state, physics_rows) = (&self.state, &self.physics);
-        let fill = |_: usize, slabs: &mut [&mut [f32]]| {
-            if let [state_slab, physics_slab, ..] = slabs {
-                state_slab.copy_from_slice(state);
-                physics_slab.copy_from_slice(physics_rows);
-            }
-        };
-        let mut network = PerChannel::splat(f64::NAN);
-        self.session.predict(1, &fill, &mut |_, output| network = hybrid.learned(output))?;
-        let acceleration = hybrid.complete(baseline, network);
+        if (self.samples - rows).is_multiple_of(self.network_every) {
+            self.look()?;
+        }
+        let hybrid: &Hybrid = self.hybrid.borrow();
+        let acceleration = hybrid.complete(baseline, self.held);
         if acceleration.iter().any(|value| !value.is_finite()) {
             return Err(Error::Undetermined(format!("sample {}: the prediction is not finite", self.samples - 1)));
         }
-        Ok(Streamed { physics, linear, network: Some(network), acceleration: Some(acceleration) })
+        let half_width = hybrid.description().intervals.as_ref().map(|intervals| intervals.half_width(state));
+        Ok(Streamed { physics, linear, network: Some(self.held), acceleration: Some(acceleration), half_width, place })
+    }
+
+    /// Lets the network look at the history.
+    fn look(&mut self) -> Result<()> {
+        let Self { hybrid, session, state, physics, held, .. } = self;
+        let hybrid: &Hybrid = (*hybrid).borrow();
+        let fill = |_: usize, slabs: &mut [&mut [f32]]| {
+            if let [state_slab, physics_slab, ..] = slabs {
+                state_slab.copy_from_slice(state);
+                physics_slab.copy_from_slice(physics);
+            }
+        };
+        session.predict(1, &fill, &mut |_, output| *held = hybrid.learned(output))?;
+        Ok(())
     }
 
     /// Refuses what is no finite number, before anything is taken.

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::flight::derived::Derived;
 use crate::flight::{Accelerations, Channel, Column, Flight, PerChannel};
 use crate::formula::{Formula, Machine, Node, Value};
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 /// Names that formulas may use on every log: the 16 state and control columns and the derived quantities.
@@ -33,6 +34,14 @@ pub fn quantity_at(state: &[f64; 16], time_s: f64, name: &str) -> Option<f64> {
         return state.get(*column as usize).copied();
     }
     Some(Derived::from_name(name)?.at(|column| state[column as usize], || time_s))
+}
+
+/// The columns behind a name that a formula reads: those that a derived quantity is made from, or the name itself.
+pub fn columns_behind(name: &str) -> Vec<String> {
+    match Derived::from_name(name) {
+        Some(derived) => derived.reads().iter().map(|column| column.name().to_owned()).collect(),
+        None => vec![name.to_owned()],
+    }
 }
 
 /// A formula of standard quantities on a whole flight.
@@ -322,6 +331,16 @@ impl StreamingModel {
     /// unless a formula names one.
     pub fn extra_inputs(&self) -> &[String] {
         &self.bound.extras
+    }
+
+    /// Columns that the model reads: of the state, those behind derived quantities among them, and the log's further ones.
+    pub fn reads(&self) -> BTreeSet<String> {
+        let of = |source: &Source| match source {
+            Source::State(column) => vec![column.name().to_owned()],
+            Source::Derived(derived) => derived.reads().iter().map(|column| column.name().to_owned()).collect(),
+            Source::Extra(index) => vec![self.bound.extras[*index].clone()],
+        };
+        self.bound.sources.iter().flat_map(of).collect()
     }
 
     /// Starts anew: the next sample is the first one, at time `start_s`.

@@ -43,7 +43,7 @@ pub use definition::{
     change, coefficient, parameter,
 };
 pub use effect::{Coefficient, Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter, Swap, Term};
-pub use evaluate::{Block, StreamingModel, Visit, evaluate, quantity, quantity_at, standard_names};
+pub use evaluate::{Block, StreamingModel, Visit, columns_behind, evaluate, quantity, quantity_at, standard_names};
 #[cfg(feature = "files")]
 pub use export_c::CFile;
 pub use implant::{implant, spread_over_flights, typical};

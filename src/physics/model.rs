@@ -128,6 +128,15 @@ impl Model {
         };
     }
 
+    /// The model for flights that it does not know: what belongs to single flights (wind, biases) is at the value of any other.
+    #[must_use]
+    pub fn of_unknown_flights(&self) -> Self {
+        let mut model = self.clone();
+        let coefficients = model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients);
+        coefficients.filter_map(|coefficient| coefficient.by_flight.as_mut()).for_each(BTreeMap::clear);
+        model
+    }
+
     /// Refuses numbers by flight whose names could mean several of these flights: a model file may name a flight by the last part of its
     /// path, where only one flight has that.
     ///

@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 /// Longest time between checkpoints, s.
 const LONGEST_CHECKPOINT_S: f64 = 86_400.0;
 
-/// Largest distance of the blocks that are kept for the gate.
-const MOST_GATE_EVERY: usize = 1_000_000;
+/// Largest distance of the blocks that are kept from training.
+const MOST_EVERY: usize = 1_000_000;
 
 /// Settings of a training run. Every field has a default, the paper's where it states one; what fits into minutes is
 /// [`TrainConfig::in_minutes`].
@@ -42,6 +42,9 @@ pub struct TrainConfig {
     /// Every so many-th 10-s block of the training part is kept from the network to fit its gate on, one factor a channel
     /// between 0 and 1; 0 keeps none and sets no gate, as in the paper. Default 0.
     pub gate_every: usize,
+    /// Every so many-th 10-s block of the training part is kept from the network to measure how far its predictions stray, where neither a gate
+    /// nor the split keeps any; 0 keeps none, and then there are no intervals. Default 0; 8 in [`TrainConfig::in_minutes`].
+    pub interval_every: usize,
     /// Seed of initial weights, order and dropout. Default 0.
     pub seed: u64,
     /// Seconds between checkpoints, at most a day. Default 30.
@@ -61,6 +64,7 @@ impl Default for TrainConfig {
             stride: TRAINING_STRIDE,
             standardise_loss: false,
             gate_every: 0,
+            interval_every: 0,
             seed: 0,
             checkpoint_s: 30.0,
         }
@@ -79,7 +83,7 @@ impl TrainConfig {
     /// window every 12 samples.
     pub fn in_minutes() -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        Self { network: network.into(), epochs: 20, stride: 12, ..Self::default() }
+        Self { network: network.into(), epochs: 20, stride: 12, interval_every: 8, ..Self::default() }
     }
 
     /// Checks every field against its range, and that no input is a target or made of one.
@@ -92,7 +96,8 @@ impl TrainConfig {
             ("batch", self.batch, 1, Self::MOST_BATCH),
             ("stride", self.stride, 1, Self::MOST_STRIDE),
             ("warmup_epochs", self.warmup_epochs, 0, Self::MOST_EPOCHS),
-            ("gate_every", self.gate_every, 0, MOST_GATE_EVERY),
+            ("gate_every", self.gate_every, 0, MOST_EVERY),
+            ("interval_every", self.interval_every, 0, MOST_EVERY),
         ];
         if let Some((field, value, least, most)) = counts.into_iter().find(|(_, value, least, most)| value < least || value > most)
         {
@@ -112,8 +117,10 @@ impl TrainConfig {
                 &format!("the number of inputs, {}", self.inputs.len()),
             ));
         }
-        if self.gate_every == 1 {
-            return Err(fault("gate_every", 1, "0 (no gate), or 2 and more: 1 would leave nothing to train on"));
+        for (field, every) in [("gate_every", self.gate_every), ("interval_every", self.interval_every)] {
+            if every == 1 {
+                return Err(fault(field, 1, "0 (none is kept), or 2 and more: 1 would leave nothing to train on"));
+            }
         }
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
         Ok(self.network.check()?)
@@ -145,12 +152,13 @@ mod tests {
     #[test]
     fn every_count_has_a_bound_and_no_product_of_bounds_overflows() {
         type Set = fn(&mut TrainConfig, usize);
-        let set: [(&str, Set); 5] = [
+        let set: [(&str, Set); 6] = [
             ("epochs", |config, value| config.epochs = value),
             ("batch", |config, value| config.batch = value),
             ("stride", |config, value| config.stride = value),
             ("warmup_epochs", |config, value| config.warmup_epochs = value),
             ("gate_every", |config, value| config.gate_every = value),
+            ("interval_every", |config, value| config.interval_every = value),
         ];
         for (field, set) in set {
             for value in [1 << 62, 1 << 63, usize::MAX, 1_000_001] {

@@ -7,6 +7,7 @@ use crate::error::Result;
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
 use crate::flight::{Flight, PerChannel, Window};
+use crate::hybrid::intervals::FEWEST_BLOCKS;
 use crate::hybrid::{Description, Hybrid, sequence};
 use crate::physics::Model;
 use crate::tape::Threads;
@@ -21,6 +22,9 @@ pub struct Job {
     pub windows: Vec<Window>,
     /// Windows kept from training, for the gate; empty without one.
     pub gate_windows: Vec<Window>,
+    /// Windows kept from training that intervals are made of: those of the gate where there is one, else those of the validation part, else
+    /// blocks of the training part.
+    pub interval_windows: Vec<Window>,
     /// Windows of the split's validation part, as dense as those that train; empty if the split has none.
     pub validation: Vec<Window>,
 }
@@ -34,7 +38,7 @@ impl Job {
         config.check()?;
         let spans = &split.training;
         let linear = config.linear.as_ref().map(|linear| sequence::linear(flights, spans, model, linear)).transpose()?;
-        let description = Description {
+        let mut description = Description {
             model: model.clone(),
             config: config.network.clone(),
             inputs: config.inputs.clone(),
@@ -42,16 +46,27 @@ impl Job {
             linear,
             gate: PerChannel::splat(1.0),
             step_s: flights.first().map_or(0.01, |flight| flight.step_s),
+            envelope: None,
+            intervals: None,
         };
+        description.set_envelope(flights, spans)?;
         let sequences = sequence::sequences(flights, &description)?;
         let all = windows(spans, config.network.history(), config.stride);
-        let blocks = Blocks::new(flights, &all).of_window;
-        let kept = |block: usize| config.gate_every > 0 && block % config.gate_every == config.gate_every - 1;
-        let choose =
-            |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| kept(**block) == wanted).map(|(window, _)| *window);
-        let (training, gate_windows) = (choose(false).collect(), choose(true).collect());
         let validation = windows(&split.validation, config.network.history(), config.stride);
-        Ok(Self { description, sequences, windows: training, gate_windows, validation })
+        // The gate is six numbers: what they were fitted on is hardly flattered by them, and serves the intervals as well.
+        let Blocks { of_window: blocks, keys } = Blocks::new(flights, &all);
+        let (every, for_gate) = match config.gate_every {
+            // Of too few blocks nothing is made: then all of them train.
+            0 if validation.is_empty() && keys.len() >= config.interval_every * FEWEST_BLOCKS => (config.interval_every, false),
+            every => (every, true),
+        };
+        let is_kept = |block: usize| every > 0 && block % every == every - 1;
+        let choose =
+            |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| is_kept(**block) == wanted).map(|(window, _)| *window);
+        let (training, kept): (Vec<Window>, Vec<Window>) = (choose(false).collect(), choose(true).collect());
+        let interval_windows = if kept.is_empty() { validation.clone() } else { kept.clone() };
+        let gate_windows = if for_gate { kept } else { Vec::new() };
+        Ok(Self { description, sequences, windows: training, gate_windows, interval_windows, validation })
     }
 
     /// The hybrid with these weights, its gate fitted where windows were kept for one.

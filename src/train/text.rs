@@ -15,7 +15,7 @@ const KIND: &str = "kind";
 const PHYTURE: &str = "phyture";
 
 /// Comments of the fields, in the order in which they are written.
-const FIELDS: [(&str, &str); 11] = [
+const FIELDS: [(&str, &str); 12] = [
     ("epochs", "Passes over the training windows; the paper does not state its number."),
     ("batch", "Windows a step."),
     ("stride", "Samples between training windows."),
@@ -23,6 +23,10 @@ const FIELDS: [(&str, &str); 11] = [
     ("warmup_epochs", "Epochs of linear warm-up; at most a tenth of all are taken. Half a cosine follows."),
     ("standardise_loss", "Divide each channel's error by its standard deviation in the loss."),
     ("gate_every", "Keep every so many-th 10-s block from the network to fit a gate on, a factor a channel; 0: no gate."),
+    (
+        "interval_every",
+        "Keep every so many-th 10-s block from the network for its intervals, where neither gate nor split keeps any; 0: no intervals.",
+    ),
     ("seed", "Seed of initial weights, order and dropout; --seed goes before it."),
     ("checkpoint_s", "Seconds between checkpoints."),
     ("inputs", "What the network sees, as formulas of the log's columns; as many as network.state_channels. No acceleration."),
@@ -206,6 +210,7 @@ mod tests {
                     peak_rate: 1.0 / 3.0,
                     standardise_loss: true,
                     gate_every: 5,
+                    interval_every: 7,
                     seed: i64::MAX as u64,
                     checkpoint_s: 0.1,
                     ..TrainConfig::in_minutes()
@@ -219,8 +224,8 @@ mod tests {
         let text = TrainConfig::default().template()?;
         let fields: Vec<&str> = text.lines().filter_map(|line| line.split_once(" = ")).map(|(field, _)| field).collect();
         let uncommented = fields.iter().filter(|field| !field.starts_with('#')).count();
-        // Ten fields, nineteen of the network; and a comment for each.
-        assert_eq!(uncommented, 10 + 19, "{text}");
+        // Eleven fields, nineteen of the network; and a comment for each.
+        assert_eq!(uncommented, 11 + 19, "{text}");
         assert!(text.lines().filter(|line| line.starts_with("# ")).count() > uncommented, "{text}");
         Ok(())
     }

@@ -24,7 +24,7 @@ pub struct Training<'a> {
     pub data: u64,
     /// Where checkpoints go.
     pub folder: &'a RunFolder,
-    /// Whether the losses of the network at its end, and on the validation part after each epoch, are worth their time.
+    /// Whether the losses of the network at its end, and on the validation part after each epoch, and its intervals are worth their time.
     pub with_losses: bool,
     /// Threads to train on.
     pub threads: Threads,
@@ -94,7 +94,7 @@ impl Training<'_> {
     /// As [`Job::new`], [`Trainer::new`], [`RunFolder::train`]; those of `observe`.
     pub fn run(&self, state: Option<State>, observe: &mut dyn FnMut(Event<'_>) -> Result<bool>) -> Result<Ended> {
         let Self { flights, split, model, config, data, folder, with_losses, threads } = *self;
-        let job = Job::new(flights, split, model, config)?;
+        let mut job = Job::new(flights, split, model, config)?;
         let network = job.description.network(config.standardise_loss)?;
         let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, threads)?;
         if with_losses {
@@ -128,7 +128,11 @@ impl Training<'_> {
         };
         let (gate_windows, parameters) = (job.gate_windows.len(), trainer.state().parameters.clone());
         drop(trainer);
-        let hybrid = job.hybrid(flights, parameters, threads)?;
+        let interval_windows = std::mem::take(&mut job.interval_windows);
+        let mut hybrid = job.hybrid(flights, parameters, threads)?;
+        if with_losses {
+            hybrid.set_intervals(flights, &split.training, &interval_windows, threads)?;
+        }
         Ok(Ended::Trained(Box::new(Trained { hybrid, begun, gate_windows, losses })))
     }
 }

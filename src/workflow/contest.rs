@@ -4,7 +4,7 @@ use crate::critique::diagnose::{Met, met};
 use crate::critique::locate::{Traced, stretches};
 use crate::critique::shares::{self, shares};
 use crate::critique::uncertainty::{Effort, uncertainty};
-use crate::critique::{Comparison, Row, compare, finite_difference, floor, ridge};
+use crate::critique::{Comparison, Row, compare, coverage, finite_difference, floor, ridge};
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
@@ -153,6 +153,9 @@ impl Contest<'_> {
         comparison.stride = self.stride;
         comparison.own_from_first_half = own_from_first_half;
         comparison.shares = judged;
+        for (name, hybrid) in &networks {
+            comparison.coverage.extend(coverage(name, hybrid, &set.flights, &windows, self.threads)?);
+        }
         for (name, hybrid) in networks.iter().filter(|_| self.uncertainty) {
             let effort = Effort::for_history(hybrid.description().config.history(), self.seed);
             comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, self.threads)?);

@@ -9,7 +9,7 @@ mod tables;
 use pictures::normalised;
 pub(super) use pictures::{Lines, USE, VARIABLES, maps, shares_map, trace_figure, traces};
 pub(super) use tables::{bar_of, channel_columns};
-use tables::{error_tables, share_parts, strip, uncertainty_parts};
+use tables::{coverage_parts, error_tables, share_parts, strip, uncertainty_parts};
 
 use super::names::said;
 use super::page::{DATA_NOTE, Page, Part, Section, Table, data_notes};
@@ -72,6 +72,9 @@ pub(super) fn judged_sections(report: &CompareReport<'_>) -> Vec<Section> {
     let mut sections = vec![section("Error per channel", error_tables(report.comparison))];
     if !report.comparison.shares.is_empty() {
         sections.push(section("Who explains what", report.comparison.shares.iter().flat_map(share_parts).collect()));
+    }
+    if !report.comparison.coverage.is_empty() {
+        sections.push(section("Prediction intervals", report.comparison.coverage.iter().flat_map(coverage_parts).collect()));
     }
     if !report.comparison.uncertainty.is_empty() {
         let parts = report.comparison.uncertainty.iter().flat_map(uncertainty_parts).collect();

@@ -7,7 +7,7 @@ use crate::critique::channels::Intervals;
 use crate::critique::digits::{Kind, significant};
 use crate::critique::shares::bars;
 use crate::critique::table::{FLOOR, LEGEND, MEASURES};
-use crate::critique::{ChannelValues, Comparison, ModelError, Shares, Uncertainty};
+use crate::critique::{ChannelValues, Comparison, Coverage, ModelError, Shares, Uncertainty};
 use crate::flight::{Channel, Column};
 
 /// Heads of the columns: what `first` says, the channels in words with symbol and unit below, and the mean.
@@ -144,6 +144,17 @@ pub fn share_parts(shares: &Shares) -> Vec<Part> {
     };
     let figure = figures::shares(&format!("Who explains what, {}", shares.name), &caption, &rows, &of_parts);
     vec![Part::Figure(figure), Part::Table(table), Part::Text(note.into())]
+}
+
+/// The share of measurements that a network's intervals hold, and where the network was not trained.
+pub fn coverage_parts(coverage: &Coverage) -> Vec<Part> {
+    let row = |(name, cells): (String, Vec<String>)| [Cell::from(name)].into_iter().chain(cells.into_iter().map(Cell::from)).collect();
+    let table = Table {
+        caption: format!("Prediction intervals of {}", coverage.name),
+        columns: channel_columns("", false, false),
+        rows: coverage.rows().into_iter().map(row).collect(),
+    };
+    vec![Part::Table(table), Part::Text(coverage.note())]
 }
 
 /// Coefficient × channel, shaded by the share of the error, and the totals.

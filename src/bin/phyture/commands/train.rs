@@ -3,6 +3,8 @@
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, data_sha256, interruption};
 use crate::output::Progress;
+use phyture::critique::digits::significant;
+use phyture::critique::wrap::wrapped;
 use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
@@ -238,6 +240,24 @@ fn say_begun(context: &Context, config: &TrainConfig, begun: &Begun) {
     ));
 }
 
+/// Says how far measurements may lie from what the network predicts.
+fn say_intervals(context: &Context, hybrid: &Hybrid) {
+    let Some(intervals) = &hybrid.description().intervals else {
+        return context.say("no prediction intervals: too few blocks of flight were kept from training (`interval_every`)");
+    };
+    let (windows, blocks) = intervals.made_from();
+    let shown: Vec<String> =
+        intervals.typical().pairs().map(|(channel, half)| format!("{} ±{} {}", channel.name(), significant(*half, 2), channel.unit())).collect();
+    context.say(wrapped(
+        "",
+        &format!(
+            "{:.0} % intervals in typical motion, from {windows} windows in {blocks} blocks kept from training: {}",
+            100.0 * intervals.coverage(),
+            shown.join(", ")
+        ),
+    ));
+}
+
 /// Writes the network and says what came of it.
 fn write(context: &Context, folder: &RunFolder, trained: &Trained, last_epoch_loss: Option<f64>, begun: Instant) -> Result<Output> {
     let Trained { hybrid, begun: Begun { parameters, windows, validation_windows, steps, .. }, gate_windows, losses } = trained;
@@ -247,6 +267,7 @@ fn write(context: &Context, folder: &RunFolder, trained: &Trained, last_epoch_lo
         let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
         context.say(format!("gate, from {gate_windows} windows kept from training: {}", shown.join("  ")));
     }
+    say_intervals(context, hybrid);
     hybrid.write(&folder.network())?;
     let validation = losses.validation.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
     let seconds = begun.elapsed().as_secs_f64();

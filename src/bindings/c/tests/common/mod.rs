@@ -49,6 +49,8 @@ pub fn hybrid(set: &DataSet) -> Result<Hybrid> {
     let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
     let config = config.into();
     let description = Description {
+        envelope: None,
+        intervals: None,
         scaling: sequence::scaling(&set.flights, &split.training, &model, &inputs, Some(&linear), &config)?,
         model,
         config,
