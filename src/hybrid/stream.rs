@@ -2,7 +2,7 @@
 //! nothing; only an error does, for its text.
 
 use super::Hybrid;
-use super::envelope::Place;
+use super::envelope::{Envelope, Place};
 use super::inputs;
 use super::linear::Linear;
 use crate::error::{Error, Result};
@@ -147,6 +147,11 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
     /// [`StreamingHybrid::push_with`] takes them in this order, in the units of the log. Empty for most hybrids.
     pub fn own_columns(&self) -> &[String] {
         &self.own
+    }
+
+    /// What the envelope asks of each sample, where the hybrid has one: [`Place::Beyond`] names a quantity by its index there.
+    pub fn envelope(&self) -> Option<&Envelope> {
+        self.hybrid.borrow().description().envelope.as_ref()
     }
 
     /// Samples until the history is full and there is a prediction.

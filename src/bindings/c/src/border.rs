@@ -22,6 +22,8 @@ pub enum Fault {
     Own(usize, f64),
     /// A time is not finite.
     Start(f64),
+    /// A network that looks at no sample.
+    Every,
     /// What the physics predicts is not finite.
     Physics,
     /// What the library says.
@@ -46,7 +48,7 @@ impl Fault {
     pub const fn status(&self) -> PhytureStatus {
         match self {
             Self::Null(_) => PhytureStatus::Null,
-            Self::Length { .. } => PhytureStatus::Length,
+            Self::Length { .. } | Self::Every => PhytureStatus::Length,
             Self::State(..) | Self::Own(..) | Self::Start(_) => PhytureStatus::NotFinite,
             Self::Physics => PhytureStatus::Prediction,
             Self::Library(status, _) => *status,
@@ -65,6 +67,7 @@ impl Display for Fault {
             }
             Self::Own(place, value) => write!(f, "own[{place}] is {value}, not a finite number; the sample was not taken"),
             Self::Start(value) => write!(f, "`start_s` is {value}, not a finite number"),
+            Self::Every => f.write_str("`samples` is 0, expected 1 or more"),
             Self::Physics => f.write_str("the physics is not finite here: look at this state, and at the formulas of the model"),
             Self::Library(_, error) => error.fmt(f),
             Self::Panic(said) => write!(f, "a fault of the library: {said}"),

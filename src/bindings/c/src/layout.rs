@@ -63,6 +63,20 @@ pub enum PhytureAcceleration {
     WzDot,
 }
 
+/// Where a sample lies beside what calibration and training saw.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PhyturePlace {
+    /// The model does not know: a model file, or a hybrid of before there were envelopes.
+    Unknown,
+    /// Inside: each quantity in its range, and the sample near to one that was seen.
+    Inside,
+    /// A quantity is beyond its range: PhyturePrediction.beyond says which.
+    Beyond,
+    /// Each quantity is in its range, but all together farther from everything that was seen than any sample of the training.
+    Apart,
+}
+
 /// A prediction and its parts, in the order of PhytureAcceleration: m/s² and rad/s².
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,6 +90,13 @@ pub struct PhyturePrediction {
     pub linear: [f64; PHYTURE_ACCELERATIONS],
     /// What the network says; 0 where there is none, NaN while the prediction is not complete.
     pub network: [f64; PHYTURE_ACCELERATIONS],
+    /// Half of the interval around the acceleration, made to hold 90 % of the measurements of flights like those of the training; NaN where
+    /// there is none.
+    pub half_width: [f64; PHYTURE_ACCELERATIONS],
+    /// Where the sample lies beside what calibration and training saw. Outside neither prediction nor interval is backed by data.
+    pub place: PhyturePlace,
+    /// For PHYTURE_PLACE_BEYOND the quantity that is farthest out, an index for phyture_stream_envelope_name; else 0.
+    pub beyond: usize,
     /// Whether the network has its history: from the phyture_stream_history-th sample on. A model without a network is always complete.
     pub complete: bool,
 }

@@ -1,14 +1,16 @@
 //! A stream behind a handle: a state in, a prediction with its parts out. The computing is `phyture`'s.
 
 use crate::border::{Fault, Text, free, guarded, numbers, shared};
-use crate::layout::{PHYTURE_ACCELERATIONS, PHYTURE_STATES, PhyturePrediction};
+use crate::layout::{PHYTURE_ACCELERATIONS, PHYTURE_STATES, PhyturePlace, PhyturePrediction};
 use crate::model::{Loaded, PhytureModel};
 use crate::status::PhytureStatus;
+use phyture::hybrid::envelope::{Envelope, Place};
 use phyture::hybrid::{Hybrid, StreamingHybrid};
 use phyture::physics::StreamingModel;
 use phyture::{Error, Result};
 use std::ffi::{CString, c_char};
 use std::mem::MaybeUninit;
+use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 /// Bytes of the sentence about the last fault.
@@ -19,6 +21,8 @@ pub struct PhytureStream {
     streaming: Streaming,
     /// Names of the log's own columns.
     own: Vec<CString>,
+    /// Names of the quantities of the envelope.
+    envelope: Vec<CString>,
     message: [MaybeUninit<u8>; MESSAGE],
     /// There was a panic, and nobody knows what it left behind.
     broken: bool,
@@ -61,6 +65,21 @@ impl Streaming {
         }
     }
 
+    fn envelope(&self) -> Option<&Envelope> {
+        match self {
+            Self::Hybrid(stream) => stream.envelope(),
+            Self::Physics(_) => None,
+        }
+    }
+
+    fn set_network_every(&mut self, samples: NonZeroUsize) {
+        match self {
+            Self::Hybrid(stream) => stream.set_network_every(samples),
+            // There is no network that could wait.
+            Self::Physics(_) => (),
+        }
+    }
+
     fn reset(&mut self, start_s: f64) {
         match self {
             Self::Hybrid(stream) => stream.reset(start_s),
@@ -77,7 +96,16 @@ impl Streaming {
                 if physics.iter().any(|value| !value.is_finite()) {
                     return Err(Fault::Physics);
                 }
-                Ok(PhyturePrediction { acceleration: physics, physics, linear: NOTHING, network: NOTHING, complete: true })
+                Ok(PhyturePrediction {
+                    acceleration: physics,
+                    physics,
+                    linear: NOTHING,
+                    network: NOTHING,
+                    half_width: NOT_YET,
+                    place: PhyturePlace::Unknown,
+                    beyond: 0,
+                    complete: true,
+                })
             }
             Self::Hybrid(stream) => {
                 // Numbers that are not finite were refused before: what is still undetermined is the prediction.
@@ -85,11 +113,20 @@ impl Streaming {
                     Error::Undetermined(_) => Fault::Library(PhytureStatus::Prediction, error),
                     _ => Fault::model(error),
                 })?;
+                let (place, beyond) = match parts.place {
+                    None => (PhyturePlace::Unknown, 0),
+                    Some(Place::Inside) => (PhyturePlace::Inside, 0),
+                    Some(Place::Beyond { quantity, .. }) => (PhyturePlace::Beyond, quantity),
+                    Some(Place::Apart { .. }) => (PhyturePlace::Apart, 0),
+                };
                 Ok(PhyturePrediction {
                     acceleration: parts.acceleration.map_or(NOT_YET, Into::into),
                     physics: parts.physics.into(),
                     linear: parts.linear.into(),
                     network: parts.network.map_or(NOT_YET, Into::into),
+                    half_width: parts.half_width.map_or(NOT_YET, Into::into),
+                    place,
+                    beyond,
                     complete: parts.acceleration.is_some(),
                 })
             }
@@ -101,13 +138,15 @@ impl PhytureStream {
     fn new(loaded: &Loaded, step_s: f64) -> Result<Self> {
         let streaming = Streaming::new(loaded, step_s)?;
         // Names are those of columns, in which nothing but a zero byte has no place in C.
-        let own = streaming.own_columns().iter().map(|name| CString::new(name.as_str()).unwrap_or_default()).collect();
-        Ok(Self { streaming, own, message: [MaybeUninit::new(0); MESSAGE], broken: false })
+        let text = |name: &str| CString::new(name).unwrap_or_default();
+        let own = streaming.own_columns().iter().map(|name| text(name)).collect();
+        let envelope = streaming.envelope().map_or(&[][..], Envelope::ranges).iter().map(|range| text(&range.name)).collect();
+        Ok(Self { streaming, own, envelope, message: [MaybeUninit::new(0); MESSAGE], broken: false })
     }
 
     /// Runs a call on the stream; a panic breaks it for good.
     fn call(&mut self, work: impl FnOnce(&mut Streaming, usize) -> std::result::Result<(), Fault>) -> PhytureStatus {
-        let Self { streaming, own, message, broken } = self;
+        let Self { streaming, own, message, broken, .. } = self;
         let is_broken = *broken;
         let status = guarded(&mut Text::new(message), || if is_broken { Err(Fault::Broken) } else { work(streaming, own.len()) });
         *broken |= status == PhytureStatus::Panic;
@@ -246,7 +285,73 @@ pub unsafe extern "C" fn phyture_stream_own_name(stream: *const PhytureStream, i
     name.map_or(std::ptr::null(), |name| name.as_ptr())
 }
 
-/// The sentence about the last phyture_stream_push or phyture_stream_reset; empty where that was done, NULL for NULL. The text belongs to the stream and
+/// How many quantities the envelope asks for; 0 for NULL, and for a model without an envelope.
+///
+/// # Safety
+/// `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phyture_stream_envelope_count(stream: *const PhytureStream) -> usize {
+    // SAFETY: the caller keeps the contract above.
+    unsafe { stream.as_ref() }.map_or(0, |stream| stream.envelope.len())
+}
+
+/// Name of one of these quantities, a state or a column of the log's own; NULL where there is none. The text belongs to the stream.
+///
+/// # Safety
+/// `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phyture_stream_envelope_name(stream: *const PhytureStream, index: usize) -> *const c_char {
+    // SAFETY: the caller keeps the contract above.
+    let name = unsafe { stream.as_ref() }.and_then(|stream| stream.envelope.get(index));
+    name.map_or(std::ptr::null(), |name| name.as_ptr())
+}
+
+/// Smallest and largest value of one of these quantities in the training, in its unit; PHYTURE_STATUS_LENGTH where there is no such quantity, and
+/// `low` and `high` are then as they were.
+///
+/// # Safety
+/// `stream` is NULL, or came from phyture_stream_new, and no other thread uses it. `low` and `high` are NULL or can be written.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phyture_stream_envelope_range(
+    stream: *const PhytureStream,
+    index: usize,
+    low: *mut f64,
+    high: *mut f64,
+) -> PhytureStatus {
+    // SAFETY: the caller keeps the contract above.
+    let Some(stream) = (unsafe { stream.as_ref() }) else { return PhytureStatus::Null };
+    if low.is_null() || high.is_null() {
+        return PhytureStatus::Null;
+    }
+    let Some(range) = stream.streaming.envelope().and_then(|envelope| envelope.ranges().get(index)) else {
+        return PhytureStatus::Length;
+    };
+    // SAFETY: not null, and the caller gives places that can be written.
+    unsafe {
+        low.write(range.low);
+        high.write(range.high);
+    }
+    PhytureStatus::Ok
+}
+
+/// Lets the network look at every `samples`-th sample only and holds what it said in between; physics and linear history are of each sample all the
+/// same. 1 after phyture_stream_new. Without a network nothing changes. Fails with PHYTURE_STATUS_NULL, PHYTURE_STATUS_LENGTH for 0,
+/// PHYTURE_STATUS_PANIC.
+///
+/// # Safety
+/// `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phyture_stream_network_every(stream: *mut PhytureStream, samples: usize) -> PhytureStatus {
+    // SAFETY: the caller keeps the contract above.
+    let Some(stream) = (unsafe { stream.as_mut() }) else { return PhytureStatus::Null };
+    stream.call(|streaming, _| {
+        let samples = NonZeroUsize::new(samples).ok_or(Fault::Every)?;
+        streaming.set_network_every(samples);
+        Ok(())
+    })
+}
+
+/// The sentence about the last phyture_stream_push, phyture_stream_reset or phyture_stream_network_every; empty where that was done, NULL for NULL. The text belongs to the stream and
 /// stays as it is until the next of these calls.
 ///
 /// # Safety

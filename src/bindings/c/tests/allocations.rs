@@ -37,6 +37,9 @@ fn pushing_allocates_nothing() -> Result<()> {
                 physics: [0.0; 6],
                 linear: [0.0; 6],
                 network: [0.0; 6],
+                half_width: [0.0; 6],
+                place: PhyturePlace::Unknown,
+                beyond: 0,
                 complete: false,
             };
             let mut complete = 0;

@@ -32,7 +32,7 @@ fn stream(of: *const PhytureModel, step_s: f64) -> (*mut PhytureStream, PhytureS
 }
 
 const NOTHING: PhyturePrediction =
-    PhyturePrediction { acceleration: [0.0; 6], physics: [0.0; 6], linear: [0.0; 6], network: [0.0; 6], complete: false };
+    PhyturePrediction { acceleration: [0.0; 6], physics: [0.0; 6], linear: [0.0; 6], network: [0.0; 6], half_width: [0.0; 6], place: PhyturePlace::Unknown, beyond: 0, complete: false };
 
 fn push(stream: *mut PhytureStream, state: &[f64], own: &[f64]) -> (PhytureStatus, PhyturePrediction) {
     let mut out = NOTHING;
@@ -83,8 +83,13 @@ fn a_hybrid_says_what_the_library_says_part_by_part_and_again_after_a_reset() ->
             assert_eq!(status, PhytureStatus::Ok, "{}", said(stream));
             assert_eq!(found.physics, PerChannel::from_fn(|channel| physics[channel][sample]).into_array());
             assert_eq!(found.complete, sample + 1 >= HISTORY);
+            let own = state(&flights[0], sample);
+            let half_width = hybrid.description().intervals.as_ref().expect("it has intervals").half_width(&own);
+            assert!(sample + 1 < HISTORY || found.half_width == half_width.into_array());
+            assert_ne!(found.place, PhyturePlace::Unknown);
             let Some(window) = (sample + 1).checked_sub(HISTORY) else {
-                assert!(found.acceleration.iter().chain(&found.network).all(|value| value.is_nan()));
+                let not_yet = found.acceleration.iter().chain(&found.network).chain(&found.half_width);
+                assert!(not_yet.copied().all(f64::is_nan));
                 continue;
             };
             assert_eq!(found.acceleration, stages.hybrid[window].into_array());
@@ -97,6 +102,85 @@ fn a_hybrid_says_what_the_library_says_part_by_part_and_again_after_a_reset() ->
     }
     // SAFETY: freed once.
     unsafe { phyture_stream_free(stream) };
+    Ok(())
+}
+
+#[test]
+fn a_state_that_no_training_saw_is_told_by_the_name_of_its_quantity() -> Result<()> {
+    let place = folder()?;
+    let [file, toml] = files(place.path())?;
+    let (handle, ..) = read(phyture_hybrid_read, &file);
+    let (stream_, status, message) = stream(handle, 0.0);
+    assert_eq!(status, PhytureStatus::Ok, "{message}");
+    let mut fast = state(&simulated()?.flights[0], 0);
+    fast[PhytureState::Vx as usize] = 80.0;
+    let (status, found) = push(stream_, &fast, &[]);
+    assert_eq!((status, found.place), (PhytureStatus::Ok, PhyturePlace::Beyond));
+    let (mut low, mut high) = (f64::NAN, f64::NAN);
+    // SAFETY: a stream of this test's own, places that can be written, and null where null is looked for.
+    unsafe {
+        let names: Vec<String> =
+            (0..phyture_stream_envelope_count(stream_)).map(|index| text(phyture_stream_envelope_name(stream_, index))).collect();
+        assert_eq!(names[found.beyond], "vx");
+        assert_eq!(phyture_stream_envelope_range(stream_, found.beyond, &mut low, &mut high), PhytureStatus::Ok);
+        assert!(low < high && high < 80.0, "{low} {high}");
+        assert_eq!(phyture_stream_envelope_range(stream_, names.len(), &mut low, &mut high), PhytureStatus::Length);
+        assert_eq!(phyture_stream_envelope_range(stream_, 0, null_mut(), &mut high), PhytureStatus::Null);
+        assert!(phyture_stream_envelope_name(stream_, names.len()).is_null() && phyture_stream_envelope_count(null()) == 0);
+        phyture_model_free(handle);
+        phyture_stream_free(stream_);
+    }
+    // A model file says nothing of what it was calibrated on.
+    let (handle, ..) = read(phyture_model_read, &toml);
+    let (stream_, ..) = stream(handle, 0.01);
+    let (status, found) = push(stream_, &fast, &[]);
+    assert_eq!((status, found.place), (PhytureStatus::Ok, PhyturePlace::Unknown));
+    assert!(found.half_width.iter().all(|value| value.is_nan()));
+    // SAFETY: handles of this test's own, freed once.
+    unsafe {
+        assert_eq!(phyture_stream_envelope_count(stream_), 0);
+        phyture_model_free(handle);
+        phyture_stream_free(stream_);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_network_that_looks_now_and_then_is_held_in_between() -> Result<()> {
+    const EVERY: usize = 4;
+    let place = folder()?;
+    let [file, _] = files(place.path())?;
+    let (handle, ..) = read(phyture_hybrid_read, &file);
+    let ((rare, ..), (often, ..)) = (stream(handle, 0.0), stream(handle, 0.0));
+    // SAFETY: streams of this test's own.
+    unsafe {
+        assert_eq!(phyture_stream_network_every(rare, 0), PhytureStatus::Length);
+        assert_eq!(said(rare), "`samples` is 0, expected 1 or more");
+        assert_eq!(phyture_stream_network_every(rare, EVERY), PhytureStatus::Ok);
+    }
+    let flight = &simulated()?.flights[0];
+    let mut held = [f64::NAN; 6];
+    for sample in 0..3 * HISTORY {
+        let state = state(flight, sample);
+        let (rare, often) = (push(rare, &state, &[]).1, push(often, &state, &[]).1);
+        assert_eq!((rare.physics, rare.linear, rare.complete), (often.physics, often.linear, often.complete));
+        if !often.complete {
+            continue;
+        }
+        if (sample + 1 - HISTORY).is_multiple_of(EVERY) {
+            held = often.network;
+        }
+        assert_eq!(rare.network, held);
+        for channel in 0..6 {
+            assert_eq!(rare.acceleration[channel], rare.physics[channel] + rare.linear[channel] + held[channel]);
+        }
+    }
+    // SAFETY: handles of this test's own, freed once.
+    unsafe {
+        phyture_stream_free(rare);
+        phyture_stream_free(often);
+        phyture_model_free(handle);
+    }
     Ok(())
 }
 

@@ -48,7 +48,7 @@ pub fn hybrid(set: &DataSet) -> Result<Hybrid> {
     let linear = LinearConfig { lags: 3, ..LinearConfig::default() };
     let linear = sequence::linear(&set.flights, &split.training, &model, &linear)?;
     let config = config.into();
-    let description = Description {
+    let mut description = Description {
         envelope: None,
         intervals: None,
         scaling: sequence::scaling(&set.flights, &split.training, &model, &inputs, Some(&linear), &config)?,
@@ -59,8 +59,12 @@ pub fn hybrid(set: &DataSet) -> Result<Hybrid> {
         gate: PerChannel::splat(1.0),
         step_s: 0.01,
     };
+    description.set_envelope(&set.flights, &split.training)?;
     let weights = description.network(false)?.initial(1);
-    Hybrid::new(description, weights)
+    let mut hybrid = Hybrid::new(description, weights)?;
+    hybrid.set_intervals(&set.flights, &split.training, &windows(&split.validation, HISTORY, 5), Threads(1))?;
+    assert!(hybrid.description().intervals.is_some(), "the flights are too short for intervals");
+    Ok(hybrid)
 }
 
 pub fn state(flight: &Flight, sample: usize) -> [f64; 16] {
