@@ -47,6 +47,8 @@ impl Case {
         let inputs: Vec<String> = Column::STATE.iter().map(|column| column.name().to_owned()).collect();
         let linear = sequence::linear(&set.flights, &split.training, &model, &LinearConfig { lags: 3, ..LinearConfig::default() })?;
         let description = Description {
+            envelope: None,
+            intervals: None,
             scaling: sequence::scaling(&set.flights, &split.training, &model, &inputs, Some(&linear), &config)?,
             model,
             config,

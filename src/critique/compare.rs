@@ -5,10 +5,10 @@
 
 use super::channels::{ChannelValues, Intervals};
 use super::contest::{self, Best, Difference, RowSums};
+use super::coverage::Coverage;
 use super::predictions::{Row, check_row, measured, variation};
 use super::regime::Regime;
 use super::shares::Shares;
-use super::coverage::Coverage;
 use super::uncertainty::Uncertainty;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;

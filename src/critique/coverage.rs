@@ -42,13 +42,7 @@ pub struct Coverage {
 ///
 /// # Errors
 /// As [`Hybrid::predict`].
-pub fn coverage(
-    name: &str,
-    hybrid: &Hybrid,
-    flights: &[Flight],
-    windows: &[Window],
-    threads: Threads,
-) -> Result<Option<Coverage>> {
+pub fn coverage(name: &str, hybrid: &Hybrid, flights: &[Flight], windows: &[Window], threads: Threads) -> Result<Option<Coverage>> {
     let Some(intervals) = &hybrid.description().intervals else { return Ok(None) };
     let predicted = hybrid.predict_unknown(flights, windows, threads)?;
     let blocks = Blocks::new(flights, windows);
@@ -104,12 +98,19 @@ impl Coverage {
     /// Rows of a table: name and a text for each channel.
     pub fn rows(&self) -> Vec<(String, Vec<String>)> {
         let percent = |value: &Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{:.0}", 100.0 * value));
-        let interval =
-            |value: &Option<[f64; 2]>| value.map_or_else(String::new, |[low, high]| format!("{:.0}…{:.0}", 100.0 * low, 100.0 * high));
+        let interval = |value: &Option<[f64; 2]>| {
+            value.map_or_else(String::new, |[low, high]| format!("{:.0}…{:.0}", 100.0 * low, 100.0 * high))
+        };
         vec![
-            (format!("measurements held, % ({:.0} promised)", 100.0 * self.promised), self.held.channels().iter().map(percent).collect()),
+            (
+                format!("measurements held, % ({:.0} promised)", 100.0 * self.promised),
+                self.held.channels().iter().map(percent).collect(),
+            ),
             (String::new(), self.held_ci95.iter().map(interval).collect()),
-            ("half of an interval, mean".to_owned(), self.half_width.channels().iter().map(|value| Kind::Error.text(*value)).collect()),
+            (
+                "half of an interval, mean".to_owned(),
+                self.half_width.channels().iter().map(|value| Kind::Error.text(*value)).collect(),
+            ),
         ]
     }
 
@@ -124,9 +125,13 @@ impl Coverage {
             Some(outside) if outside > 0.0 => {
                 let mut by: Vec<(&String, &f64)> = self.outside_by.iter().collect();
                 by.sort_by(|one, other| other.1.total_cmp(one.1));
-                let by: Vec<String> = by.iter().map(|(name, share)| format!("{name} {} %", significant(100.0 * **share, 2))).collect();
+                let by: Vec<String> =
+                    by.iter().map(|(name, share)| format!("{name} {} %", significant(100.0 * **share, 2))).collect();
                 let outside = significant(100.0 * outside, 2);
-                note.push_str(&format!(" {outside} % of these samples lie outside of what calibration and training saw ({}).", by.join(", ")));
+                note.push_str(&format!(
+                    " {outside} % of these samples lie outside of what calibration and training saw ({}).",
+                    by.join(", ")
+                ));
             }
             Some(_) => note.push_str(" All of these samples lie within what calibration and training saw."),
             None => (),

@@ -66,8 +66,10 @@ impl Envelope {
         if samples == 0 {
             return Err(Error::Undetermined("no sample to take an envelope from: the training part is empty".into()));
         }
-        let columns: Vec<Vec<&[f64]>> = spans.iter().map(|span| columns(&flights[span.flight], span, names)).collect::<Result<_>>()?;
-        let ranges: Vec<Range> = names.iter().enumerate().map(|(index, name)| range(name, columns.iter().map(|span| span[index]))).collect();
+        let columns: Vec<Vec<&[f64]>> =
+            spans.iter().map(|span| columns(&flights[span.flight], span, names)).collect::<Result<_>>()?;
+        let ranges: Vec<Range> =
+            names.iter().enumerate().map(|(index, name)| range(name, columns.iter().map(|span| span[index]))).collect();
         let mut envelope = Self { ranges, centres: Vec::new(), radius: 0.0 };
         let mut row = vec![0.0; names.len()];
         let mut candidates: Vec<f32> = Vec::new();
@@ -106,7 +108,11 @@ impl Envelope {
         if let Some(range) = ranges.iter().find(|range| !(range.low <= range.high && (range.high - range.low).is_finite())) {
             return Err(format!("`{}` from {} to {}", range.name, range.low, range.high));
         }
-        if ranges.is_empty() || centres.is_empty() || !centres.len().is_multiple_of(ranges.len().max(1)) || centres.iter().any(|share| !share.is_finite()) {
+        if ranges.is_empty()
+            || centres.is_empty()
+            || !centres.len().is_multiple_of(ranges.len().max(1))
+            || centres.iter().any(|share| !share.is_finite())
+        {
             return Err(format!("{} numbers for centres of {} quantities", centres.len(), ranges.len()));
         }
         if *radius >= 0.0 && radius.is_finite() { Ok(()) } else { Err(format!("a radius of {radius}")) }
@@ -124,7 +130,9 @@ impl Envelope {
 
     /// Square of the distance from the nearest centre.
     fn square(&self, values: &[f64]) -> f64 {
-        let of = |centre: &[f32]| centre.iter().zip(self.shares(values)).map(|(at, share)| (share - f64::from(*at)).powi(2)).sum::<f64>();
+        let of = |centre: &[f32]| {
+            centre.iter().zip(self.shares(values)).map(|(at, share)| (share - f64::from(*at)).powi(2)).sum::<f64>()
+        };
         self.centres.chunks_exact(self.ranges.len()).map(of).fold(f64::INFINITY, f64::min)
     }
 }
@@ -143,7 +151,8 @@ fn columns<'f>(flight: &'f Flight, span: &Span, names: &[String]) -> Result<Vec<
 }
 
 fn range<'c>(name: &str, columns: impl Iterator<Item = &'c [f64]>) -> Range {
-    let (low, high) = columns.flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
+    let (low, high) =
+        columns.flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
     Range { name: name.to_owned(), low, high }
 }
 

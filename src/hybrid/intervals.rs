@@ -289,7 +289,8 @@ mod tests {
 
     #[test]
     fn errors_of_nothing_have_an_interval_of_nothing() {
-        let nothing: Vec<Stray> = (0..60).map(|index| Stray { size: 0.0, motion: f64::from(index), block: index as usize / 10 }).collect();
+        let nothing: Vec<Stray> =
+            (0..60).map(|index| Stray { size: 0.0, motion: f64::from(index), block: index as usize / 10 }).collect();
         assert_eq!(width(&nothing, 6).half(1.0).to_bits(), 0.0_f64.to_bits());
     }
 }

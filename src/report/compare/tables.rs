@@ -148,7 +148,8 @@ pub fn share_parts(shares: &Shares) -> Vec<Part> {
 
 /// The share of measurements that a network's intervals hold, and where the network was not trained.
 pub fn coverage_parts(coverage: &Coverage) -> Vec<Part> {
-    let row = |(name, cells): (String, Vec<String>)| [Cell::from(name)].into_iter().chain(cells.into_iter().map(Cell::from)).collect();
+    let row =
+        |(name, cells): (String, Vec<String>)| [Cell::from(name)].into_iter().chain(cells.into_iter().map(Cell::from)).collect();
     let table = Table {
         caption: format!("Prediction intervals of {}", coverage.name),
         columns: channel_columns("", false, false),

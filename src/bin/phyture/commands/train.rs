@@ -246,8 +246,11 @@ fn say_intervals(context: &Context, hybrid: &Hybrid) {
         return context.say("no prediction intervals: too few blocks of flight were kept from training (`interval_every`)");
     };
     let (windows, blocks) = intervals.made_from();
-    let shown: Vec<String> =
-        intervals.typical().pairs().map(|(channel, half)| format!("{} ±{} {}", channel.name(), significant(*half, 2), channel.unit())).collect();
+    let shown: Vec<String> = intervals
+        .typical()
+        .pairs()
+        .map(|(channel, half)| format!("{} ±{} {}", channel.name(), significant(*half, 2), channel.unit()))
+        .collect();
     context.say(wrapped(
         "",
         &format!(

@@ -31,8 +31,16 @@ fn stream(of: *const PhytureModel, step_s: f64) -> (*mut PhytureStream, PhytureS
     (handle, status, unsafe { text(message.as_ptr()) })
 }
 
-const NOTHING: PhyturePrediction =
-    PhyturePrediction { acceleration: [0.0; 6], physics: [0.0; 6], linear: [0.0; 6], network: [0.0; 6], half_width: [0.0; 6], place: PhyturePlace::Unknown, beyond: 0, complete: false };
+const NOTHING: PhyturePrediction = PhyturePrediction {
+    acceleration: [0.0; 6],
+    physics: [0.0; 6],
+    linear: [0.0; 6],
+    network: [0.0; 6],
+    half_width: [0.0; 6],
+    place: PhyturePlace::Unknown,
+    beyond: 0,
+    complete: false,
+};
 
 fn push(stream: *mut PhytureStream, state: &[f64], own: &[f64]) -> (PhytureStatus, PhyturePrediction) {
     let mut out = NOTHING;

@@ -3,12 +3,14 @@
 #![allow(dead_code, reason = "each test program uses its part")]
 
 use phyture::flight::split::{Protocol, Split};
+use phyture::flight::windows::windows;
 use phyture::flight::{Channel, Column, DataSet, Flight, PerChannel};
 use phyture::hybrid::linear::LinearConfig;
 use phyture::hybrid::{Description, Hybrid, sequence};
 use phyture::nn::PhyTureConfig;
 use phyture::physics::{Effect, Model, calibrate};
 use phyture::sim::{Simulation, simulate};
+use phyture::tape::Threads;
 use phyture::{Error, Result};
 use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
@@ -62,7 +64,7 @@ pub fn hybrid(set: &DataSet) -> Result<Hybrid> {
     description.set_envelope(&set.flights, &split.training)?;
     let weights = description.network(false)?.initial(1);
     let mut hybrid = Hybrid::new(description, weights)?;
-    hybrid.set_intervals(&set.flights, &split.training, &windows(&split.validation, HISTORY, 5), Threads(1))?;
+    hybrid.set_intervals(&set.flights, &split.training, &windows(&split.training, HISTORY, 5), Threads(1))?;
     assert!(hybrid.description().intervals.is_some(), "the flights are too short for intervals");
     Ok(hybrid)
 }
