@@ -76,6 +76,28 @@ typedef enum PhytureStatus {
 } PhytureStatus;
 
 /*
+ Where a sample lies beside what calibration and training saw.
+ */
+typedef enum PhyturePlace {
+  /*
+   The model does not know: a model file, or a hybrid of before there were envelopes.
+   */
+  PHYTURE_PLACE_UNKNOWN,
+  /*
+   Inside: each quantity in its range, and the sample near to one that was seen.
+   */
+  PHYTURE_PLACE_INSIDE,
+  /*
+   A quantity is beyond its range: PhyturePrediction.beyond says which.
+   */
+  PHYTURE_PLACE_BEYOND,
+  /*
+   Each quantity is in its range, but all together farther from everything that was seen than any sample of the training.
+   */
+  PHYTURE_PLACE_APART,
+} PhyturePlace;
+
+/*
  Places in a state.
  */
 typedef enum PhytureState {
@@ -206,6 +228,19 @@ typedef struct PhyturePrediction {
    What the network says; 0 where there is none, NaN while the prediction is not complete.
    */
   double network[PHYTURE_ACCELERATIONS];
+  /*
+   Half of the interval around the acceleration, made to hold 90 % of the measurements of flights like those of the training; NaN where
+   there is none.
+   */
+  double half_width[PHYTURE_ACCELERATIONS];
+  /*
+   Where the sample lies beside what calibration and training saw. Outside neither prediction nor interval is backed by data.
+   */
+  enum PhyturePlace place;
+  /*
+   For PHYTURE_PLACE_BEYOND the quantity that is farthest out, an index for phyture_stream_envelope_name; else 0.
+   */
+  size_t beyond;
   /*
    Whether the network has its history: from the phyture_stream_history-th sample on. A model without a network is always complete.
    */
@@ -339,7 +374,47 @@ size_t phyture_stream_own_count(const struct PhytureStream *stream);
 const char *phyture_stream_own_name(const struct PhytureStream *stream, size_t index);
 
 /*
- The sentence about the last phyture_stream_push or phyture_stream_reset; empty where that was done, NULL for NULL. The text belongs to the stream and
+ How many quantities the envelope asks for; 0 for NULL, and for a model without an envelope.
+
+ # Safety
+ `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+ */
+size_t phyture_stream_envelope_count(const struct PhytureStream *stream);
+
+/*
+ Name of one of these quantities, a state or a column of the log's own; NULL where there is none. The text belongs to the stream.
+
+ # Safety
+ `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+ */
+const char *phyture_stream_envelope_name(const struct PhytureStream *stream,
+                                         size_t index);
+
+/*
+ Smallest and largest value of one of these quantities in the training, in its unit; PHYTURE_STATUS_LENGTH where there is no such quantity, and
+ `low` and `high` are then as they were.
+
+ # Safety
+ `stream` is NULL, or came from phyture_stream_new, and no other thread uses it. `low` and `high` are NULL or can be written.
+ */
+enum PhytureStatus phyture_stream_envelope_range(const struct PhytureStream *stream,
+                                                 size_t index,
+                                                 double *low,
+                                                 double *high);
+
+/*
+ Lets the network look at every `samples`-th sample only and holds what it said in between; physics and linear history are of each sample all the
+ same. 1 after phyture_stream_new. Without a network nothing changes. Fails with PHYTURE_STATUS_NULL, PHYTURE_STATUS_LENGTH for 0,
+ PHYTURE_STATUS_PANIC.
+
+ # Safety
+ `stream` is NULL, or came from phyture_stream_new, and no other thread uses it.
+ */
+enum PhytureStatus phyture_stream_network_every(struct PhytureStream *stream,
+                                                size_t samples);
+
+/*
+ The sentence about the last phyture_stream_push, phyture_stream_reset or phyture_stream_network_every; empty where that was done, NULL for NULL. The text belongs to the stream and
  stays as it is until the next of these calls.
 
  # Safety
