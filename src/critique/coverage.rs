@@ -8,7 +8,7 @@ use crate::blocks::{BlockMean, BlockSum, Blocks};
 use crate::error::Result;
 use crate::flight::{Channel, Column, Flight, PerChannel, Window};
 use crate::hybrid::Hybrid;
-use crate::hybrid::envelope::Place;
+use crate::hybrid::envelope::{Envelope, Place};
 use crate::tape::Threads;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -61,7 +61,7 @@ pub fn coverage(name: &str, hybrid: &Hybrid, flights: &[Flight], windows: &[Wind
     }
     let means = held.map(|sums| BlockMean::new(sums.into_iter()));
     let within = |[low, high]: [f64; 2]| [low.max(0.0), high.min(1.0)];
-    let outside_by = outside(hybrid, flights, windows);
+    let outside_by = outside_by(hybrid, flights, windows);
     Ok(Some(Coverage {
         name: name.to_owned(),
         promised: intervals.coverage(),
@@ -74,21 +74,22 @@ pub fn coverage(name: &str, hybrid: &Hybrid, flights: &[Flight], windows: &[Wind
     }))
 }
 
+/// What a sample is outside of: the quantity that is farthest beyond its range, or [`TOGETHER`]; `None` inside. A quantity that the flight lacks was
+/// refused when it was predicted.
+pub fn outside<'e>(envelope: &'e Envelope, flight: &Flight, sample: usize) -> Option<&'e str> {
+    let columns = envelope.ranges().iter().filter_map(|range| flight.named(&range.name));
+    match envelope.place(&columns.map(|column| column[sample]).collect::<Vec<f64>>()) {
+        Place::Inside => None,
+        Place::Beyond { quantity, .. } => Some(&envelope.ranges()[quantity].name),
+        Place::Apart { .. } => Some(TOGETHER),
+    }
+}
+
 /// Shares of the windows that lie outside the envelope, by quantity.
-fn outside(hybrid: &Hybrid, flights: &[Flight], windows: &[Window]) -> Option<BTreeMap<String, f64>> {
+fn outside_by(hybrid: &Hybrid, flights: &[Flight], windows: &[Window]) -> Option<BTreeMap<String, f64>> {
     let envelope = hybrid.description().envelope.as_ref()?;
     let mut shares = BTreeMap::new();
-    let mut values = Vec::with_capacity(envelope.ranges().len());
-    for window in windows {
-        values.clear();
-        // A flight that lacks a column was refused when it was predicted.
-        let columns = envelope.ranges().iter().filter_map(|range| flights[window.flight].named(&range.name));
-        values.extend(columns.map(|column| column[window.last]));
-        let blamed = match envelope.place(&values) {
-            Place::Inside => continue,
-            Place::Beyond { quantity, .. } => envelope.ranges()[quantity].name.as_str(),
-            Place::Apart { .. } => TOGETHER,
-        };
+    for blamed in windows.iter().filter_map(|window| outside(envelope, &flights[window.flight], window.last)) {
         *shares.entry(blamed.to_owned()).or_insert(0.0) += 1.0 / windows.len() as f64;
     }
     Some(shares)

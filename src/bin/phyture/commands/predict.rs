@@ -3,9 +3,12 @@
 use crate::arguments::{Data, STRIDES, count};
 use crate::context::Context;
 use crate::output::Progress;
+use phyture::critique::coverage::outside;
 use phyture::flight::windows::windows;
 use phyture::flight::write::{self, Values};
 use phyture::flight::{Channel, DataSet, Flight, PerChannel, Span, Window};
+use phyture::hybrid::envelope::Envelope;
+use phyture::hybrid::intervals::Intervals;
 use phyture::hybrid::{Hybrid, check_finite};
 use phyture::physics::Model;
 use phyture::{Error, Result};
@@ -14,6 +17,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Predictions for every sample: of a network, where there is a full history; or of a model alone
+///
+/// Where the network has intervals, half of each stands in a column `…_half_width`; where it has an envelope, `outside` names the quantity that
+/// is farthest beyond what calibration and training saw (`all together` where each by itself is within), and is empty inside.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  phyture predict flights -n run -o predictions.parquet\n  phyture predict flights -m n9-calibrated.toml -o physics.csv     # physics alone"
@@ -110,6 +116,14 @@ impl Predictor {
         }
     }
 
+    /// What the network says of its own limits.
+    const fn limits(&self) -> (Option<&Intervals>, Option<&Envelope>) {
+        match self {
+            Self::Hybrid(hybrid) => (hybrid.description().intervals.as_ref(), hybrid.description().envelope.as_ref()),
+            Self::Physics(_) => (None, None),
+        }
+    }
+
     const fn model(&self) -> &Model {
         match self {
             Self::Hybrid(hybrid) => &hybrid.description().model,
@@ -160,14 +174,22 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
         progress.at(predicted.len() as u64, String::new);
     }
     drop(progress);
-    write(context.ready(&target)?, format, &set, &all, &predicted)?;
+    write(context.ready(&target)?, format, &set, &Rows { windows: &all, predicted: &predicted, limits: predictor.limits() })?;
     let of = predictor.name();
     context.say(format!("{} predictions of the {of} written to {}", all.len(), wanted.output.display()));
     context.json(&Output { predictions: wanted.output.clone(), of, rows: all.len(), flights: set.flights.len() })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(path: &Path, format: Format, set: &DataSet, windows: &[Window], predicted: &[PerChannel<f64>]) -> Result<()> {
+/// What is written, a row a window.
+struct Rows<'r> {
+    windows: &'r [Window],
+    predicted: &'r [PerChannel<f64>],
+    limits: (Option<&'r Intervals>, Option<&'r Envelope>),
+}
+
+fn write(path: &Path, format: Format, set: &DataSet, rows: &Rows<'_>) -> Result<()> {
+    let Rows { windows, predicted, limits: (intervals, envelope) } = *rows;
     let numbers = |value: &dyn Fn(usize) -> f64| (0..windows.len()).map(value).collect::<Vec<f64>>();
     let flight_of = |row: usize| &set.flights[windows[row].flight];
     let text = |value: &dyn Fn(usize) -> String| (0..windows.len()).map(value).collect::<Vec<String>>();
@@ -178,8 +200,16 @@ fn write(path: &Path, format: Format, set: &DataSet, windows: &[Window], predict
         columns.push((column.name().to_owned(), numbers(&|row| flight_of(row).column(column)[windows[row].last])));
         columns.push((format!("{}_predicted", column.name()), numbers(&|row| predicted[row][channel])));
     }
+    if let Some(intervals) = intervals {
+        let half: Vec<PerChannel<f64>> =
+            windows.iter().map(|window| intervals.half_width(&set.flights[window.flight].state(window.last))).collect();
+        columns.extend(Channel::ALL.map(|channel| (format!("{}_half_width", channel.name()), numbers(&|row| half[row][channel]))));
+    }
+    let outside =
+        envelope.map(|envelope| text(&|row| outside(envelope, flight_of(row), windows[row].last).unwrap_or_default().to_owned()));
     let mut table = vec![("manoeuvre", Values::Text(&manoeuvres)), ("flight", Values::Text(&flights))];
     table.extend(columns.iter().map(|(name, values)| (name.as_str(), Values::Numbers(values))));
+    table.extend(outside.as_ref().map(|outside| ("outside", Values::Text(outside))));
     match format {
         Format::Csv => write::table_csv(path, &table),
         Format::Parquet => write::table_parquet(path, &table),
