@@ -61,7 +61,7 @@ pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     of_logs(path, logs, in_force, is_whole, options, notes)
 }
 
-/// Reads logs whose columns are in memory, as [`data_set`] reads files. The flights come from `source.files` that are none: the names of the logs.
+/// Reads logs whose columns are in memory, as [`data_set`] reads files. Where the set says which files it was read from, the names of the logs stand.
 ///
 /// # Errors
 /// As [`data_set`]; [`Error::Log`] for no log, for columns of several lengths, for two logs of one name.
