@@ -72,6 +72,9 @@ impl Format {
     /// # Errors
     /// What is wrong with the log; [`crate::Error::Log`] where the program was built without what reads it.
     pub fn read(&self, log: &Log, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
+        if let Some(table) = &log.given {
+            return assemble(table.clone(), &log.name, &log.manoeuvre, schema, cuts);
+        }
         match self.reader {
             Reader::Table(read) => {
                 let table = read(&log.path, &|name| schema.wants(name))?;

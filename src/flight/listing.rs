@@ -4,8 +4,10 @@
 //! and a symbolic link that leads back to the folder itself is not followed.
 
 use super::formats::{self, Format};
+use super::given::Given;
+use super::names::own_name;
 use super::schema::{Manoeuvre, Schema};
-use super::table::fault;
+use super::table::{CSV, RawTable, fault};
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -17,6 +19,8 @@ pub(super) struct Log {
     pub format: &'static Format,
     pub name: String,
     pub manoeuvre: String,
+    /// Its columns, where they were given and are in no file.
+    pub given: Option<RawTable>,
 }
 
 /// What a data set's folder holds.
@@ -215,26 +219,49 @@ fn none(path: &Path, unread: &Unread) -> Error {
 fn log(path: &Path, below: Option<&str>, folder: &str, schema: &Schema) -> Result<Log> {
     let format = formats::of_file(path).ok_or_else(|| fault(path, "a file of another kind", formats::files()))?;
     let own = text(path.file_stem());
-    let manoeuvre = match &schema.manoeuvre {
-        Manoeuvre::Folder => folder.to_owned(),
+    let manoeuvre = class(path, &own, folder, schema)?;
+    let name = below.map_or(own.clone(), |below| format!("{below}/{own}"));
+    Ok(Log { path: path.into(), format, name, manoeuvre, given: None })
+}
+
+/// The class of a flight with this own name, whose folder is called `folder`, as the description says.
+fn class(path: &Path, own: &str, folder: &str, schema: &Schema) -> Result<String> {
+    match &schema.manoeuvre {
+        Manoeuvre::Folder => Ok(folder.to_owned()),
         Manoeuvre::FilePart { separator, part } => own.split(separator).nth(part - 1).map(str::to_owned).ok_or_else(|| {
             fault(
                 path,
                 format!("a file name without a part {part} between `{separator}`"),
                 "a name as `manoeuvre` in dataset.toml says",
             )
-        })?,
-    };
-    Ok(Log { path: path.into(), format, name: below.map_or(own.clone(), |below| format!("{below}/{own}")), manoeuvre })
+        }),
+    }
+}
+
+/// A log whose columns are given, as a CSV file of this name would be.
+///
+/// # Errors
+/// As [`Given::table`]; [`Error::Log`] for a name that the description finds no class in.
+pub(super) fn given(log: Given, schema: &Schema) -> Result<Log> {
+    let (path, name) = (PathBuf::from(&log.name), log.name.clone());
+    let own = own_name(&name);
+    let folder = name.rsplit_once('/').map_or_else(|| without_number(own), |(above, _)| own_name(above));
+    let manoeuvre = class(&path, own, folder, schema)?;
+    Ok(Log { path, format: &CSV, manoeuvre, given: Some(log.table(&|name| schema.wants(name))?), name })
+}
+
+/// A name without an underscore and a number at its end: `hover` of `hover_03`.
+fn without_number(own: &str) -> &str {
+    own.trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix('_').unwrap_or(own)
 }
 
 /// The class is the folder above the flight's, or else the flight's name without a number at its end (`hover_03`).
 fn folder_log(path: &Path, format: &'static Format, class: Option<&Path>) -> Log {
     let own = folder_name(path);
-    let without_number = own.trim_end_matches(|c: char| c.is_ascii_digit()).strip_suffix('_');
     let class = class.map(|class| text(class.file_name()));
-    let manoeuvre = class.clone().unwrap_or_else(|| without_number.unwrap_or(&own).to_owned());
-    Log { path: path.into(), format, name: class.map_or(own.clone(), |class| format!("{class}/{own}")), manoeuvre }
+    let manoeuvre = class.clone().unwrap_or_else(|| without_number(&own).to_owned());
+    let name = class.map_or(own.clone(), |class| format!("{class}/{own}"));
+    Log { path: path.into(), format, name, manoeuvre, given: None }
 }
 
 /// Refuses two logs of one name: `a.csv` beside `a.parquet`.

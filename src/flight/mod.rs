@@ -21,6 +21,8 @@ mod description;
 pub mod differentiate;
 #[cfg(feature = "files")]
 mod formats;
+#[cfg(feature = "files")]
+mod given;
 #[cfg(feature = "parquet")]
 pub mod guard;
 #[cfg(feature = "files")]
@@ -73,6 +75,8 @@ pub use channel::{Channel, PerChannel};
 pub use column::Column;
 #[cfg(feature = "files")]
 pub(crate) use description::Description;
+#[cfg(feature = "files")]
+pub use given::Given;
 #[cfg(feature = "files")]
 pub(crate) use schema::{Frame, Schema, TargetKind};
 pub use source::Source;

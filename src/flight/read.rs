@@ -6,11 +6,11 @@
 
 use super::assemble::{Assembled, Cuts, gather};
 use super::formats;
-use super::listing::{DESCRIPTION, Listing, Log, check_unique, list};
+use super::listing::{DESCRIPTION, Listing, Log, check_unique, given, list};
 use super::schema::{LateIn, Schema};
 use super::source::Read;
 use super::table::fault;
-use super::{DataSet, Flight, Source, names};
+use super::{DataSet, Flight, Given, Source, names};
 use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;
 use std::collections::hash_map::{DefaultHasher, Entry};
@@ -32,6 +32,13 @@ pub struct ReadOptions {
     pub described: Option<String>,
 }
 
+impl ReadOptions {
+    /// Whether they say which description is in force, wherever the logs lie.
+    const fn gives_description(&self) -> bool {
+        self.dataset.is_some() || self.described.is_some()
+    }
+}
+
 /// Columns that a data set holds in memory, bytes; four hours of flight at 100 Hz.
 const LARGEST_HELD: usize = 256 << 20;
 
@@ -46,17 +53,44 @@ const LARGEST_HELD: usize = 256 << 20;
 pub fn data_set(path: &Path, options: &ReadOptions) -> Result<DataSet> {
     let mut notes = Vec::new();
     let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
-    let InForce { mut schema, read: described, mut text } = in_force(folder, options, &mut notes)?;
-    let Listing { mut logs, notes: unread } = list(path, &schema)?;
+    let in_force = in_force(Some(folder), options, &mut notes)?;
+    let Listing { logs, notes: unread } = list(path, &in_force.schema)?;
     notes.extend(unread);
+    // A description that was found above the folder, or beside a single log, is that of a larger set.
+    let is_whole = path.is_dir() && (options.gives_description() || folder.join(DESCRIPTION).is_file());
+    of_logs(path, logs, in_force, is_whole, options, notes)
+}
+
+/// Reads logs whose columns are in memory, as [`data_set`] reads files. Where the set says which files it was read from, the names of the logs stand.
+///
+/// # Errors
+/// As [`data_set`]; [`Error::Log`] for no log, for columns of several lengths, for two logs of one name.
+pub fn of_columns(logs: Vec<Given>, options: &ReadOptions) -> Result<DataSet> {
+    let mut notes = Vec::new();
+    let path = Path::new("columns");
+    let in_force = in_force(None, options, &mut notes)?;
+    if logs.is_empty() {
+        return Err(fault(path, "no logs", "the columns of at least one flight"));
+    }
+    let logs = logs.into_iter().map(|log| given(log, &in_force.schema)).collect::<Result<Vec<Log>>>()?;
+    of_logs(path, logs, in_force, options.gives_description(), options, notes)
+}
+
+/// Reads these logs. `is_whole` says whether the description in force is given for all of them and no others that are not here.
+fn of_logs(
+    path: &Path,
+    mut logs: Vec<Log>,
+    in_force: InForce,
+    is_whole: bool,
+    options: &ReadOptions,
+    mut notes: Vec<String>,
+) -> Result<DataSet> {
+    let InForce { mut schema, read: described, mut text } = in_force;
     check_unique(path, &logs)?;
     let cuts = Cuts { minimum_rows: options.minimum_rows, split_at_gaps: options.split_at_gaps };
 
-    // A description that was found above the folder, or beside a single log, is that of a larger set.
-    let is_given = options.dataset.is_some() || options.described.is_some();
-    let is_whole = path.is_dir() && (is_given || folder.join(DESCRIPTION).is_file());
     // One that lies elsewhere may be that of several sets.
-    let is_of_these = is_whole && !is_given;
+    let is_of_these = is_whole && !options.gives_description();
     let in_description = |error| described.iter().fold(error, |error, read| at(&read.path, error));
     classify(&schema, &mut logs, is_of_these, &mut notes).map_err(in_description)?;
     if let Some(whole) = formats::description(path, &logs, text.as_deref().unwrap_or_default())? {
@@ -131,10 +165,10 @@ struct InForce {
     text: Option<String>,
 }
 
-/// The description that was given, or else named, or else found beside the logs.
-fn in_force(folder: &Path, options: &ReadOptions, notes: &mut Vec<String>) -> Result<InForce> {
+/// The description that was given, or else named, or else found beside the logs, if these lie in a folder.
+fn in_force(folder: Option<&Path>, options: &ReadOptions, notes: &mut Vec<String>) -> Result<InForce> {
     let given = options.described.as_ref().map(|text| (PathBuf::from(DESCRIPTION), text.clone().into_bytes()));
-    let found = || options.dataset.clone().or_else(|| description(folder));
+    let found = || options.dataset.clone().or_else(|| description(folder?));
     let of_file = |path: PathBuf| std::fs::read(&path).map_err(Error::io(&path)).map(|bytes| (path, bytes));
     let Some((path, bytes)) = given.map(Ok).or_else(|| found().map(of_file)).transpose()? else {
         return Ok(InForce { schema: Schema::default(), read: None, text: None });

@@ -77,10 +77,17 @@ impl TrainConfig {
     /// # Errors
     /// As [`TrainConfig::read`].
     pub fn read_over(path: &Path, base: &Self) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(Error::io(path))?;
+        Self::from_text(&std::fs::read_to_string(path).map_err(Error::io(path))?, path, base)
+    }
+
+    /// As [`TrainConfig::read_over`], of a text; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`TrainConfig::read`], but for [`Error::Io`].
+    pub fn from_text(text: &str, path: &Path, base: &Self) -> Result<Self> {
         let fault = |error: &dyn std::fmt::Display| Error::File { path: path.into(), message: error.to_string() };
         // By itself first: the line of a mistake is known only here.
-        toml::from_str::<Self>(&text).map_err(|error| fault(&error))?;
+        toml::from_str::<Self>(text).map_err(|error| fault(&error))?;
         let given: Table = text.parse().map_err(|error: toml::de::Error| fault(&error))?;
         let mut merged = table(base)?;
         overlay(&mut merged, given);

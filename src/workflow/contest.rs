@@ -64,6 +64,12 @@ pub fn affordable_stride(
     Ok(Affordable { stride: round_stride(every_s / BUDGET_S), every_s })
 }
 
+/// Rows that every window must have before it is judged, the same for all: the longest history, of a ridge regression too if there is one.
+pub fn rows_needed(networks: &[(String, Hybrid)], ridge: Option<usize>) -> usize {
+    let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
+    history.max(ridge.unwrap_or(1)).max(2)
+}
+
 /// The smallest of 1, 2, 5, 10, 20, 50 … that is no less than `wanted`.
 fn round_stride(wanted: f64) -> usize {
     let mut power = 1;

@@ -12,7 +12,7 @@ use crate::hybrid::{Hybrid, network_target};
 use crate::physics::Model;
 use crate::tape::Threads;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Most windows of a network with a short history that are evaluated when its output is searched; a long one costs ten times as much.
 const MOST_WINDOWS: usize = 100_000;
@@ -116,6 +116,19 @@ pub fn network_search(hybrid: &Hybrid, set: &DataSet, split: &Split, threads: Th
         tested: split.tested,
     };
     Ok(NetworkSearch { set: target.set, split, stride })
+}
+
+/// What a loop did, as data.
+#[derive(Serialize)]
+pub struct Looped {
+    /// Diagnoses, one a round.
+    pub rounds: Vec<Diagnosis>,
+    /// The rounds as one: what was added, what it is worth, the errors before and after.
+    pub together: Diagnosis,
+    /// The file of the model, if it was written.
+    pub model: Option<PathBuf>,
+    /// There is one once something was added to a model.
+    pub ledger: Option<PathBuf>,
 }
 
 /// One line of the ledger.

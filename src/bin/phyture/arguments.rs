@@ -5,6 +5,7 @@ use clap::builder::RangedU64ValueParser;
 use phyture::flight::split::Protocol;
 use phyture::tape::Threads;
 use phyture::train::TrainConfig;
+use phyture::workflow;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
@@ -67,4 +68,11 @@ pub struct Division {
     /// Without locked flights: `segments` (random 10-s segments, 70/20/10) or `first SHARE` [default: the model file's, or segments]
     #[arg(long)]
     pub split: Option<Protocol>,
+}
+
+impl Division {
+    /// As the library takes it.
+    pub fn wanted(&self) -> workflow::Division {
+        workflow::Division { lock: self.lock.clone(), split: self.split.clone() }
+    }
 }

@@ -4,7 +4,6 @@
 use crate::arguments::{Common, Data, Division};
 use crate::folder::NewFolder;
 use crate::{notes, output};
-use phyture::critique::check::check;
 use phyture::critique::wrap::wrapped;
 use phyture::disk::{Existing, Target};
 use phyture::flight::read::{ReadOptions, data_set};
@@ -12,13 +11,16 @@ use phyture::flight::split::{BENCHMARK_SEED, Split};
 use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::tape::Threads;
-use phyture::{Error, Result};
+use phyture::{Error, Result, workflow};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Name of the model file that lies beside flights.
 const MODEL_FILE: &str = "model.toml";
+
+/// The place of what was given in vain.
+const COMMAND_LINE: &str = "command line";
 
 /// The options of every command, and the ways of speaking that follow from them.
 pub struct Context<'a> {
@@ -185,35 +187,27 @@ impl<'a> Context<'a> {
 
     /// Divides the flights as the command line and the model file say.
     pub fn split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
-        model.check_flights(flights)?;
-        let mut locked = model.data.locked.clone();
-        locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned());
-        let protocol = division.split.clone().unwrap_or_else(|| model.data.split.clone());
-        if division.split.is_some() && !locked.is_empty() {
-            return Err(Error::Config {
-                place: "command line".into(),
-                field: "--split".into(),
-                found: format!("`{protocol}` with locked flights ({})", locked.join(", ")),
-                expected: "one or the other: locked flights are the test part and all others train".into(),
-            });
-        }
-        let of_the_line = |found: &str| division.lock.iter().any(|name| found.starts_with(&format!("`{name}`")));
-        Split::new(flights, &locked, &protocol, self.seed()).map_err(|error| match error {
-            Error::Config { found, expected, field, .. } if field == "data.locked" && of_the_line(&found) => {
-                Error::Config { place: "command line".into(), field: "--lock".into(), found, expected }
-            }
-            other => other,
-        })
+        division.wanted().split(flights, model, self.seed()).map_err(of_the_line)
     }
 
-    /// Divides the flights for a search. Where nothing is locked and no split is asked for, every fifth flight confirms and no search
-    /// sees it; of fewer than ten flights the last fifth of each.
+    /// Divides the flights for a search, where something is kept in any case.
     pub fn search_split(&self, flights: &[Flight], model: &Model, division: &Division) -> Result<Split> {
-        if model.data.locked.is_empty() && division.lock.is_empty() && division.split.is_none() {
-            model.check_flights(flights)?;
-            return Ok(Split::for_search(flights, self.seed()));
+        division.wanted().search_split(flights, model, self.seed()).map_err(of_the_line)
+    }
+
+    /// Divides the flights for these models to be judged: as the first of them says, or with `all` on every flight.
+    pub fn judged_split(&self, flights: &[Flight], models: &[&Model], division: &Division, all: bool) -> Result<Split> {
+        division.wanted().judged(flights, models, self.seed(), all).map_err(of_the_line)
+    }
+}
+
+/// An error about the division with the option that it is about.
+fn of_the_line(error: Error) -> Error {
+    match error {
+        Error::Config { place, field, found, expected } if place == workflow::Division::PLACE => {
+            Error::Config { place: COMMAND_LINE.into(), field: format!("--{field}"), found, expected }
         }
-        self.split(flights, model, division)
+        other => other,
     }
 }
 
@@ -235,37 +229,12 @@ fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
 }
 
-/// The word for all flights of which `check` says that they are read otherwise than the rest.
-const SUSPECTS: &str = "suspects";
-/// Times that what is left is checked again: beside the worst the next may not have shown.
-const MOST_CHECKS: usize = 3;
-
 /// The flights without those that were asked to be left out.
-fn without(mut set: DataSet, data: &Data) -> Result<DataSet> {
-    let names: Vec<String> = data.leave_out.iter().filter(|name| *name != SUSPECTS).cloned().collect();
-    set.leave_out(&names, "as --leave-out says").map_err(|error| match error {
+fn without(set: DataSet, data: &Data) -> Result<DataSet> {
+    workflow::without(set, &data.leave_out).map_err(|error| match error {
         Error::Config { found, expected, .. } => {
-            Error::Config { place: "command line".into(), field: "--leave-out".into(), found, expected }
+            Error::Config { place: COMMAND_LINE.into(), field: "--leave-out".into(), found, expected }
         }
         other => other,
-    })?;
-    if data.leave_out.iter().any(|name| name == SUSPECTS) {
-        for _ in 0..MOST_CHECKS {
-            let suspects = check(&set, None).suspects();
-            if suspects.is_empty() {
-                break;
-            }
-            set.leave_out(&suspects, "as suspects")?;
-        }
-    }
-    if set.flights.is_empty() {
-        let expected = "at least one flight that is left".to_owned();
-        return Err(Error::Config {
-            place: "command line".into(),
-            field: "--leave-out".into(),
-            found: data.leave_out.join(" "),
-            expected,
-        });
-    }
-    Ok(set)
+    })
 }

@@ -4,6 +4,7 @@ use crate::style;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use phyture::critique::wrap::wrapped;
 use phyture::disk::write_atomically;
+use phyture::workflow::document;
 use phyture::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::io::{IsTerminal, Write};
@@ -11,23 +12,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Of the form of all machine-readable results. It grows when a program that reads them would have to change.
-const SCHEMA: u32 = 1;
-
-/// A machine-readable result, which is an object.
-#[derive(Serialize)]
-struct Document<'a, T> {
-    schema: u32,
-    #[serde(flatten)]
-    content: &'a T,
-}
-
 /// Writes the machine-readable result, to standard output for `-`.
 pub fn json(target: Option<&Path>, content: &impl Serialize) -> Result<()> {
     let Some(path) = target else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(&Document { schema: SCHEMA, content })
-        .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
-    text.push('\n');
+    let text = document(content).map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
     if path == Path::new("-") {
         return std::io::stdout().write_all(text.as_bytes()).map_err(Error::io(path));
     }

@@ -1,21 +1,19 @@
 //! `compare`: measured against predicted for every model and network given, beside honest yardsticks.
 
 use super::explainable;
-use super::predict::read_network;
 use crate::arguments::{Data, Division, STRIDES, count};
 use crate::context::Context;
 use crate::pages::Pages;
+use phyture::Result;
 use phyture::critique::table::ordinal;
 use phyture::critique::wrap::wrapped;
-use phyture::flight::split::{Part, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, Flight, Span, Window};
+use phyture::flight::{DataSet, Window};
 use phyture::hybrid::Hybrid;
 use phyture::hybrid::linear::LinearConfig;
 use phyture::physics::Model;
 use phyture::report::compare_page;
-use phyture::workflow::{Contest, affordable_stride, provenance};
-use phyture::{Error, Result};
+use phyture::workflow::{Contest, affordable_stride, provenance, read_network, rows_needed};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -67,18 +65,9 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let history = networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
     let set = context.flights(data, history)?;
     let of_networks = networks.iter().map(|(_, hybrid)| &hybrid.description().model);
-    models.iter().map(|(_, model)| model).chain(of_networks).try_for_each(|model| model.check_flights(&set.flights))?;
-    let first = models.first().map(|(_, model)| model).or_else(|| networks.first().map(|(_, hybrid)| &hybrid.description().model));
-    let Some(first) = first else {
-        return Err(Error::Config {
-            place: "command line".into(),
-            field: "--model".into(),
-            found: "nothing".into(),
-            expected: "a model file or a network".into(),
-        });
-    };
-    let split = tested(&set, context.split(&set.flights, first, division), wanted.all)?;
-    let rows_needed = history.max(wanted.ridge.unwrap_or(1)).max(2);
+    let all: Vec<&Model> = models.iter().map(|(_, model)| model).chain(of_networks).collect();
+    let split = context.judged_split(&set.flights, &all, division, wanted.all)?;
+    let rows_needed = rows_needed(&networks, wanted.ridge);
     let stride = match wanted.stride {
         Some(stride) => stride,
         None => affordable(context, &set, &windows(&split.test, rows_needed, 1), &networks)?,
@@ -125,20 +114,6 @@ fn affordable(context: &Context, set: &DataSet, every: &[Window], networks: &[(S
         ));
     }
     Ok(found.stride)
-}
-
-/// The split, or with `all` one whose test part is every flight.
-pub fn tested(set: &DataSet, split: Result<Split>, all: bool) -> Result<Split> {
-    if !all {
-        return split;
-    }
-    let whole = |(flight, log): (usize, &Flight)| Span { flight, start: 0, end: log.len() };
-    Ok(Split {
-        training: split.map(|split| split.training).unwrap_or_default(),
-        validation: Vec::new(),
-        test: set.flights.iter().enumerate().map(whole).collect(),
-        tested: Part::All,
-    })
 }
 
 /// What a row of a file or folder is called.

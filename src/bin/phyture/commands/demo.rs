@@ -5,7 +5,7 @@
 //! the baseline and on the amended model; everything judged on the locked flights.
 
 use super::diagnose;
-use super::train::{Told, digest};
+use super::train::Told;
 use super::{CHECK_FAILED, calibrate, simulate::starting_model};
 use crate::context::{Context, interruption};
 use crate::pages::Figures;
@@ -21,7 +21,7 @@ use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate_with_explainable};
 use phyture::train::{RunFolder, TrainConfig, Training};
-use phyture::workflow::{Contest, SearchTask};
+use phyture::workflow::{Calibrating, Contest, SearchTask, digest};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -165,7 +165,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let split = Split::new(&set.flights, &locked, &Protocol::Segments, context.seed())?;
     let mut model = starting_model();
     model.data.locked = locked;
-    let (model, _, _) = calibrate::fit(context, &set, &model, &split)?;
+    let model = calibrate::fit(context, &Calibrating { set: &set, split: &split }, &model)?.model;
     model.write(out.join("model.toml"))?;
 
     context.say("\n4. What is missing? Found, added, calibrated, until nothing worthwhile is left");

@@ -1,6 +1,5 @@
 //! `diagnose` and `loop`: which physical effect is missing; and the same with adding and calibrating until nothing is left.
 
-use super::predict::read_network;
 use super::{CHECK_FAILED, explainable};
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, data_sha256};
@@ -13,8 +12,7 @@ use phyture::flight::split::{Part, Split};
 use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
-use phyture::workflow::{SearchTask, append_to_ledger, convention_fault, network_search, provenance};
-use serde::Serialize;
+use phyture::workflow::{Looped, SearchTask, append_to_ledger, convention_fault, network_search, provenance, read_network};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -190,17 +188,6 @@ fn told(context: &Context, diagnosis: &Diagnosis) -> String {
     if context.is_verbose() { format!("{diagnosis:#}") } else { diagnosis.to_string() }
 }
 
-/// What `loop --json` writes.
-#[derive(Serialize)]
-struct LoopOutput {
-    rounds: Vec<Diagnosis>,
-    /// The rounds as one: what was added, what it is worth, the errors before and after.
-    together: Diagnosis,
-    model: PathBuf,
-    /// There is one once something was added to a model.
-    ledger: Option<PathBuf>,
-}
-
 /// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger. A round by itself is told only in the verbose
 /// text; what all found is the caller's to tell (see [`told_together`]).
 pub fn amend(context: &Context, task: &SearchTask<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
@@ -291,7 +278,7 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     let before = calibrated(&model, &set.flights, &split)?;
     let mut amended = amend(context, &task, &model, &ledger)?;
     let model = &mut amended.model;
-    model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
+    division.wanted().note(model);
     model.note_source(&set.source, context.seed());
     // Before anything else is measured: what the search found is then safe.
     model.write(context.ready(&target)?)?;
@@ -306,7 +293,7 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
         let told = [amended.rounds.as_slice(), std::slice::from_ref(&together)];
         page.write(context, told, &set.flights, &split, [&before, after])?;
     }
-    context.json(&LoopOutput { rounds: amended.rounds, together, model: output.into(), ledger })?;
+    context.json(&Looped { rounds: amended.rounds, together, model: Some(output.into()), ledger })?;
     Ok(ExitCode::SUCCESS)
 }
 

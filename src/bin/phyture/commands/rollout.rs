@@ -1,14 +1,13 @@
 //! `rollout`: models and networks integrated forward from measured states, their errors by step.
 
-use super::compare::{name, tested};
-use super::predict::read_network;
+use super::compare::name;
 use crate::arguments::{Data, Division, HORIZONS, STRIDES, count};
 use crate::context::Context;
 use crate::pages::Pages;
+use phyture::Result;
 use phyture::physics::Model;
 use phyture::report::rollout_page;
-use phyture::workflow::{Rolling, provenance};
-use phyture::{Error, Result};
+use phyture::workflow::{Rolling, provenance, read_network};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -53,16 +52,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let set = context.flights(&wanted.data, history)?;
     let of_networks = networks.iter().map(|(_, hybrid)| &hybrid.description().model);
     let all: Vec<&Model> = models.iter().map(|(_, model)| model).chain(of_networks).collect();
-    all.iter().try_for_each(|model| model.check_flights(&set.flights))?;
-    let Some(first) = all.first() else {
-        return Err(Error::Config {
-            place: "command line".into(),
-            field: "--model".into(),
-            found: "nothing".into(),
-            expected: "a model file or a network".into(),
-        });
-    };
-    let split = tested(&set, context.split(&set.flights, first, &wanted.division), wanted.all)?;
+    let split = context.judged_split(&set.flights, &all, &wanted.division, wanted.all)?;
     let rolling = Rolling { models: &models, networks: &networks, horizon: wanted.horizon, stride: wanted.stride };
     let result = rolling.run(&set, &split)?;
     context.say(format!("\n{result}"));

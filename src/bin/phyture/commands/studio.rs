@@ -38,7 +38,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let set = context.flights(data, 1)?;
     let mut model = context.model(path.as_deref(), data)?;
     let split = context.search_split(&set.flights, &model, division)?;
-    model.data.locked.extend(division.lock.iter().filter(|name| !model.data.locked.contains(name)).cloned().collect::<Vec<_>>());
+    division.wanted().note(&mut model);
     let file = path.clone().or_else(|| Context::model_file(data));
     let opening = Opening { set, split, model, data: data.data.clone(), file, seed: context.seed() };
     let studio = Arc::new(Studio::open(opening)?);

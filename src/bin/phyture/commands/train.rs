@@ -1,21 +1,19 @@
 //! `train`: the residual network of a calibrated model.
 
 use crate::arguments::{Data, Division, count};
-use crate::context::{Context, data_sha256, interruption};
+use crate::context::{Context, interruption};
 use crate::output::Progress;
 use phyture::critique::digits::significant;
 use phyture::critique::wrap::wrapped;
 use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
-use phyture::train::{Begun, Ended, Event, Report, RunFolder, TrainConfig, Trained, Training};
+use phyture::train::{Begun, Event, RunFolder, TrainConfig, Training};
+use phyture::workflow::{Epoch, Run, train, training_digest};
 use phyture::{Error, Result};
-use serde::Serialize;
-use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
 
 /// Train the residual network; crash-safe checkpoints, Ctrl-C saves
 ///
@@ -78,24 +76,6 @@ fn print_config(context: &Context, config: &TrainConfig) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What `--json` writes.
-#[derive(Serialize)]
-struct Output {
-    network: PathBuf,
-    parameters: usize,
-    windows: usize,
-    steps: u64,
-    /// Of the network as it is written, on the windows that trained it, without dropout: mean of the squared errors, summed over the
-    /// channels, (m/s²)² + (rad/s²)².
-    training_loss: f64,
-    /// The same on the validation part, which it was not trained on; none if the split has no validation part.
-    validation_loss: Option<f64>,
-    validation_windows: usize,
-    /// Mean over the steps of the last epoch, dropout on; none if a finished run was gone on with.
-    last_epoch_loss: Option<f64>,
-    seconds: f64,
-}
-
 /// Trains on the training part, with checkpoints, until the end or Ctrl-C.
 pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let config = wanted.config(context)?;
@@ -117,54 +97,20 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let set = context.flights(data, config.network.history())?;
     let model = Model::read(model)?;
     let split = context.split(&set.flights, &model, &wanted.division)?;
-    let identity = format!("{}\n{}\n{split:?}", data_sha256(&set), model.to_toml()?);
     let interrupted = interruption()?;
     let training = Training {
         flights: &set.flights,
         split: &split,
         model: &model,
         config: &config,
-        data: digest(&identity),
+        data: training_digest(&set, &model, &split)?,
         folder: &folder,
         with_losses: true,
         threads: context.threads(),
     };
-    let output = Told { training, resume: wanted.resume, interrupted: &interrupted }.run(context)?;
-    context.json(&output)?;
+    let run = Told { training, resume: wanted.resume, interrupted: &interrupted }.run(context)?;
+    context.json(&run.network)?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The epoch under way, for the display.
-#[derive(Default)]
-struct Epoch {
-    number: usize,
-    sum: f64,
-    steps: u32,
-    /// Of the last epoch that ended.
-    validation: Option<f64>,
-}
-
-impl Epoch {
-    fn take(&mut self, report: &Report) {
-        if report.step.epoch != self.number {
-            (self.number, self.sum, self.steps) = (report.step.epoch, 0.0, 0);
-        }
-        self.sum += report.step.loss;
-        self.steps += 1;
-        self.validation = report.validation_loss.or(self.validation);
-    }
-
-    /// Mean over its steps so far.
-    fn loss(&self) -> Option<f64> {
-        (self.steps > 0).then(|| self.sum / f64::from(self.steps))
-    }
-}
-
-impl std::fmt::Display for Epoch {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "epoch {}  loss {:.4}", self.number + 1, self.loss().unwrap_or(f64::NAN))?;
-        self.validation.map_or(Ok(()), |loss| write!(f, "  validation {loss:.4}"))
-    }
 }
 
 /// A training run, as it is told.
@@ -177,32 +123,19 @@ pub struct Told<'a> {
     pub interrupted: &'a AtomicBool,
 }
 
-/// What tells one set of training data from another, as a number.
-pub fn digest(identity: &str) -> u64 {
-    let digest = Sha256::digest(identity.as_bytes());
-    u64::from_le_bytes(*digest.first_chunk().expect("it has 32 bytes"))
-}
-
 impl Told<'_> {
     /// Trains to the end, writes the network and reads back the hybrid.
     pub fn hybrid(&self, context: &Context) -> Result<Hybrid> {
-        Hybrid::read(&self.run(context)?.network)
+        Hybrid::read(&self.run(context)?.network.network)
     }
 
-    fn run(&self, context: &Context) -> Result<Output> {
-        let Training { config, folder, data, .. } = self.training;
-        let begun = Instant::now();
-        let state = self.resume.then(|| folder.resume(config, data)).transpose()?;
+    fn run(&self, context: &Context) -> Result<Run> {
         let mut epoch = Epoch::default();
         let mut progress = None;
-        let ended = self.training.run(state, &mut |event| {
+        let run = train(&self.training, self.resume, &mut |event| {
             match event {
                 Event::Begins(begun) => {
-                    say_begun(context, config, &begun);
-                    if !self.resume {
-                        // Only now does the old run go, if there is one: everything that the new one needs has been read.
-                        folder.clear()?;
-                    }
+                    say_begun(context, self.training.config, &begun);
                     progress = Some(Progress::new("training", begun.steps, begun.done));
                 }
                 Event::Step(report) => {
@@ -214,13 +147,8 @@ impl Told<'_> {
             Ok(!self.interrupted.load(Ordering::Relaxed))
         })?;
         drop(progress);
-        match ended {
-            Ended::Trained(trained) => write(context, folder, &trained, epoch.loss(), begun),
-            Ended::Stopped { done, steps } => {
-                let saved = format!("saved after step {done} of {steps} in {}; go on with --resume", folder.checkpoint().display());
-                Err(Error::Interrupted { saved })
-            }
-        }
+        say_trained(context, &run);
+        Ok(run)
     }
 }
 
@@ -261,33 +189,19 @@ fn say_intervals(context: &Context, hybrid: &Hybrid) {
     ));
 }
 
-/// Writes the network and says what came of it.
-fn write(context: &Context, folder: &RunFolder, trained: &Trained, last_epoch_loss: Option<f64>, begun: Instant) -> Result<Output> {
-    let Trained { hybrid, begun: Begun { parameters, windows, validation_windows, steps, .. }, gate_windows, losses } = trained;
-    let losses = losses.expect("they were asked for");
+/// Says what came of it.
+fn say_trained(context: &Context, Run { hybrid, gate_windows, network }: &Run) {
     if *gate_windows > 0 {
         let factors = Column::TARGETS.iter().zip(hybrid.description().gate);
         let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
         context.say(format!("gate, from {gate_windows} windows kept from training: {}", shown.join("  ")));
     }
     say_intervals(context, hybrid);
-    hybrid.write(&folder.network())?;
-    let validation = losses.validation.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
-    let seconds = begun.elapsed().as_secs_f64();
+    let validation = network.validation_loss.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
     context.say(format!(
-        "trained in {seconds:.0} s: {}, training loss {:.4}, validation loss {validation}",
-        folder.network().display(),
-        losses.training
+        "trained in {:.0} s: {}, training loss {:.4}, validation loss {validation}",
+        network.seconds,
+        network.network.display(),
+        network.training_loss
     ));
-    Ok(Output {
-        network: folder.network(),
-        parameters: *parameters,
-        windows: *windows,
-        steps: *steps,
-        training_loss: losses.training,
-        validation_loss: losses.validation,
-        validation_windows: *validation_windows,
-        last_epoch_loss,
-        seconds,
-    })
 }

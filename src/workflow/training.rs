@@ -1,0 +1,142 @@
+//! The training run of a residual network in its folder: begun or gone on with, its network written, and what came of it as data. The run itself
+//! is [`Training`]'s.
+
+use crate::error::{Error, Result};
+use crate::flight::DataSet;
+use crate::flight::split::Split;
+use crate::hybrid::Hybrid;
+use crate::physics::Model;
+use crate::train::{Ended, Event, Report, Trained, Training};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// What tells one set of training data from another, as a number: of a text that does.
+pub fn digest(identity: &str) -> u64 {
+    let digest = Sha256::digest(identity.as_bytes());
+    u64::from_le_bytes(*digest.first_chunk().expect("it has 32 bytes"))
+}
+
+/// What tells these training data from others: the files, the model, the division.
+///
+/// # Errors
+/// As [`Model::to_toml`].
+pub fn training_digest(set: &DataSet, model: &Model, split: &Split) -> Result<u64> {
+    Ok(digest(&format!("{}\n{}\n{split:?}", set.source.sha256, model.to_toml()?)))
+}
+
+/// The epoch under way.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Epoch {
+    number: usize,
+    sum: f64,
+    steps: u32,
+    /// Of the last epoch that ended.
+    validation: Option<f64>,
+}
+
+impl Epoch {
+    /// Takes a step in.
+    pub fn take(&mut self, report: &Report) {
+        if report.step.epoch != self.number {
+            (self.number, self.sum, self.steps) = (report.step.epoch, 0.0, 0);
+        }
+        self.sum += report.step.loss;
+        self.steps += 1;
+        self.validation = report.validation_loss.or(self.validation);
+    }
+
+    /// Mean loss over its steps so far.
+    pub fn loss(&self) -> Option<f64> {
+        (self.steps > 0).then(|| self.sum / f64::from(self.steps))
+    }
+}
+
+impl std::fmt::Display for Epoch {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "epoch {}  loss {:.4}", self.number + 1, self.loss().unwrap_or(f64::NAN))?;
+        self.validation.map_or(Ok(()), |loss| write!(f, "  validation {loss:.4}"))
+    }
+}
+
+/// A network that was trained and written, as data.
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainedNetwork {
+    /// Its file.
+    pub network: PathBuf,
+    /// Trainable numbers.
+    pub parameters: usize,
+    /// Windows that trained it.
+    pub windows: usize,
+    /// Steps in all.
+    pub steps: u64,
+    /// Of the network as it is written, on the windows that trained it, without dropout: mean of the squared errors, summed over the
+    /// channels, (m/s²)² + (rad/s²)².
+    pub training_loss: f64,
+    /// The same on the validation part, which it was not trained on; none if the split has no validation part.
+    pub validation_loss: Option<f64>,
+    /// Windows that validated it.
+    pub validation_windows: usize,
+    /// Mean over the steps of the last epoch, dropout on; none if a finished run was gone on with.
+    pub last_epoch_loss: Option<f64>,
+    /// Time that it took, s.
+    pub seconds: f64,
+}
+
+/// What a run ended in.
+pub struct Run {
+    /// Physics and network.
+    pub hybrid: Hybrid,
+    /// Windows kept from training for the gate; 0 if there is none.
+    pub gate_windows: usize,
+    /// The rest as data.
+    pub network: TrainedNetwork,
+}
+
+/// Trains to the end and writes the network into the run's folder: from the beginning, where what an earlier run left goes as soon as everything
+/// that the new one needs has been read, or, with `resume`, from the last checkpoint. `observe` hears what happens and says after each step whether
+/// to go on.
+///
+/// # Errors
+/// As [`Training::run`], [`RunFolder::resume`](crate::train::RunFolder::resume) and [`Hybrid::write`]; [`Error::Interrupted`] where `observe` ends it,
+/// the state being saved.
+pub fn train(training: &Training<'_>, resume: bool, observe: &mut dyn FnMut(Event<'_>) -> Result<bool>) -> Result<Run> {
+    let Training { config, folder, data, .. } = *training;
+    let begun = Instant::now();
+    let state = resume.then(|| folder.resume(config, data)).transpose()?;
+    let mut epoch = Epoch::default();
+    let training = Training { with_losses: true, ..*training };
+    let ended = training.run(state, &mut |event| {
+        let begins = matches!(event, Event::Begins(_));
+        if let Event::Step(report) = &event {
+            epoch.take(report);
+        }
+        let goes_on = observe(event)?;
+        if begins && !resume {
+            folder.clear()?;
+        }
+        Ok(goes_on)
+    })?;
+    let Trained { hybrid, begun: did, gate_windows, losses } = match ended {
+        Ended::Trained(trained) => *trained,
+        Ended::Stopped { done, steps } => {
+            let saved = format!("saved after step {done} of {steps} in {}; go on with --resume", folder.checkpoint().display());
+            return Err(Error::Interrupted { saved });
+        }
+    };
+    let losses = losses.expect("they were asked for");
+    hybrid.write(&folder.network())?;
+    let network = TrainedNetwork {
+        network: folder.network(),
+        parameters: did.parameters,
+        windows: did.windows,
+        steps: did.steps,
+        training_loss: losses.training,
+        validation_loss: losses.validation,
+        validation_windows: did.validation_windows,
+        last_epoch_loss: epoch.loss(),
+        seconds: begun.elapsed().as_secs_f64(),
+    };
+    Ok(Run { hybrid, gate_windows, network })
+}
