@@ -238,7 +238,7 @@ fn numbers_found_for_another_formula_are_refused() {
     let droop = "kind = \"rotor_droop\"\ncoefficients = { k = -0.1 }";
     let inflow = "kind = \"inflow_lag\"\nparameters = { tau_s = 0.08, overshoot = 0.3 }";
     let wind = "kind = \"weathercock\"\ncoefficients = { k_fin = 0.03 }";
-    for format in ["", "format = 2", "format = 3"] {
+    for format in ["", "format = 2", "format = 3", "format = 4"] {
         assert!(read(format, wind).is_ok(), "{format}");
     }
     assert!(read("format = 3", droop).is_ok() && read("format = 2", "kind = \"rotor_droop\"").is_ok());
@@ -249,7 +249,15 @@ fn numbers_found_for_another_formula_are_refused() {
         let refused = read(format, effect).err().unwrap_or_default();
         assert!(refused.contains(&format!("numbers of `{name}`")) && refused.contains("phyture calibrate"), "{refused}");
     }
-    assert!(read("format = 4", wind).err().is_some_and(|refused| refused.contains("1, 2 or 3")));
+    // A falling mass alone beside the baseline means what it did: the baseline's moments do not read the thrust.
+    let mass = "kind = \"mass_drift\"\ncoefficients = { k = 0.001 }";
+    let both = format!("{mass}\n\n[[effect]]\n{wind}");
+    assert!(read("format = 3", mass).is_ok() && read("format = 4", &both).is_ok());
+    for format in ["format = 2", "format = 3"] {
+        let refused = read(format, &both).err().unwrap_or_default();
+        assert!(refused.contains("numbers of `mass_drift`, found beside others"), "{refused}");
+    }
+    assert!(read("format = 5", wind).err().is_some_and(|refused| refused.contains("1 to 4")));
 }
 
 /// Correlations are kept beside the intervals, and read back as they were written.

@@ -25,11 +25,14 @@ const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
 
 /// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power
-/// and damps less, and the induced flow settles sooner the more air passes.
-const FORMAT: u32 = 3;
+/// and damps less, and the induced flow settles sooner the more air passes; since 4 a falling mass changes accelerations, not forces.
+const FORMAT: u32 = 4;
 
 /// Effects of the catalogue that mean something else in format 3 than in format 2.
 const CHANGED: [&str; 2] = ["inflow_lag", "rotor_droop"];
+
+/// The effect of the catalogue that means something else in format 4 than in format 3 where other effects read the thrust.
+const MASS: &str = "mass_drift";
 
 /// Effects of the catalogue that, alone beside the baseline, mean since format 2 what they meant before.
 const UNCHANGED: [&str; 15] = [
@@ -55,7 +58,7 @@ fn read_format(model: &Section<'_>) -> Result<u32> {
     if (1..=FORMAT).any(|known| format == f64::from(known)) {
         return Ok(format as u32);
     }
-    Err(model.fault("format", format.to_string(), "1, 2 or 3, the formats that this version reads"))
+    Err(model.fault("format", format.to_string(), "1 to 4, the formats that this version reads"))
 }
 
 /// Refuses numbers of effects that a file of an earlier format found for other formulas.
@@ -71,13 +74,22 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect], format: u32) -> Result<
         effect.enabled && of_catalogue.is_some_and(given)
     };
     let found: Vec<&Effect> = effects.iter().filter(has_numbers).collect();
-    if format == 2 {
-        let Some(changed) = found.iter().find(|effect| CHANGED.contains(&effect.kind.as_str())) else { return Ok(()) };
+    if format == 2
+        && let Some(changed) = found.iter().find(|effect| CHANGED.contains(&effect.kind.as_str()))
+    {
         return Err(file.fault(
             "model.format",
             format!("2, and numbers of `{}`, found for another formula", changed.name),
-            "`format = 3` under [model], and then `phyture calibrate`: a rotor that slows down now takes less power and damps less, and induced flow \
+            "`format = 4` under [model], and then `phyture calibrate`: a rotor that slows down now takes less power and damps less, and induced flow \
              settles sooner at speed",
+        ));
+    }
+    if format >= 2 {
+        let Some(mass) = found.iter().find(|effect| effect.kind == MASS).filter(|_| found.len() > 1) else { return Ok(()) };
+        return Err(file.fault(
+            "model.format",
+            format!("{format}, and numbers of `{}`, found beside others for another formula", mass.name),
+            "`format = 4` under [model], and then `phyture calibrate`: a falling mass now changes the acceleration that the thrust makes, not its moments",
         ));
     }
     let changed = match found.as_slice() {
@@ -88,15 +100,15 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect], format: u32) -> Result<
     Err(file.fault(
         "model.format",
         format!("nothing, and numbers of `{}`, found when effects did not see each other", changed.name),
-        "`format = 3` under [model], and then `phyture calibrate`: effects now read thrust, air velocity and controls as the other effects leave them",
+        "`format = 4` under [model], and then `phyture calibrate`: effects now read thrust, air velocity and controls as the other effects leave them",
     ))
 }
 
 impl Model {
     /// Reads a model file.
     ///
-    /// A file without `format` was written when effects did not see each other: it is read where that means the same. So is one of format 2,
-    /// whose effects are those of today but for `inflow_lag` and `rotor_droop`.
+    /// A file without `format` was written when effects did not see each other: it is read where that means the same. So is one of format 2 or 3,
+    /// whose effects are those of today but for `inflow_lag` and `rotor_droop` (2) and `mass_drift` beside others.
     ///
     /// `[model]` may leave out everything but is itself needed; `mass_kg`, `inertia` and `rotor_radius_m` default to those of the
     /// paper's aircraft (4.58 kg, `[0.18, 0.34, 0.28]`, 0.80 m) and are marked in [`Model::assumed`], the name to the file's, and without `baseline` the model holds

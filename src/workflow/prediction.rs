@@ -196,7 +196,8 @@ impl Predictions {
             columns.push((format!("{}_predicted", column.name()), numbers(&|row| self.predicted[row][channel])));
         }
         if let Some(half) = &self.half_width {
-            columns.extend(Channel::ALL.map(|channel| (format!("{}_half_width", channel.name()), numbers(&|row| half[row][channel]))));
+            columns
+                .extend(Channel::ALL.map(|channel| (format!("{}_half_width", channel.name()), numbers(&|row| half[row][channel]))));
         }
         let mut named = vec![
             ("manoeuvre".to_owned(), text(&|row| flight_of(row).manoeuvre.clone())),

@@ -1,6 +1,6 @@
 //! Mass and its distribution: products of inertia, centre of mass, fuel, displaced air.
 
-use super::super::definition::{Definition, Notes, change, coefficient};
+use super::super::definition::{Definition, Notes, coefficient};
 use super::{ANY, HELICOPTER};
 use crate::flight::Channel;
 
@@ -69,16 +69,17 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         meaning: "fuel burns, the mass falls, and the same thrust accelerates it more",
         coefficients: &[coefficient("k", "1/s", "share of the mass lost per second").within(0.0, 0.01).usually(0.0002, 0.002)],
         parameters: &[],
-        // Time as the log counts it: each flight is taken to start with full tanks at t = 0.
-        terms: &[],
-        swaps: &[change("thrust", "thrust * (1 + k * t)")],
+        // Time as the log counts it: each flight is taken to start with full tanks at t = 0. The force stays as it is, and so do the moments that
+        // it makes: what changes is the acceleration, not the signal.
+        terms: &[(Channel::VzDot, Some("k"), "thrust * t")],
+        swaps: &[],
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "flights of several minutes each, with the time counted from take-off",
             confusable_with: &["rotor_droop"],
             would_tell_apart: "the same hover at the beginning and at the end of a flight",
             fault_of_log: None,
-            source: "0.5 kg of fuel in 4.6 kg; drag over mass changes too, by less",
+            source: "0.5 kg of fuel in 4.6 kg; drag and tilted thrust over mass change too, by less",
             searched: true,
         }),
     },

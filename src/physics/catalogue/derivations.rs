@@ -159,6 +159,12 @@ fn hover() -> [f64; 16] {
     state
 }
 
+/// The same as columns of a flight.
+fn hover_columns(samples: usize) -> [Vec<f64>; Column::COUNT] {
+    let state = hover();
+    std::array::from_fn(|column| vec![state.get(column).copied().unwrap_or(0.0); samples])
+}
+
 #[test]
 fn signs_are_those_of_an_upright_helicopter() -> Result<()> {
     let push = |kind: &str, values: &[f64], column: Column, value: f64, channel: Column| -> Result<f64> {
@@ -181,6 +187,21 @@ fn signs_are_those_of_an_upright_helicopter() -> Result<()> {
     assert!((push("stall_saturation", &[-0.5], Column::U4, 1.0, Column::VzDot)? - 3.88).abs() < 0.01);
     assert!(push("weathercock", &[0.05, 0.5], Column::Vy, 2.0, Column::WzDot)? > 1.0);
     assert!(push("mass_drift", &[1e-3], Column::U4, 0.5, Column::VzDot)?.abs() < EXACT, "nothing is burnt at t = 0");
+    Ok(())
+}
+
+#[test]
+fn a_falling_mass_lifts_more_and_turns_no_more() -> Result<()> {
+    let columns = hover_columns(1);
+    // A hundred seconds after take-off a tenth of a per cent a second is a tenth: the thrust of 1 g accelerates by a tenth of it more.
+    let flight = Flight::new("late", "made_up", 100.0, 0.01, columns, Targets::Recorded)?;
+    let mut model = helicopter();
+    model.effects.push(effect("collective_torque", &[2.0])?);
+    let before = model.predict(&flight)?;
+    model.effects.push(effect("mass_drift", &[1e-3])?);
+    let after = model.predict(&flight)?;
+    assert!((after[Channel::VzDot][0] - before[Channel::VzDot][0] + 0.1 * GRAVITY_M_S2).abs() < EXACT);
+    assert_eq!(after[Channel::WzDot][0].to_bits(), before[Channel::WzDot][0].to_bits(), "the torque is that of the same force");
     Ok(())
 }
 
