@@ -179,8 +179,8 @@ fn a_network_that_looks_now_and_then_is_held_in_between() -> Result<()> {
             held = often.network;
         }
         assert_eq!(rare.network, held);
-        for channel in 0..6 {
-            assert_eq!(rare.acceleration[channel], rare.physics[channel] + rare.linear[channel] + held[channel]);
+        for (channel, held) in held.into_iter().enumerate() {
+            assert_eq!(rare.acceleration[channel], rare.physics[channel] + rare.linear[channel] + held);
         }
     }
     // SAFETY: handles of this test's own, freed once.
