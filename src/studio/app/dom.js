@@ -47,6 +47,15 @@ export function h(tag, props = {}, ...children) {
 }
 
 /**
+ * A sentence in which what stands between backticks is code: names of effects, columns, formulas.
+ * @param {string} text
+ * @returns {Child[]}
+ */
+export function prose(text) {
+  return text.split('`').map((part, index) => (index % 2 === 1 ? h('code', {}, part) : part));
+}
+
+/**
  * An SVG element.
  * @param {string} tag
  * @param {Props} [props]

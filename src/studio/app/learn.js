@@ -3,7 +3,7 @@
 
 import { ask } from './api.js';
 import { range } from './charts.js';
-import { h } from './dom.js';
+import { h, prose } from './dom.js';
 import { interval, measure, number, percent, shorter } from './format.js';
 import { go, read } from './place.js';
 
@@ -161,7 +161,7 @@ function findings(app, job, has) {
   return h(
     'div',
     { id: 'findings' },
-    h('div', { class: 'verdict' }, h('p', {}, found.summary), all),
+    h('div', { class: 'verdict' }, h('p', {}, prose(found.summary)), all),
     steps.map((step) => effect(app, found, step, has.has(step.effect))),
     (found.unknown ?? []).map((one) => unknown(app, one)),
     found.notes.length
@@ -172,7 +172,7 @@ function findings(app, job, has) {
           h(
             'ul',
             {},
-            found.notes.map((note) => h('li', {}, note)),
+            found.notes.map((note) => h('li', {}, prose(note))),
           ),
         )
       : null,
@@ -261,7 +261,7 @@ function effect(app, found, step, isIn) {
       ),
       add,
     ),
-    h('p', {}, step.meaning),
+    h('p', {}, prose(step.meaning)),
     h(
       'div',
       { class: 'falls' },
@@ -287,10 +287,10 @@ function effect(app, found, step, isIn) {
       ? h(
           'p',
           {},
-          `These flights cannot tell it from ${step.indistinguishable.join(', ')}. What would: ${step.would_tell_apart}`,
+          prose(`These flights cannot tell it from ${step.indistinguishable.join(', ')}. What would: ${step.would_tell_apart}`),
         )
       : null,
-    step.fault_of_log ? h('p', { class: 'quiet' }, `Or the log: ${step.fault_of_log}`) : null,
+    step.fault_of_log ? h('p', { class: 'quiet' }, prose(`Or the log: ${step.fault_of_log}`)) : null,
     step.rests_on_flight ? h('p', { class: 'rise' }, `It rests on one flight: ${step.rests_on_flight}`) : null,
     h(
       'small',
@@ -365,7 +365,7 @@ function tried(found) {
             {},
             h('th', { scope: 'row' }, one.effect),
             h('td', {}, words[one.status] ?? one.status),
-            h('td', {}, one.reason),
+            h('td', {}, prose(one.reason)),
           ),
         ),
       ),
