@@ -65,7 +65,14 @@ struct Scale {
 impl Scale {
     fn new(quick: bool, seed: u64) -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        let full = TrainConfig { network: network.clone().into(), epochs: 6, stride: 12, interval_every: 8, seed, ..TrainConfig::default() };
+        let full = TrainConfig {
+            network: network.clone().into(),
+            epochs: 6,
+            stride: 12,
+            interval_every: 8,
+            seed,
+            ..TrainConfig::default()
+        };
         if !quick {
             return Self { minutes: 20.0, config: full };
         }
