@@ -9,7 +9,7 @@
 //!
 //! It needs none of the features: what runs on board reads no logs. Here the built-in helicopter stands in for the aircraft.
 
-use phyture::flight::{Channel, Column, PerChannel};
+use phyture::flight::{Channel, PerChannel};
 use phyture::hybrid::Hybrid;
 use phyture::sim::{Simulation, simulate};
 use phyture::{Error, Result};
@@ -37,7 +37,7 @@ fn main() -> Result<()> {
     let flight = &set.flights[0];
     for sample in 0..flight.len() {
         // Position, Euler angles, velocity, rates, controls, in SI units and radians: what the aircraft knows at this moment.
-        let state: [f64; 16] = std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]);
+        let state = flight.state(sample);
         // `None` until the history is full.
         let Some(predicted) = stream.push(&state)? else { continue };
         predictions += 1;

@@ -80,7 +80,7 @@ fn streamed(model: &Model, flight: &Flight) -> Result<Vec<PerChannel<f64>>> {
     let own: Vec<&[f64]> = stream.extra_inputs().iter().map(|name| flight.extra[name].as_slice()).collect();
     (0..flight.len())
         .map(|sample| {
-            let state = std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]);
+            let state = flight.state(sample);
             stream.push_with(&state, &own.iter().map(|column| column[sample]).collect::<Vec<_>>())
         })
         .collect()

@@ -253,9 +253,12 @@ fn numbers_found_for_another_formula_are_refused() {
     let mass = "kind = \"mass_drift\"\ncoefficients = { k = 0.001 }";
     let both = format!("{mass}\n\n[[effect]]\n{wind}");
     assert!(read("format = 3", mass).is_ok() && read("format = 4", &both).is_ok());
+    let own = format!("{mass}\n\n[[effect]]\nkind = \"formula\"\nname = \"own\"\nchannel = \"wz_dot\"\nformula = \"thrust\"");
     for format in ["format = 2", "format = 3"] {
-        let refused = read(format, &both).err().unwrap_or_default();
-        assert!(refused.contains("numbers of `mass_drift`, found beside others"), "{refused}");
+        for beside in [&both, &own] {
+            let refused = read(format, beside).err().unwrap_or_default();
+            assert!(refused.contains("numbers of `mass_drift`, found beside others"), "{refused}");
+        }
     }
     assert!(read("format = 5", wind).err().is_some_and(|refused| refused.contains("1 to 4")));
 }

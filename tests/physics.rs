@@ -151,7 +151,7 @@ fn a_stream_gives_the_same_bits_as_a_flight() -> Result<()> {
     for round in 0..2 {
         stream.reset(flight.start_s);
         for sample in 0..flight.len() {
-            let state: [f64; 16] = std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]);
+            let state = flight.state(sample);
             let found = stream.push_with(&state, &[flight.extra["battery"][sample]])?;
             for (channel, values) in predicted.pairs() {
                 assert_eq!(found[channel].to_bits(), values[sample].to_bits(), "round {round}, sample {sample}, channel {channel}");

@@ -273,7 +273,7 @@ fn file_and_stream_say_what_the_batch_says() -> Result<()> {
     let mut stream = read.stream()?;
     let mut streamed = Vec::new();
     for sample in 0..200 {
-        let state = std::array::from_fn(|column| flight.column(phyture::flight::Column::STATE[column])[sample]);
+        let state = flight.state(sample);
         streamed.extend(stream.push(&state)?);
     }
     assert!(streamed == batch, "stream and batch differ");
@@ -326,7 +326,7 @@ fn a_stream_takes_columns_of_the_logs_own_where_physics_history_and_network_read
     assert_eq!(stream.own_columns(), ["front", "rear"]);
     let mut streamed = Vec::new();
     for sample in 0..100 {
-        let state = std::array::from_fn(|column| flight.column(phyture::flight::Column::STATE[column])[sample]);
+        let state = flight.state(sample);
         let own = ["front", "rear"].map(|name| flight.extra[name][sample]);
         let refused = stream.push(&state).map_err(|error| error.to_string()).err().unwrap_or_default();
         assert!(refused.contains("0 values for the log's own columns, which are [\"front\", \"rear\"]"), "{refused}");

@@ -60,7 +60,7 @@ fn hybrid(set: &DataSet, history: usize, width: usize) -> Result<Hybrid> {
     Ok(hybrid)
 }
 
-/// Sleeps to the next tick of `rate` and times what is done then.
+/// Sleeps to the next multiple of `step` and times what is done then, s.
 fn paced(samples: usize, step: Duration, mut work: impl FnMut(usize) -> Result<()>) -> Result<Vec<f64>> {
     let begun = Instant::now();
     let mut seconds = Vec::with_capacity(samples);

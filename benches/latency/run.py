@@ -11,30 +11,16 @@ import argparse
 import json
 import os
 import pathlib
-import platform
 import subprocess
 import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parents[1]
-VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "onnx", "onnxscript", "onnxruntime"]
+sys.path.insert(0, str(HERE.parent / "peers"))
+import run as peers  # noqa: E402
+
+VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "onnx==1.23.2", "onnxscript==0.7.2", "onnxruntime==1.32.0"]
 # History, width, levels of the trees.
 SIZES = [(1000, 64, 3), (100, 16, 2)]
-
-
-def environment():
-    folder = ROOT / "target" / "latency-venv"
-    python = folder / "bin" / "python"
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", *VERSIONS], check=True)
-    return python
-
-
-def own_program():
-    command = ["cargo", "bench", "--features", "sim", "--bench", "latency", "--no-run", "--message-format=json"]
-    lines = subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout.splitlines()
-    return [json.loads(line)["executable"] for line in lines if '"latency"' in line and '"executable":"' in line][-1]
 
 
 def measure(name, command):
@@ -75,7 +61,8 @@ def main():
     parser.add_argument("out")
     parser.add_argument("--seconds", type=int, default=60)
     options = parser.parse_args()
-    python, program = environment(), own_program()
+    python = peers.environment("latency-venv", VERSIONS)
+    program = peers.own_program("latency", ["--features", "sim"])
     busy = subprocess.Popen(["taskset", "-c", "1", sys.executable, "-c", "while True: pass"]) if os.cpu_count() > 1 else None
     record, lines = {}, []
     try:
@@ -97,9 +84,8 @@ def main():
     finally:
         if busy:
             busy.kill()
-    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
     versions = sorted({result["version"] for found in record.values() for result in found.values() if result and "version" in result})
-    head = [f"{processor}, one core of {os.cpu_count()}, another kept busy; {'; '.join(versions)}. Memory: of phyture what the stream takes, of the others "
+    head = [f"{peers.processor()}, one core of {os.cpu_count()}, another kept busy; {'; '.join(versions)}. Memory: of phyture what the stream takes, of the others "
             "the whole process.", ""]
     pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
     pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))

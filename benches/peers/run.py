@@ -61,19 +61,23 @@ PEERS = ["cnn", "cnn_lstm", "tcn", "timesnet", "timemixer", "dlinear", "informer
 LATENCY = GROUPS["forward pass"]
 
 
-def environment():
-    folder = ROOT / "target" / "peers-venv"
+def environment(name="peers-venv", versions=VERSIONS):
+    folder = ROOT / "target" / name
     python = folder / "bin" / "python"
     if not python.exists():
         subprocess.run([sys.executable, "-m", "venv", folder], check=True)
-    subprocess.run([python, "-m", "pip", "install", "--quiet", *VERSIONS], check=True)
+    subprocess.run([python, "-m", "pip", "install", "--quiet", *versions], check=True)
     return python
 
 
-def own_program():
-    command = ["cargo", "bench", "--bench", "peers", "--no-run", "--message-format=json"]
+def own_program(bench="peers", features=()):
+    command = ["cargo", "bench", *features, "--bench", bench, "--no-run", "--message-format=json"]
     lines = subprocess.run(command, check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True).stdout.splitlines()
-    return [json.loads(line)["executable"] for line in lines if '"peers"' in line and '"executable":"' in line][-1]
+    return [json.loads(line)["executable"] for line in lines if f'"{bench}"' in line and '"executable":"' in line][-1]
+
+
+def processor():
+    return next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
 
 
 def measure(programs, row, threads, batch, history, repeats):
@@ -134,8 +138,7 @@ def report(options, record, lines):
     """Writes every time of every step, and the tables under a line that says on what and with what they were measured."""
     results = [result for found in record.values() for results in found.values() for result in results]
     own = [result for found in record.values() for result in found["phyture"]]
-    processor = next((line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name")), platform.processor())
-    head = [f"{processor}, {os.cpu_count()} cores, level {own[0]['level']}, {max(result['peak_gflops_alone'] for result in own):.0f} GFLOP/s of "
+    head = [f"{processor()}, {os.cpu_count()} cores, level {own[0]['level']}, {max(result['peak_gflops_alone'] for result in own):.0f} GFLOP/s of "
             f"multiply-adds on one core; {'; '.join(sorted({result['version'] for result in results}))}; {options.rounds} rounds of "
             f"{options.repeats} steps each, rows in turn.", ""]
     pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))

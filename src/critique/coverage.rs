@@ -1,7 +1,7 @@
 //! Do a hybrid's intervals keep their promise on the flights judged, and how much of these lies outside what it was trained on? Counts; the
 //! intervals and the envelope are the hybrid's own.
 
-use super::channels::ChannelValues;
+use super::channels::{ChannelValues, Intervals};
 use super::digits::{Kind, aligned, significant};
 use super::wrap::wrapped;
 use crate::blocks::{BlockMean, BlockSum, Blocks};
@@ -29,7 +29,7 @@ pub struct Coverage {
     /// Share of the measurements judged that they hold, with the physics as on flights that it does not know.
     pub held: ChannelValues,
     /// 95 % interval of that share, from blocks of ten seconds.
-    pub held_ci95: PerChannel<Option<[f64; 2]>>,
+    pub held_ci95: Intervals,
     /// Mean of half an interval, m/s² and rad/s².
     pub half_width: ChannelValues,
     /// Share of the samples judged that lie outside the envelope of training; none if the network has no envelope.
@@ -46,7 +46,7 @@ pub fn coverage(name: &str, hybrid: &Hybrid, flights: &[Flight], windows: &[Wind
     let Some(intervals) = &hybrid.description().intervals else { return Ok(None) };
     let predicted = hybrid.predict_unknown(flights, windows, threads)?;
     let blocks = Blocks::new(flights, windows);
-    let mut held = PerChannel::splat(()).map(|()| vec![BlockSum::default(); blocks.len()]);
+    let mut held = PerChannel::from_fn(|_| vec![BlockSum::default(); blocks.len()]);
     let mut half = PerChannel::splat(0.0);
     for ((window, predicted), block) in windows.iter().zip(&predicted).zip(&blocks.of_window) {
         let flight = &flights[window.flight];
@@ -67,7 +67,7 @@ pub fn coverage(name: &str, hybrid: &Hybrid, flights: &[Flight], windows: &[Wind
         promised: intervals.coverage(),
         made_from: intervals.made_from(),
         held: ChannelValues::new(means.map(|mean| mean.map(|mean| mean.mean))),
-        held_ci95: means.map(|mean| mean.and_then(|mean| mean.interval()).map(within)),
+        held_ci95: Intervals::new(means.map(|mean| mean.and_then(|mean| mean.interval()).map(within))),
         half_width: ChannelValues::new(half.map(Some)),
         outside: outside_by.as_ref().map(|shares| shares.values().sum()),
         outside_by: outside_by.unwrap_or_default(),
@@ -107,7 +107,7 @@ impl Coverage {
                 format!("measurements held, % ({:.0} promised)", 100.0 * self.promised),
                 self.held.channels().iter().map(percent).collect(),
             ),
-            (String::new(), self.held_ci95.iter().map(interval).collect()),
+            (String::new(), self.held_ci95.channels().iter().map(interval).collect()),
             (
                 "half of an interval, mean".to_owned(),
                 self.half_width.channels().iter().map(|value| Kind::Error.text(*value)).collect(),

@@ -27,9 +27,9 @@ const ROUNDS: usize = 8;
 /// Halvings of the step in which the level of the quantile is found.
 const HALVINGS: usize = 20;
 
-/// Intervals around what a hybrid predicts.
+/// PredictionIntervals around what a hybrid predicts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Intervals {
+pub struct PredictionIntervals {
     /// Share of measurements that they hold on flights like those they were made from.
     coverage: f64,
     /// Windows that they were made from.
@@ -78,8 +78,8 @@ pub(super) struct Kept<'f> {
     pub block: usize,
 }
 
-impl Intervals {
-    /// Intervals from windows that the network was not trained on; none from fewer than [`FEWEST_BLOCKS`] blocks. `spans` is what trained,
+impl PredictionIntervals {
+    /// PredictionIntervals from windows that the network was not trained on; none from fewer than [`FEWEST_BLOCKS`] blocks. `spans` is what trained,
     /// which gives the motion its scale.
     pub(super) fn new(flights: &[Flight], spans: &[Span], kept: &[Kept<'_>]) -> Option<Self> {
         let blocks = kept.iter().map(|kept| kept.block + 1).max().unwrap_or(0);

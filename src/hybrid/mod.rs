@@ -16,7 +16,7 @@ mod stream;
 mod target;
 
 use envelope::Envelope;
-use intervals::{Intervals, Kept};
+use intervals::{Kept, PredictionIntervals};
 use linear::Linear;
 pub use rollout::HybridRollout;
 pub use scaling::{Scale, Scaling};
@@ -76,7 +76,7 @@ pub struct Description {
     pub envelope: Option<Envelope>,
     /// How far measurements may lie from what it predicts; none where no windows were kept from training.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub intervals: Option<Intervals>,
+    pub intervals: Option<PredictionIntervals>,
 }
 
 impl Description {
@@ -152,7 +152,7 @@ impl Description {
                 return fault("envelope", format!("`{}`", range.name), "what physics, linear history or network read");
             }
         }
-        match self.intervals.as_ref().map_or(Ok(()), Intervals::check) {
+        match self.intervals.as_ref().map_or(Ok(()), PredictionIntervals::check) {
             Ok(()) => Ok(()),
             Err(found) => fault("intervals", found, "finite numbers that are not negative, and a coverage between 0 and 1"),
         }
@@ -270,7 +270,7 @@ impl Hybrid {
             block: *block,
         };
         let kept: Vec<Kept<'_>> = windows.iter().zip(&predicted).zip(&blocks).map(kept).collect();
-        self.description.intervals = Intervals::new(flights, training, &kept);
+        self.description.intervals = PredictionIntervals::new(flights, training, &kept);
         Ok(())
     }
 

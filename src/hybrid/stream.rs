@@ -26,9 +26,9 @@ pub struct Streamed {
     /// The prediction: the sum of the three, or for a network that does not learn a residual what it says alone; `None` until the
     /// history is full.
     pub acceleration: Option<PerChannel<f64>>,
-    /// Half of the interval around the prediction; `None` without a prediction, and where the hybrid has no [`Intervals`].
+    /// Half of the interval around the prediction; `None` without a prediction, and where the hybrid has no [`PredictionIntervals`].
     ///
-    /// [`Intervals`]: super::Intervals
+    /// [`PredictionIntervals`]: super::intervals::PredictionIntervals
     pub half_width: Option<PerChannel<f64>>,
     /// Where the sample lies beside what was seen in training; `None` where the hybrid has no [`Envelope`](super::Envelope). Outside of it
     /// neither prediction nor interval is backed by data.

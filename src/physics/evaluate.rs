@@ -337,7 +337,7 @@ impl StreamingModel {
     pub fn reads(&self) -> BTreeSet<String> {
         let of = |source: &Source| match source {
             Source::State(column) => vec![column.name().to_owned()],
-            Source::Derived(derived) => derived.reads().iter().map(|column| column.name().to_owned()).collect(),
+            Source::Derived(derived) => columns_behind(derived.name()),
             Source::Extra(index) => vec![self.bound.extras[*index].clone()],
         };
         self.bound.sources.iter().flat_map(of).collect()

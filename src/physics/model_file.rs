@@ -85,7 +85,10 @@ fn check_meaning(file: &Section<'_>, effects: &[Effect], format: u32) -> Result<
         ));
     }
     if format >= 2 {
-        let Some(mass) = found.iter().find(|effect| effect.kind == MASS).filter(|_| found.len() > 1) else { return Ok(()) };
+        // A formula of the user's may read the thrust as well.
+        let is_own = |effect: &Effect| effect.enabled && effect.kind == FORMULA_KIND;
+        let has_others = found.len() > 1 || effects.iter().any(is_own);
+        let Some(mass) = found.iter().find(|effect| effect.kind == MASS).filter(|_| has_others) else { return Ok(()) };
         return Err(file.fault(
             "model.format",
             format!("{format}, and numbers of `{}`, found beside others for another formula", mass.name),

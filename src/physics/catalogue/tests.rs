@@ -157,7 +157,7 @@ proptest! {
         let mut stream = model.stream(STEP_S)?;
         stream.reset(flight.start_s);
         for (sample, state) in wild.iter().enumerate() {
-            let found = stream.push(&std::array::from_fn(|column| flight.column(Column::STATE[column])[sample]))?;
+            let found = stream.push(&flight.state(sample))?;
             for (channel, values) in predicted.pairs() {
                 prop_assert!(found[channel].is_finite());
                 prop_assert_eq!(found[channel].to_bits(), values[sample].to_bits(), "sample {}: {:?}", sample, state);

@@ -6,7 +6,7 @@ mod common;
 #[path = "../../../../tests/counting/mod.rs"]
 mod counting;
 
-use common::{HISTORY, c_path, folder, hybrid, model, simulated, state};
+use common::{HISTORY, NOTHING, c_path, folder, hybrid, model, simulated, state};
 use counting::REQUESTS;
 use phyture::Result;
 use phyture_c::*;
@@ -32,16 +32,7 @@ fn pushing_allocates_nothing() -> Result<()> {
             let read = if is_hybrid { phyture_hybrid_read } else { phyture_model_read };
             assert_eq!(read(path.as_ptr(), &mut loaded, null_mut(), 0), PhytureStatus::Ok);
             assert_eq!(phyture_stream_new(loaded, flight.step_s, &mut stream, null_mut(), 0), PhytureStatus::Ok);
-            let mut out = PhyturePrediction {
-                acceleration: [0.0; 6],
-                physics: [0.0; 6],
-                linear: [0.0; 6],
-                network: [0.0; 6],
-                half_width: [0.0; 6],
-                place: PhyturePlace::Unknown,
-                beyond: 0,
-                complete: false,
-            };
+            let mut out = NOTHING;
             let mut complete = 0;
             let before = REQUESTS.load(Ordering::Relaxed);
             for _ in 0..2 {

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{HISTORY, c_path, folder, hybrid, model, simulated, state, text};
+use common::{HISTORY, NOTHING, c_path, folder, hybrid, model, simulated, state, text};
 use phyture::flight::{PerChannel, Span};
 use phyture::tape::Threads;
 use phyture::{Error, Result};
@@ -30,17 +30,6 @@ fn stream(of: *const PhytureModel, step_s: f64) -> (*mut PhytureStream, PhytureS
     // SAFETY: the message always ends with a zero.
     (handle, status, unsafe { text(message.as_ptr()) })
 }
-
-const NOTHING: PhyturePrediction = PhyturePrediction {
-    acceleration: [0.0; 6],
-    physics: [0.0; 6],
-    linear: [0.0; 6],
-    network: [0.0; 6],
-    half_width: [0.0; 6],
-    place: PhyturePlace::Unknown,
-    beyond: 0,
-    complete: false,
-};
 
 fn push(stream: *mut PhytureStream, state: &[f64], own: &[f64]) -> (PhytureStatus, PhyturePrediction) {
     let mut out = NOTHING;

@@ -12,11 +12,24 @@ use phyture::physics::{Effect, Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
 use phyture::{Error, Result};
+use phyture_c::{PhyturePlace, PhyturePrediction};
 use std::ffi::{CStr, CString, c_char};
 use std::path::Path;
 
 /// Samples of the hybrid's history.
 pub const HISTORY: usize = 16;
+
+/// What nothing has been written to yet.
+pub const NOTHING: PhyturePrediction = PhyturePrediction {
+    acceleration: [0.0; 6],
+    physics: [0.0; 6],
+    linear: [0.0; 6],
+    network: [0.0; 6],
+    half_width: [0.0; 6],
+    place: PhyturePlace::Unknown,
+    beyond: 0,
+    complete: false,
+};
 
 pub fn simulated() -> Result<DataSet> {
     simulate(&Simulation { minutes: 2.0, seed: 3, ..Simulation::default() })
@@ -70,7 +83,7 @@ pub fn hybrid(set: &DataSet) -> Result<Hybrid> {
 }
 
 pub fn state(flight: &Flight, sample: usize) -> [f64; 16] {
-    std::array::from_fn(|column| flight.column(Column::STATE[column])[sample])
+    flight.state(sample)
 }
 
 pub fn folder() -> Result<tempfile::TempDir> {
