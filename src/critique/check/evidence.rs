@@ -6,7 +6,7 @@ use super::finding::{Finding, RELATIONS, Severity, finding};
 use super::forces::Forces;
 use super::gains::Gains;
 use super::increments::Motion;
-use super::mounts::Mounts;
+use super::mounts::{Mounts, Turns};
 use super::relations::Relation;
 use super::robust::median;
 use super::timing::Timing;
@@ -60,6 +60,11 @@ impl Evidence {
         self.timing.add(flight, motion);
         let duration_s = motion.step_s * motion.instants.len() as f64;
         self.halves = Halves::of(&self.timing, motion.step_s, duration_s);
+    }
+
+    /// How the sensors sit.
+    pub fn turns(&self) -> Turns {
+        self.mounts.turns()
     }
 
     /// Adds what another gathered, so many of its blocks as one.

@@ -8,6 +8,7 @@
 use super::finding::{Finding, Severity, finding};
 use super::increments::{Motion, Vector};
 use super::regression::{BlockRegression, Estimate};
+use super::robust::median;
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::cross;
 
@@ -31,7 +32,7 @@ pub(super) struct Mounts {
 }
 
 /// What one regression says: δ about each axis.
-struct Turn {
+pub(super) struct Turn {
     angles: [Estimate; 3],
     /// A turn is what is wrong with the relation.
     convinces: bool,
@@ -47,6 +48,14 @@ impl Turn {
         (0..3).filter(certain).max_by(|one, other| self.size(*one).total_cmp(&self.size(*other)))
     }
 
+    /// Whether it is another mount than the one that is usual, by δ about each axis.
+    fn is_beyond(&self, usual: &[f64; 3]) -> bool {
+        self.axis().is_some_and(|axis| {
+            let [low, high] = self.angles[axis].interval.map(|bound| bound - usual[axis]);
+            low > TURNED || high < -TURNED
+        })
+    }
+
     fn size(&self, axis: usize) -> f64 {
         self.angles[axis].value.abs()
     }
@@ -54,6 +63,21 @@ impl Turn {
     fn largest(&self) -> usize {
         (0..3).max_by(|one, other| self.size(*one).total_cmp(&self.size(*other))).expect("there are three axes")
     }
+}
+
+/// Against the velocity and against the rates, where they are known.
+pub(super) type Turns = [Option<Turn>; 2];
+
+/// Whether one flight has another mount than the most of those in which nothing is turned too far: what all share is a property of the aircraft, as an
+/// inertial unit is that sits a degree or two off, and no fault of one flight.
+pub(super) fn is_beyond_usual<'t>(one: &Turns, all: impl Iterator<Item = &'t Turns> + Clone) -> bool {
+    let is_sound = |turns: &&Turns| turns.iter().flatten().all(|turn| turn.axis().is_none());
+    let usual = |stream: usize, axis: usize| {
+        let of_flights = all.clone().filter(is_sound).filter_map(|turns| Some(turns[stream].as_ref()?.angles[axis].value));
+        median(of_flights.collect()).unwrap_or(0.0)
+    };
+    let known = one.iter().enumerate().filter_map(|(stream, turn)| Some((stream, turn.as_ref()?)));
+    known.into_iter().any(|(stream, turn)| turn.is_beyond(&std::array::from_fn(|axis| usual(stream, axis))))
 }
 
 impl Mounts {
@@ -105,6 +129,11 @@ impl Mounts {
     pub fn absorb(&mut self, other: &Self, together: usize) {
         self.velocity.absorb(&other.velocity, together);
         self.rates.absorb(&other.rates, together);
+    }
+
+    /// The angles.
+    pub fn turns(&self) -> Turns {
+        [&self.velocity, &self.rates].map(turn)
     }
 
     /// What is turned, or that nothing is; nothing is said of a stream in which a column is known to be read wrongly, as `sound` says of velocity and
@@ -181,5 +210,30 @@ fn of_angle(angle: Estimate, verdict: Severity, message: String, set: Option<Str
         expected: Some(0.0),
         unit: "rad".into(),
         ..finding(NAME, verdict, message, set.as_deref())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turns(about_x: f64) -> Turns {
+        let angle = |value: f64| Estimate { value, interval: [value - 0.002, value + 0.002] };
+        [None, Some(Turn { angles: [angle(about_x), angle(0.0), angle(0.0)], convinces: true })]
+    }
+
+    #[test]
+    fn a_flight_is_turned_against_what_the_most_show() {
+        let with = |usual: f64, many: usize, others: f64| {
+            let all: Vec<Turns> = (0..20).map(|flight| turns(if flight < many { usual } else { others })).collect();
+            is_beyond_usual(&all[19], all.iter())
+        };
+        // All sit a little off, and one is estimated a little more: the same mount.
+        assert!(!with(0.03, 19, 0.063));
+        assert!(with(0.03, 19, 0.12));
+        assert!(with(-0.03, 19, 0.04 + TURNED));
+        // Half of the flights may be turned: those that are not say what is usual.
+        assert!(with(0.0, 10, 0.1));
+        assert!(with(0.0, 6, -0.1));
     }
 }

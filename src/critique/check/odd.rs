@@ -6,6 +6,7 @@ use super::evidence::Evidence;
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, TOGETHER};
+use super::mounts::{self, Turns, is_beyond_usual};
 use super::robust::{NORMAL, median};
 use super::timing::{Acts, Timing};
 use super::unexplained::Left;
@@ -41,6 +42,8 @@ pub(super) struct Own {
     pub left: Vec<Left>,
     /// When u1, u2 and u3 act.
     pub acts: [Option<Acts>; 3],
+    /// How its sensors sit.
+    turns: Turns,
 }
 
 impl Own {
@@ -57,7 +60,7 @@ impl Own {
         let mut evidence = Evidence::new(quaternion, step_s);
         // A block of usual length is longer than most manoeuvres.
         evidence.absorb(&short, TOGETHER);
-        Self { flight, evidence, findings, left: short.unexplained(), acts: short.timing.acts() }
+        Self { flight, evidence, findings, left: short.unexplained(), acts: short.timing.acts(), turns: short.turns() }
     }
 }
 
@@ -169,6 +172,14 @@ impl Odd {
                     let mut late = shifted(&of_flights, &name[STICK.len()..]);
                     late.retain(|shift| shift.is_late && are_some(shift.flights.len()));
                     late
+                }
+                mounts::NAME => {
+                    let turns = |flight: usize| each.iter().find(|own| own.flight == flight).map(|own| &own.turns);
+                    let all = each.iter().map(|own| &own.turns);
+                    let is_other = |flight: usize| turns(flight).is_none_or(|turns| is_beyond_usual(turns, all.clone()));
+                    of_flights.retain(|(flight, finding)| finding.verdict != Severity::Fault || is_other(*flight));
+                    odd.extend(name, broken(&of_flights), flights);
+                    continue;
                 }
                 _ => {
                     odd.extend(name, broken(&of_flights), flights);
