@@ -27,7 +27,7 @@ const ROUNDS: usize = 8;
 /// Halvings of the step in which the level of the quantile is found.
 const HALVINGS: usize = 20;
 
-/// PredictionIntervals around what a hybrid predicts.
+/// Prediction intervals around what a hybrid predicts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PredictionIntervals {
     /// Share of measurements that they hold on flights like those they were made from.
@@ -79,7 +79,7 @@ pub(super) struct Kept<'f> {
 }
 
 impl PredictionIntervals {
-    /// PredictionIntervals from windows that the network was not trained on; none from fewer than [`FEWEST_BLOCKS`] blocks. `spans` is what trained,
+    /// Intervals from windows that the network was not trained on; none from fewer than [`FEWEST_BLOCKS`] blocks. `spans` is what trained,
     /// which gives the motion its scale.
     pub(super) fn new(flights: &[Flight], spans: &[Span], kept: &[Kept<'_>]) -> Option<Self> {
         let blocks = kept.iter().map(|kept| kept.block + 1).max().unwrap_or(0);

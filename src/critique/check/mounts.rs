@@ -68,16 +68,20 @@ impl Turn {
 /// Against the velocity and against the rates, where they are known.
 pub(super) type Turns = [Option<Turn>; 2];
 
-/// Whether one flight has another mount than the most of those in which nothing is turned too far: what all share is a property of the aircraft, as an
+/// δ about each axis, rad, by stream: the median of the flights in which nothing is turned too far. What all share is a property of the aircraft, as an
 /// inertial unit is that sits a degree or two off, and no fault of one flight.
-pub(super) fn is_beyond_usual<'t>(one: &Turns, all: impl Iterator<Item = &'t Turns> + Clone) -> bool {
-    let is_sound = |turns: &&Turns| turns.iter().flatten().all(|turn| turn.axis().is_none());
-    let usual = |stream: usize, axis: usize| {
-        let of_flights = all.clone().filter(is_sound).filter_map(|turns| Some(turns[stream].as_ref()?.angles[axis].value));
-        median(of_flights.collect()).unwrap_or(0.0)
+pub(super) fn usual<'t>(flights: impl Iterator<Item = &'t Turns>) -> [[f64; 3]; 2] {
+    let sound: Vec<&Turns> = flights.filter(|turns| turns.iter().flatten().all(|turn| turn.axis().is_none())).collect();
+    let of = |stream: usize, axis: usize| {
+        let angles = sound.iter().filter_map(|turns| Some(turns[stream].as_ref()?.angles[axis].value));
+        median(angles.collect()).unwrap_or(0.0)
     };
-    let known = one.iter().enumerate().filter_map(|(stream, turn)| Some((stream, turn.as_ref()?)));
-    known.into_iter().any(|(stream, turn)| turn.is_beyond(&std::array::from_fn(|axis| usual(stream, axis))))
+    std::array::from_fn(|stream| std::array::from_fn(|axis| of(stream, axis)))
+}
+
+/// Whether a flight has another mount than the usual one.
+pub(super) fn is_beyond(turns: &Turns, usual: &[[f64; 3]; 2]) -> bool {
+    turns.iter().zip(usual).any(|(turn, usual)| turn.as_ref().is_some_and(|turn| turn.is_beyond(usual)))
 }
 
 impl Mounts {
@@ -224,9 +228,9 @@ mod tests {
 
     #[test]
     fn a_flight_is_turned_against_what_the_most_show() {
-        let with = |usual: f64, many: usize, others: f64| {
-            let all: Vec<Turns> = (0..20).map(|flight| turns(if flight < many { usual } else { others })).collect();
-            is_beyond_usual(&all[19], all.iter())
+        let with = |common: f64, many: usize, others: f64| {
+            let all: Vec<Turns> = (0..20).map(|flight| turns(if flight < many { common } else { others })).collect();
+            is_beyond(&all[19], &usual(all.iter()))
         };
         // All sit a little off, and one is estimated a little more: the same mount.
         assert!(!with(0.03, 19, 0.063));

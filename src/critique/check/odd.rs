@@ -6,7 +6,7 @@ use super::evidence::Evidence;
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, TOGETHER};
-use super::mounts::{self, Turns, is_beyond_usual};
+use super::mounts::{self, Turns};
 use super::robust::{NORMAL, median};
 use super::timing::{Acts, Timing};
 use super::unexplained::Left;
@@ -154,7 +154,13 @@ impl Odd {
             let such = scaled(relation, &by_name);
             odd.extend(relation, such, flights);
         }
+        let usual = mounts::usual(each.iter().map(|own| &own.turns));
+        let is_turned = |own: &&&Own| mounts::is_beyond(&own.turns, &usual);
+        let turned: BTreeSet<usize> = each.iter().filter(is_turned).map(|own| own.flight).collect();
         for (name, mut of_flights) in by_name {
+            // A mount that all share is no fault of one.
+            of_flights
+                .retain(|(flight, finding)| name != mounts::NAME || finding.verdict != Severity::Fault || turned.contains(flight));
             // A flight all of whose controls are late says nothing more of each.
             of_flights.retain(|(flight, _)| !name.starts_with(STICK) || !odd.flights.contains(flight));
             let are_some = |flights: usize| flights >= FEWEST && 10 * flights >= of_flights.len();
@@ -172,14 +178,6 @@ impl Odd {
                     let mut late = shifted(&of_flights, &name[STICK.len()..]);
                     late.retain(|shift| shift.is_late && are_some(shift.flights.len()));
                     late
-                }
-                mounts::NAME => {
-                    let turns = |flight: usize| each.iter().find(|own| own.flight == flight).map(|own| &own.turns);
-                    let all = each.iter().map(|own| &own.turns);
-                    let is_other = |flight: usize| turns(flight).is_none_or(|turns| is_beyond_usual(turns, all.clone()));
-                    of_flights.retain(|(flight, finding)| finding.verdict != Severity::Fault || is_other(*flight));
-                    odd.extend(name, broken(&of_flights), flights);
-                    continue;
                 }
                 _ => {
                     odd.extend(name, broken(&of_flights), flights);
