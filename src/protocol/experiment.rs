@@ -186,7 +186,7 @@ impl<'a> Experiment<'a> {
             return Ok(amended.clone());
         }
         let options = Options { seed: SEARCH_SEED, ..Options::default() };
-        let Amended { rounds, model } = amend(self.flights, self.model, &confirming(split), &options, &mut |_, _| {
+        let Amended { rounds, model, .. } = amend(self.flights, self.model, &confirming(split), &options, &mut |_, _| {
             if go_on(0.0) { Ok(()) } else { Err(Error::Interrupted { saved: format!("the run `{run}` starts anew") }) }
         })?;
         let confirmed = rounds.into_iter().filter(Diagnosis::is_confirmed);

@@ -216,11 +216,16 @@ pub fn data_sha256(set: &DataSet) -> String {
     set.source.sha256.clone()
 }
 
-/// A flag that Ctrl-C (and a polite kill) raises. Installed once.
+/// A flag that Ctrl-C (and a polite kill) raises; the second time it ends the program at once. Installed once.
 pub fn interruption() -> Result<Arc<AtomicBool>> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
-    ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed))
+    let raise = move || {
+        if raised.swap(true, Ordering::Relaxed) {
+            std::process::exit(crate::INTERRUPTED.into());
+        }
+    };
+    ctrlc::set_handler(raise)
         .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
     Ok(flag)
 }

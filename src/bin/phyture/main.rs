@@ -6,6 +6,7 @@ mod arguments;
 mod commands;
 mod context;
 mod folder;
+mod following;
 mod notes;
 mod output;
 mod pages;

@@ -77,6 +77,11 @@ pub fn be_quiet() {
     QUIET.store(true, Ordering::Relaxed);
 }
 
+/// Whether it is so.
+pub fn is_quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
 /// An error for a person, on standard error.
 pub fn complain(text: impl std::fmt::Display) {
     eprintln!("{}", style::for_error(&printable(&text.to_string())));
@@ -103,12 +108,12 @@ pub struct Progress {
 }
 
 /// How often a plain line is written when there is no terminal.
-const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
+pub const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
 
 impl Progress {
     /// A bar of `steps` steps, `done` of which are behind already.
     pub fn new(what: &str, steps: u64, done: u64) -> Self {
-        let quiet = QUIET.load(Ordering::Relaxed);
+        let quiet = is_quiet();
         let plain = quiet || !std::io::stderr().is_terminal();
         let bar = ProgressBar::with_draw_target(
             Some(steps),

@@ -120,7 +120,7 @@ fn held_against(with: &Errors, without: &Errors, before: &Errors) -> (BTreeMap<S
 /// # Errors
 /// As [`weigh`]; [`Error::Shape`] without a round.
 pub fn together(flights: &[Flight], before: &Model, amended: &Amended, split: &Split) -> Result<Diagnosis> {
-    let Amended { rounds, model } = amended;
+    let Amended { rounds, model, .. } = amended;
     let nothing = || Error::Shape { operation: "loop", message: "there is no round to tell of".into() };
     let last = rounds.last().ok_or_else(nothing)?;
     let added: Vec<&Diagnosis> = rounds.iter().filter(|round| round.is_confirmed()).collect();
@@ -301,6 +301,33 @@ mod tests {
         let found = [locked.rmse_before.vx_dot, locked.rmse_after.vx_dot].map(|rmse| rmse.unwrap_or(f64::NAN));
         assert!((found[0] - first).abs() < 1e-9 && (found[1] - last).abs() < 1e-9, "{found:?} {first} {last}");
         assert_eq!((whole.verdict, whole.is_confirmed()), (Verdict::EffectsMissing, true));
+        Ok(())
+    }
+
+    #[test]
+    fn a_loop_that_is_stopped_keeps_what_it_had_added() -> Result<()> {
+        let flights = flights()?;
+        let split = split(&flights, 2);
+        let mut model = model();
+        model.effects.push(Effect { enabled: false, ..formula("one", "u1")? });
+        let without: Vec<String> = catalogue::definitions().map(|definition| definition.kind.to_owned()).collect();
+        let stopped_in = |stop: usize| {
+            let options = Options { without: without.clone(), max_effects: Some(1), ..Options::default() };
+            if stop == 0 {
+                options.watch.stop();
+            }
+            amend(&flights, &model, &split, &options, &mut |round, _| {
+                if round == stop {
+                    options.watch.stop();
+                }
+                Ok(())
+            })
+        };
+        let amended = stopped_in(1)?;
+        assert!(amended.stopped && amended.rounds.len() == 1);
+        assert!(amended.model.effect("one").is_some_and(|effect| effect.enabled));
+        assert!(matches!(stopped_in(0), Err(Error::Interrupted { .. })), "with nothing found there is nothing to keep");
+        assert!(!stopped_in(9)?.stopped);
         Ok(())
     }
 

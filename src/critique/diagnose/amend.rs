@@ -1,6 +1,7 @@
 //! The loop: diagnose, add what is confirmed, calibrate, until nothing worthwhile is left. No file is written here: the caller is
 //! told of every round.
 
+use super::report::Step;
 use super::suggest::{is_suggested, standing};
 use super::{Diagnosis, Options, diagnose};
 use crate::error::{Error, Result};
@@ -17,6 +18,8 @@ pub struct Amended {
     pub rounds: Vec<Diagnosis>,
     /// The calibrated model with all that was added.
     pub model: Model,
+    /// Whether [`Options::watch`] stopped it after these rounds, before nothing more was found.
+    pub stopped: bool,
 }
 
 /// What a search reads of a split: everything but the part that confirms.
@@ -41,20 +44,23 @@ pub fn calibrated(model: &Model, flights: &[Flight], split: &Split) -> Result<Mo
 /// Puts the numbers of the model that goes on into what is said of its effects: one coefficient, one value, and that of the model
 /// file. A property of each flight keeps its mean.
 pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
-    for step in &mut diagnosis.steps {
-        let Some(effect) = model.effect(&step.effect) else { continue };
-        for number in &mut step.coefficients {
-            let Some(coefficient) = effect.coefficient(&number.name) else { continue };
-            (number.value, number.ci95) = (coefficient.value, coefficient.ci95.or(number.ci95));
-            number.sign = doubt(effect, coefficient).map(|doubt| doubt.finding);
-        }
-        for value in &mut step.parameters {
-            let known = effect.parameters.iter().find(|parameter| parameter.name == value.name);
-            value.value = known.map_or(value.value, |known| known.value);
-            value.profile = known.and_then(|known| known.ci95).or(value.profile);
-        }
-        step.formula = effect.to_string();
+    diagnosis.steps.iter_mut().for_each(|step| numbers_of(step, model));
+}
+
+/// The same for one effect.
+pub(super) fn numbers_of(step: &mut Step, model: &Model) {
+    let Some(effect) = model.effect(&step.effect) else { return };
+    for number in &mut step.coefficients {
+        let Some(coefficient) = effect.coefficient(&number.name) else { continue };
+        (number.value, number.ci95) = (coefficient.value, coefficient.ci95.or(number.ci95));
+        number.sign = doubt(effect, coefficient).map(|doubt| doubt.finding);
     }
+    for value in &mut step.parameters {
+        let known = effect.parameters.iter().find(|parameter| parameter.name == value.name);
+        value.value = known.map_or(value.value, |known| known.value);
+        value.profile = known.and_then(|known| known.ci95).or(value.profile);
+    }
+    step.formula = effect.to_string();
 }
 
 /// Diagnoses, adds and calibrates until nothing is found that the confirming flights confirm. `told` hears of every round, from 1,
@@ -64,7 +70,7 @@ pub(super) fn as_in_the_model(diagnosis: &mut Diagnosis, model: &Model) {
 /// bear out are tried as effects are, by themselves and beside all that was found.
 ///
 /// # Errors
-/// As [`diagnose`]; what `told` gives.
+/// As [`diagnose`], but for a stop after a round that added something, whose findings are kept; what `told` gives.
 pub fn amend(
     flights: &[Flight],
     model: &Model,
@@ -78,9 +84,15 @@ pub fn amend(
     model.effects.extend(off.iter().cloned());
     let mut rounds: Vec<Diagnosis> = Vec::new();
     let mut options = options.clone();
-    let (mut at_once, mut of_formulas) = (false, false);
+    let (mut at_once, mut of_formulas, mut stopped) = (false, false, false);
     for round in 1..=MOST_ROUNDS {
-        let mut outcome = diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), &options)?;
+        let mut outcome = match diagnose(flights, &model, &searched(split), &split.test, split.tested.name(), &options) {
+            Err(Error::Interrupted { .. }) if rounds.iter().any(Diagnosis::is_confirmed) => {
+                stopped = true;
+                break;
+            }
+            outcome => outcome?,
+        };
         let confirmed = outcome.diagnosis.is_confirmed();
         at_once |= outcome.diagnosis.both_roads;
         if confirmed {
@@ -110,7 +122,7 @@ pub fn amend(
     }
     // A formula that was tried and not taken is no wish of the user's.
     model.effects.retain(|effect| effect.enabled || given(effect) || !is_suggested(&effect.name));
-    Ok(Amended { rounds, model })
+    Ok(Amended { rounds, model, stopped })
 }
 
 /// All candidates but these.

@@ -1,16 +1,18 @@
 //! From what a search found to what is said of it. No measuring here.
 
+use super::amend::numbers_of;
 use super::candidate::{Candidate, is_found};
 use super::engine::Trial;
 use super::found::Found;
 use super::gates::SMALLEST_FALL;
-use super::influence::decisive_flight;
+use super::influence::{Influences, decisive_flight};
 use super::judged::{Fitted, Judged};
 use super::report::{CandidateReport, Confirmation, Diagnosis, Number, ParameterValue, Status, Step, Verdict};
 use super::resample::{RESAMPLES, draw};
 use super::scored::Scored;
 use super::search::Search;
 use super::sentences;
+use crate::error::Result;
 use crate::flight::{Channel, Column, PerChannel};
 use crate::physics::{Coefficient, Definition, Effect, FORMULA_KIND, Parameter, catalogue};
 use std::collections::BTreeMap;
@@ -41,10 +43,7 @@ impl Search<'_> {
             rests_on_flight: judged.rests_on.clone(),
             ..told_of(effect, definition, model.is_usual(), &judged.falls)
         };
-        // Numbers of an effect are its coefficients, then its parameters.
-        let coefficients = step.coefficients.iter_mut().map(|number| &mut number.influence);
-        let numbers = coefficients.chain(step.parameters.iter_mut().map(|parameter| &mut parameter.influence));
-        numbers.enumerate().for_each(|(position, influence)| *influence = influences.get(&(index, position)).cloned());
+        note_influences(&mut step, index, influences);
         Some(Found {
             step,
             gain: judged.gain(),
@@ -54,6 +53,28 @@ impl Search<'_> {
             mse_before: PerChannel::splat(0.0),
             removed: PerChannel::splat(0.0),
         })
+    }
+
+    /// The numbers of what was found beside many effects, with their intervals: numbers of many effects lean on each other and on lags, so
+    /// all are fitted at once, as on the backward road.
+    ///
+    /// # Errors
+    /// As [`Search::refitted`].
+    pub(super) fn numbers_at_once(&self, found: &mut [Found]) -> Result<()> {
+        let Some((last, earlier)) = found.split_last_mut() else { return Ok(()) };
+        let Fitted { model, influences } = self.refitted(&last.model, &[])?;
+        // The models on the way may have been fitted on a part.
+        for found in earlier {
+            found.model = self.engine.pass(&found.model, &[])?.base.model;
+        }
+        for found in found.iter_mut() {
+            numbers_of(&mut found.step, &model);
+            let index = model.effects.iter().position(|effect| effect.name == found.step.effect);
+            index.into_iter().for_each(|index| note_influences(&mut found.step, index, &influences));
+        }
+        self.judge_signs(&model, found);
+        found.last_mut().into_iter().for_each(|last| last.model.clone_from(&model));
+        Ok(())
     }
 
     /// Share of resampled block sets in which the model with an effect is better than that without.
@@ -125,6 +146,13 @@ impl Search<'_> {
         reports.sort_by(|left, right| largest(right).total_cmp(&largest(left)));
         reports
     }
+}
+
+/// Notes which numbers of an effect hang on one flight: its coefficients, then its parameters.
+fn note_influences(step: &mut Step, effect: usize, influences: &Influences) {
+    let coefficients = step.coefficients.iter_mut().map(|number| &mut number.influence);
+    let numbers = coefficients.chain(step.parameters.iter_mut().map(|parameter| &mut parameter.influence));
+    numbers.enumerate().for_each(|(position, influence)| *influence = influences.get(&(effect, position)).cloned());
 }
 
 /// What there is to tell of an accepted effect as it stands in a model.

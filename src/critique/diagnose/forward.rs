@@ -10,14 +10,15 @@ use super::report::CandidateReport;
 use super::resample::{RESAMPLES, Resampled, draw, resampled};
 use super::scored::Scored;
 use super::search::Search;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::flight::PerChannel;
-use crate::physics::Model;
+use crate::physics::{Model, catalogue};
 use std::collections::BTreeMap;
 
 impl Search<'_> {
     /// The fitted model; with half a step of control delay, if it states none and half a step is better than none and than a little
-    /// less or more: then the controls are held between samples, which is how the log was made and no effect. Another delay is one.
+    /// less or more: then the controls are held between samples, which is how the log was made and no effect. Another delay is one, and where it
+    /// is in the model nothing is asked.
     pub(super) fn timing(&self, base: &Model) -> Result<(Model, Option<f64>)> {
         let step_s = self.engine.flights.first().map_or(0.01, |flight| flight.step_s);
         let delays: Vec<f64> = [0.5, 0.35, 0.65, 1.0, 1.5, 2.0].iter().map(|steps| steps * step_s).collect();
@@ -26,19 +27,25 @@ impl Search<'_> {
             model.data.control_delay_s = *delay_s;
             model
         };
-        let stated = base.data.control_delay_s > 0.0;
+        let stated = base.data.control_delay_s > 0.0 || base.effects.iter().any(|effect| effect.kind == "ctrl_delay");
         let models: Vec<Model> = if stated { Vec::new() } else { delays.iter().map(delayed).collect() };
-        let pass = self.engine.pass(base, &models)?;
+        // All columns of a model change with its delay, and one of many effects has many: a part of long flights tells it as well.
+        let part = self.part().filter(|_| !models.is_empty() && has_many(base));
+        let pass = part.as_ref().unwrap_or(self).engine.pass(base, &models)?;
+        let fitted = |model: &Model| match part {
+            Some(_) => Ok::<_, Error>(self.engine.pass(model, &[])?.base.model),
+            None => Ok(model.clone()),
+        };
         let gains: Vec<Vec<f64>> =
             pass.trials.iter().map(|trial| trial.as_ref().map_or_else(Vec::new, |trial| gains(&pass.base, trial))).collect();
         let total = |gains: &Vec<f64>| gains.iter().sum::<f64>();
         if let (Some(half), Some(Some(trial))) = (gains.first(), pass.trials.first()) {
             let (difference, error) = paired(half, &vec![0.0; half.len()]);
             if difference > 2.0 * error && gains.iter().skip(1).all(|longer| total(longer) < total(half)) {
-                return Ok((trial.model.clone(), delays.first().copied()));
+                return Ok((fitted(&trial.model)?, delays.first().copied()));
             }
         }
-        Ok((pass.base.model, None))
+        Ok((fitted(&pass.base.model)?, None))
     }
 
     /// With how many effects more it is time to begin from the other end: those that earlier searches found count, unless they were as many.
@@ -235,6 +242,12 @@ impl Search<'_> {
             .count();
         wins as f64 / RESAMPLES as f64
     }
+}
+
+/// Whether a model has so many effects beyond a baseline as make a search begin from the other end.
+pub(super) fn has_many(model: &Model) -> bool {
+    let is_searched = |kind: &str| catalogue::definition(kind).is_some_and(|definition| definition.notes.is_some());
+    model.effects.iter().filter(|effect| is_found(effect) || is_searched(&effect.kind)).count() >= MANY
 }
 
 /// What a search has found by now, in words.

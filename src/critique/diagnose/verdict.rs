@@ -6,6 +6,7 @@ use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, permuted_folds};
 use super::failure::{Measured, failure};
+use super::forward::has_many;
 use super::found::Found;
 use super::gates::{
     BLOCK_S, CORRELATION_S, ENOUGH_BLOCKS, FAMILY_WISE, FEWEST_BLOCKS, MOST_BLOCKS, SHORTEST_BLOCK_S, SMALLEST_FALL,
@@ -144,10 +145,10 @@ impl Search<'_> {
         let before = ground.before;
         let limit = self.options.max_effects;
         let is_many = |found: &[Found]| limit.is_none() && found.len() == Self::enough(before);
-        // Where much is missing, a part of long flights shows it as well.
+        // Where much is missing, or is in the model already, a part of long flights shows it as well.
         let part = self.part().filter(|_| limit.is_none());
         let of_part = part.map(|part| part.forward(before, candidates, None)).transpose()?;
-        let (mut found, mut left) = match of_part.filter(|(found, _)| is_many(found)) {
+        let (mut found, mut left) = match of_part.filter(|(found, _)| is_many(found) || has_many(before)) {
             Some(of_part) => of_part,
             None => self.forward(before, candidates, limit)?,
         };
@@ -173,7 +174,12 @@ impl Search<'_> {
             unknown = unknown_of(&fitted(&found))?;
         }
         self.options.watch.at("intervals of the numbers")?;
-        self.intervals(&mut found)?;
+        let numbers = if has_many(before) { self.numbers_at_once(&mut found) } else { self.intervals(&mut found) };
+        match numbers {
+            // Lags and delays may be what these flights leave open; the coefficients by themselves are not.
+            Err(Error::Undetermined(_)) if has_many(before) => self.intervals(&mut found)?,
+            done => done?,
+        }
         Ok(Heard { found, left, unknown, roads, at_once: false })
     }
 
@@ -245,7 +251,8 @@ impl Search<'_> {
                 failure(flights, &Measured { on: "searched", spans: ground.searched, mse }, &unknown)
             }
         };
-        diagnosis.notes.extend(if diagnosis.both_roads { wrong_signs(&after) } else { self.sign_notes(&after)? });
+        let judged = diagnosis.both_roads || has_many(ground.before) && has_intervals(&after);
+        diagnosis.notes.extend(if judged { wrong_signs(&after) } else { self.sign_notes(&after)? });
         diagnosis.notes.extend(after.assumptions());
         diagnosis.summary = summary(&diagnosis);
         diagnosis.seconds += begun.elapsed().as_secs_f64();
@@ -271,6 +278,12 @@ impl Search<'_> {
         };
         Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
     }
+}
+
+/// Whether every number of a model that is not of each flight has its interval.
+fn has_intervals(model: &Model) -> bool {
+    let mut numbers = model.effects.iter().flat_map(|effect| &effect.coefficients);
+    numbers.all(|number| number.by_flight.is_some() || number.ci95.is_some())
 }
 
 #[cfg(test)]

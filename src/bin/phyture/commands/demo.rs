@@ -180,10 +180,11 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let calm = Some(explainable.flights.clone());
     let search = SearchTask { set: &set, split: &split, data_sha256: String::new(), options, explainable: calm };
     let ledger = out.join("amended.ledger.jsonl");
-    let found = diagnose::amend(context, &search, &model, &ledger)?;
+    let found = diagnose::amend(context, &search, &model, &ledger, &interrupted)?;
     found.model.write(out.join("amended.toml"))?;
+    diagnose::not_stopped(&found, &out.join("amended.toml"))?;
     let together = diagnose::told_together(context, &search, &model, &found)?;
-    let Amended { rounds, model: amended } = found;
+    let Amended { rounds, model: amended, .. } = found;
 
     context.say("\n5. The residual network, trained on the baseline and on the amended model");
     let of = Settings { out, set: &set, split: &split, config: &config };

@@ -2,9 +2,9 @@
 
 use super::{CHECK_FAILED, explainable};
 use crate::arguments::{Data, Division, count};
-use crate::context::{Context, data_sha256};
+use crate::context::{Context, data_sha256, interruption};
+use crate::following::followed;
 use crate::pages::{Outlet, Pages};
-use phyture::Result;
 use phyture::critique::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, LoopText, Options, calibrated, searched};
 use phyture::critique::wrap::wrapped;
@@ -13,8 +13,10 @@ use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::workflow::{Looped, SearchTask, append_to_ledger, convention_fault, network_search, provenance, read_network};
+use phyture::{Error, Result};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
 
 /// The page of a diagnosis: where it goes, and what stands in it besides.
 struct DiagnosisPage {
@@ -172,7 +174,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let options = Options { max_effects: wanted.max_effects, seed: context.seed(), ..Options::default() };
     let explainable = read_explainable(data, truth, &split)?;
     let task = SearchTask { set: &set, split: &split, data_sha256, options, explainable };
-    let outcome = task.diagnose(&model)?;
+    let outcome = followed("search", &task.options.watch, &*interruption()?, |_| task.diagnose(&model))?;
     context.say(format!("\n{}", told(context, &outcome.diagnosis)));
     if let Some(page) = page {
         let before = calibrated(&model, &set.flights, &split)?;
@@ -190,18 +192,26 @@ fn told(context: &Context, diagnosis: &Diagnosis) -> String {
 
 /// Diagnoses, adds and calibrates until nothing worthwhile is left; appends to the ledger. A round by itself is told only in the verbose
 /// text; what all found is the caller's to tell (see [`told_together`]).
-pub fn amend(context: &Context, task: &SearchTask<'_>, model: &Model, ledger: &Path) -> Result<Amended> {
-    task.amend(model, &mut |round, diagnosis| {
-        if context.is_verbose() {
-            context.say(format!("\nRound {round}\n{diagnosis:#}"));
-        } else {
-            context.say(progress(diagnosis));
-        }
-        if diagnosis.is_confirmed() {
-            append_to_ledger(ledger, round, diagnosis)?;
-        }
-        Ok(())
+pub fn amend(context: &Context, task: &SearchTask<'_>, model: &Model, ledger: &Path, interrupted: &AtomicBool) -> Result<Amended> {
+    followed("search", &task.options.watch, interrupted, |line| {
+        task.amend(model, &mut |round, diagnosis| {
+            let said = if context.is_verbose() { format!("\nRound {round}\n{diagnosis:#}") } else { progress(diagnosis) };
+            line.aside(|| context.say(said));
+            if diagnosis.is_confirmed() {
+                append_to_ledger(ledger, round, diagnosis)?;
+            }
+            Ok(())
+        })
     })
+}
+
+/// After a loop that was stopped there is nothing more to do: what it had found is in the model file that was written.
+///
+/// # Errors
+/// [`Error::Interrupted`] if it was.
+pub fn not_stopped(amended: &Amended, written: &Path) -> Result<()> {
+    let saved = || format!("what was found before is in {}; it has not been searched for more", written.display());
+    if amended.stopped { Err(Error::Interrupted { saved: saved() }) } else { Ok(()) }
 }
 
 /// One line for a search of minutes; its findings are told once all are known.
@@ -276,12 +286,13 @@ pub fn run_loop(context: &Context, wanted: &LoopArgs) -> Result<ExitCode> {
     let task = SearchTask { set: &set, split: &split, data_sha256: data_sha256.clone(), options, explainable };
     let ledger = output.with_extension("ledger.jsonl");
     let before = calibrated(&model, &set.flights, &split)?;
-    let mut amended = amend(context, &task, &model, &ledger)?;
+    let mut amended = amend(context, &task, &model, &ledger, &*interruption()?)?;
     let model = &mut amended.model;
     division.wanted().note(model);
     model.note_source(&set.source, context.seed());
     // Before anything else is measured: what the search found is then safe.
     model.write(context.ready(&target)?)?;
+    not_stopped(&amended, output)?;
     let together = told_together(context, &task, &before, &amended)?;
     context.say(format!("\nmodel written to {}", output.display()));
     let ledger = ledger.exists().then_some(ledger);

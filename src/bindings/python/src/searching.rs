@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::network::Network;
 use crate::ranges;
 use crate::work::{Interrupted, Watched, work};
-use phyture::Result;
+use phyture::{Error, Result};
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Diagnosis, LoopText, Options, calibrated, searched};
 use phyture::flight::split::{Part, Split};
@@ -185,6 +185,9 @@ fn looped(
         Some(ledger) if diagnosis.is_confirmed() => append_to_ledger(ledger, round, diagnosis),
         _ => Ok(()),
     })?;
+    if amended.stopped {
+        return Err(Error::Interrupted { saved: "the search was stopped, and nothing was written but the ledger".into() });
+    }
     division.wanted()?.note(&mut amended.model);
     amended.model.note_source(&searched.set.source, searched.seed);
     if let Some(output) = &searching.output {
