@@ -3,6 +3,7 @@
 
 use super::candidate::{Candidate, is_found, with};
 use super::engine::{Engine, Errors, permuted_folds};
+use super::exchange::{Exchange, Ground, Rivals};
 use super::gains::{by_flight_of, gains_of};
 use super::gates::{BLOCK_S, SMALLEST_FALL};
 use super::gram::blocks;
@@ -70,8 +71,9 @@ impl Search<'_> {
         let (quick, judging) = (self.quick(), self.judging());
         let road = Road { flips: Flips::new(judging.blocks.len(), self.options.seed), engine: judging, largest_p: self.largest_p };
         let mut gone: Vec<Judged> = Vec::new();
+        let mut rivals = Rivals::default();
         let mut round = 1;
-        let needed = loop {
+        let mut needed = loop {
             self.options.watch.at(format!("round {round}: fitting {} effects together", optional(&model).len()))?;
             model = Point::fitted(&quick, model, STEPS[0])?;
             self.options.watch.at(format!("round {round}: fitting them on more flights"))?;
@@ -83,11 +85,23 @@ impl Search<'_> {
             let Pruned { absent, needed, needless } = road.pruned(&point)?;
             gone.extend(needless);
             model = point.without(&road.engine, &absent).ok_or_else(undetermined)?;
-            if absent.is_empty() || round == MOST_ROUNDS {
+            if round == MOST_ROUNDS {
                 break needed;
+            }
+            if absent.is_empty() {
+                self.options.watch.at(format!("round {round}: holding {} effects against their rivals", needed.len()))?;
+                let ground = Ground { quick: &quick, judging: &road.engine, candidates };
+                let Some(Exchange { model: exchanged, out, by }) = rivals.exchange(&ground, &model, &needed)? else { break needed };
+                model = exchanged;
+                let went = needed.into_iter().find(|judged| judged.effect == out);
+                gone.extend(went.map(|judged| Judged { gave_way_to: Some(by), ..judged }));
             }
             round += 1;
         };
+        for judged in &mut needed {
+            judged.ties = rivals.ties.remove(&judged.effect).unwrap_or_default();
+        }
+        gone.retain(|judged| needed.iter().all(|needed| needed.effect != judged.effect));
         self.options.watch.at("numbers and intervals on all that is searched")?;
         Ok(Backward { fitted: self.refitted(&model, &[])?, needed, needless: gone })
     }
@@ -259,7 +273,18 @@ impl Road<'_> {
         let falls = Channel::ALL.into_iter().filter(|&channel| channels[channel]).map(fall).collect();
         let rests_on = decisive_flight(&self.engine, &gains);
         let name = effect.name.clone();
-        Some(Judged { effect: name, falls, p_value, gains, looseness: f64::INFINITY, rests_on, by_flight, mends: None })
+        Some(Judged {
+            effect: name,
+            falls,
+            p_value,
+            gains,
+            looseness: f64::INFINITY,
+            rests_on,
+            by_flight,
+            mends: None,
+            gave_way_to: None,
+            ties: Vec::new(),
+        })
     }
 }
 

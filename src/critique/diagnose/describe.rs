@@ -41,6 +41,7 @@ impl Search<'_> {
             selection_frequency,
             stability: stability(selection_frequency).into(),
             rests_on_flight: judged.rests_on.clone(),
+            indistinguishable: judged.ties.clone(),
             ..told_of(effect, definition, model.is_usual(), &judged.falls)
         };
         note_influences(&mut step, index, influences);
@@ -87,7 +88,7 @@ impl Search<'_> {
     /// What is said of an effect that the backward road leaves out.
     pub(super) fn needless(&self, judged: &Judged) -> CandidateReport {
         let status = match () {
-            () if judged.mends.is_some() => Status::SamePhysics,
+            () if judged.mends.is_some() || judged.gave_way_to.is_some() => Status::SamePhysics,
             () if !judged.is_excited() => Status::NotExcited,
             () if judged.largest_fall() < SMALLEST_FALL => Status::Negligible,
             () => Status::NotSignificant,
@@ -102,7 +103,10 @@ impl Search<'_> {
             p_value: Some(judged.p_value),
             detection_limit_mse_fall: None,
             reason: match status {
-                Status::SamePhysics => sentences::mends(judged.mends.as_deref().unwrap_or("?")),
+                Status::SamePhysics => match &judged.gave_way_to {
+                    Some(other) => sentences::gave_way(other),
+                    None => sentences::mends(judged.mends.as_deref().unwrap_or("?")),
+                },
                 Status::NotExcited => sentences::loose(judged.looseness),
                 Status::Negligible => too_little(),
                 _ => sentences::could_be_chance(judged.p_value, self.largest_p),

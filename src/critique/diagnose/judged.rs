@@ -22,6 +22,10 @@ pub(super) struct Judged {
     pub by_flight: bool,
     /// An effect whose form it may only mend.
     pub mends: Option<String>,
+    /// An effect that took its place.
+    pub gave_way_to: Option<String>,
+    /// Effects that would fit as well in its place.
+    pub ties: Vec<String>,
 }
 
 impl Judged {
@@ -41,12 +45,9 @@ impl Judged {
     /// The effect whose form this one may only mend: in every channel in which it is worth while, some other removes so much more that
     /// its form need be wrong by little. The form of a property of each flight is not in doubt.
     pub fn flaw_of<'j>(&self, others: impl Iterator<Item = &'j Judged> + Clone) -> Option<&'j str> {
-        let notes = |kind: &str| catalogue::definition(kind).and_then(|definition| definition.notes);
-        let listed = |one: &str, other: &str| notes(one).is_some_and(|notes| notes.confusable_with.contains(&other));
         let stronger = |channel: Channel| {
             others.clone().filter(|other| other.effect != self.effect && !other.by_flight).find(|other| {
-                let related = listed(&self.effect, &other.effect) || listed(&other.effect, &self.effect);
-                let amplitude = if related { SMALLEST_AMPLITUDE_OF_RIVAL } else { SMALLEST_AMPLITUDE };
+                let amplitude = if related(&self.effect, &other.effect) { SMALLEST_AMPLITUDE_OF_RIVAL } else { SMALLEST_AMPLITUDE };
                 self.removed(channel) < amplitude * amplitude * other.removed(channel)
             })
         };
@@ -59,6 +60,13 @@ impl Judged {
     pub fn is_excited(&self) -> bool {
         self.looseness <= LOOSE
     }
+}
+
+/// Whether two effects are known to be mistaken for each other.
+pub(super) fn related(one: &str, other: &str) -> bool {
+    let notes = |kind: &str| catalogue::definition(kind).and_then(|definition| definition.notes);
+    let listed = |one: &str, other: &str| notes(one).is_some_and(|notes| notes.confusable_with.contains(&other));
+    listed(one, other) || listed(other, one)
 }
 
 /// A model whose numbers and intervals are from all that was searched, and those of them that hang on one flight.

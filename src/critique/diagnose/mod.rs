@@ -16,6 +16,7 @@ mod confirm;
 mod describe;
 mod design;
 mod engine;
+mod exchange;
 mod failure;
 mod fit;
 mod forward;

@@ -324,6 +324,11 @@ pub fn mends(rival: &str) -> String {
     format!("little beside what `{rival}` removed: it may only mend its form")
 }
 
+/// Another does its work as well with fewer numbers, or better.
+pub fn gave_way(other: &str) -> String {
+    format!("`{other}` does in its place what it did, as well with fewer numbers or better")
+}
+
 /// It removes enough by share, but not from enough blocks.
 pub fn few_blocks_gain() -> String {
     "removes error from a few blocks and adds it in the others".into()
