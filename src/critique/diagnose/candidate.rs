@@ -2,7 +2,7 @@
 //! values of its open parameters.
 
 use crate::flight::Flight;
-use crate::physics::{Columns, Definition, Effect, Model, SPREAD, Wanted, catalogue};
+use crate::physics::{Columns, Definition, Effect, Model, Parameter, SPREAD, Wanted, catalogue};
 
 /// What effects that a search puts into a model are marked with.
 pub(super) const FOUND: &str = "diagnose";
@@ -25,8 +25,7 @@ pub(super) struct Candidate {
 impl Candidate {
     /// Coefficients and open parameters: what a fit can turn. A spread holds numbers back and turns nothing.
     pub fn freedom(&self) -> usize {
-        let open = self.effect.parameters.iter().filter(|parameter| !parameter.fixed && parameter.name != SPREAD);
-        self.effect.coefficients.len() + open.count()
+        freedom(&self.effect)
     }
 
     /// Whether its coefficients are properties of each flight.
@@ -107,6 +106,16 @@ pub(super) fn with(model: &Model, effect: &Effect) -> Model {
     enlarged.effects.retain(|other| other.name != effect.name);
     enlarged.effects.push(effect.clone());
     enlarged
+}
+
+/// Times and shapes of an effect that are found, a spread aside.
+pub(super) fn open(effect: &Effect) -> impl Iterator<Item = &Parameter> {
+    effect.parameters.iter().filter(|parameter| !parameter.fixed && parameter.name != SPREAD)
+}
+
+/// Numbers of an effect that a fit can turn.
+pub(super) fn freedom(effect: &Effect) -> usize {
+    effect.coefficients.len() + open(effect).count()
 }
 
 /// Whether a search put an effect into the model.

@@ -2,14 +2,15 @@
 //! backward road leaves out first is chance. So what is kept is held against its rivals, each fitted in its place. Which effects are needed at all
 //! is judged in `backward`.
 
-use super::candidate::{Candidate, with};
+use super::candidate::{Candidate, freedom, open, with};
 use super::engine::{Engine, Errors};
 use super::gains::{gains_of, paired};
+use super::gates::CLEARLY;
 use super::joint::Point;
 use super::judged::{Judged, related};
 use crate::error::{Error, Result};
 use crate::flight::PerChannel;
-use crate::physics::{Effect, Model, Parameter, SPREAD, off_zero};
+use crate::physics::{Effect, Model, off_zero};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Steps of a rival on the flights that are cheap to fit on, at most, one after the other; it is not looked at further where its cost is then above that
@@ -18,9 +19,6 @@ const TRIED: [(usize, f64); 2] = [(2, 100.0), (6, 30.0)];
 
 /// Steps on the flights that judge, at most, and of what is there on the cheap ones.
 const STEPS: [usize; 2] = [3, 1];
-
-/// Standard errors of a difference that decide.
-const CLEARLY: f64 = 2.0;
 
 /// What was held against each other, by what was to go and what was to come: nothing is asked twice.
 #[derive(Default)]
@@ -63,7 +61,7 @@ impl Rivals {
                     base = ground.judged(model)?;
                 }
                 let Some((cost, errors)) = &base else { return Ok(None) };
-                let simpler = freedom(&rival) < freedom(model);
+                let simpler = numbers(&rival) < numbers(model);
                 let Some((fitted, found)) = ground.fitted(rival, *cost)? else { continue };
                 let gains = gains_of(errors, &found, &PerChannel::splat(true));
                 let (better, deviation) = paired(&gains, &vec![0.0; gains.len()]);
@@ -142,18 +140,12 @@ fn determined(fitted: Result<Model>) -> Result<Option<Model>> {
     }
 }
 
-/// Times and shapes of an effect that are found, a spread aside.
-fn open(effect: &Effect) -> impl Iterator<Item = &Parameter> {
-    effect.parameters.iter().filter(|parameter| !parameter.fixed && parameter.name != SPREAD)
-}
-
 fn is_open(effect: &Effect) -> bool {
     open(effect).next().is_some()
 }
 
-/// Numbers that a fit can turn.
-fn freedom(model: &Model) -> usize {
-    model.effects.iter().map(|effect| effect.coefficients.len() + open(effect).count()).sum()
+fn numbers(model: &Model) -> usize {
+    model.effects.iter().map(freedom).sum()
 }
 
 #[cfg(test)]

@@ -48,3 +48,5 @@ pub(super) const MANY: usize = 3;
 pub(super) const SMALLEST_AMPLITUDE: f64 = 0.05;
 /// … and more than this where the two are known to be mistaken for each other.
 pub(super) const SMALLEST_AMPLITUDE_OF_RIVAL: f64 = 0.15;
+/// Standard errors by which one of two that are mistaken for each other has to be better to take the other's place; within them they are told as a tie.
+pub(super) const CLEARLY: f64 = 2.0;
