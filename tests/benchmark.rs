@@ -49,6 +49,7 @@ fn killed_ten_times_cut_into_shards_or_left_alone_the_tables_are_the_same_bytes(
     let at = place.path();
     succeed(at, &planned("whole", &["--seeds", "2"]))?;
     let said = succeed(at, &["benchmark", "collect", "whole"])?;
+    assert!(said.contains("95 % interval over segments") && said.contains("± 0.02"), "{said}");
     assert!(said.contains("SCALED DOWN") && said.contains("Conv–Informer") && said.contains("As the paper prints it"), "{said}");
 
     // Moments spread over the length of the work by a fixed rule, from the first file on.
@@ -84,6 +85,38 @@ fn killed_ten_times_cut_into_shards_or_left_alone_the_tables_are_the_same_bytes(
         assert!(differing.is_empty(), "{differing:?} differ");
     }
     assert_eq!(files(&at.join("whole/runs"))?, files(&at.join("killed/runs"))?);
+    Ok(())
+}
+
+#[test]
+fn an_estimate_is_printed_and_nothing_is_done() -> Result<()> {
+    let place = place()?;
+    let said = succeed(place.path(), &planned("none", &["--estimate", "--seeds", "3"]))?;
+    assert!(said.contains("runs to do, about") && said.contains("3 x TCN") && said.contains("1 x Ridge regression"), "{said}");
+    assert!(!place.path().join("none").exists());
+    Ok(())
+}
+
+#[test]
+fn with_the_explainable_part_there_is_a_floor_below_every_predictor() -> Result<()> {
+    let place = folder()?;
+    let at = place.path();
+    succeed(at, &["simulate", "flights", "--minutes", "3", "--seed", "51", "--explainable", "calm"])?;
+    std::fs::write(at.join("train.toml"), CONFIG).map_err(Error::io("train.toml"))?;
+    let rows =
+        ["--table", "noise", "--method", "floor", "--method", "ridge", "--method", "physical_baseline", "--explainable", "calm"];
+    succeed(at, &planned("bench", &rows))?;
+    succeed(at, &["benchmark", "collect", "bench"])?;
+    let tables = files(&at.join("bench/tables"))?;
+    for name in ["table1.csv", "noise.csv"] {
+        let text = String::from_utf8_lossy(&tables[name]);
+        let mean = |method: &str| {
+            let row =
+                text.lines().find(|line| line.starts_with(&format!("{method},"))).unwrap_or_else(|| panic!("no {method}: {text}"));
+            row.rsplit(',').nth(2).and_then(|value| value.parse::<f64>().ok()).unwrap_or_else(|| panic!("{row}"))
+        };
+        assert!(mean("floor") < mean("physical_baseline") && mean("floor") > 0.0, "{text}");
+    }
     Ok(())
 }
 

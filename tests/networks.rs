@@ -59,9 +59,13 @@ fn training_ends_with_one_line_that_says_where_and_how_good() -> Result<()> {
     let place = place()?;
     let at = place.path();
     let train = ["train", "data", "-m", "model.toml", "-o", "run", "--config", "train.toml", "--epochs", "2"];
-    let said = succeed(at, &train)?;
-    let last = said.lines().last().unwrap_or_default();
-    for part in ["run/network.safetensors", "training loss ", "validation loss "] {
+    let said = succeed(at, &[&train[..], &["--report", "page"]].concat())?;
+    let page = std::fs::read_to_string(at.join("page/training.html")).map_err(Error::io("training.html"))?;
+    for part in ["epoch 2 of 2", "Losses by epoch", "validation loss ", "SHA-256 of the data"] {
+        assert!(page.contains(part), "{part} is not in the page");
+    }
+    let last = said.lines().find(|line| line.starts_with("trained in")).unwrap_or_default();
+    for part in ["run/network.safetensors", "weights of epoch 2 of 2", "training loss ", "validation loss "] {
         assert!(last.contains(part), "{part} in {last}");
     }
     // A finished run that is gone on with says the same: nothing of it depends on when it was interrupted.
@@ -81,6 +85,11 @@ fn training_ends_with_one_line_that_says_where_and_how_good() -> Result<()> {
     let locked = [&train[..6], &["--config", "train.toml", "--epochs", "1", "--lock", "chaos"]].concat();
     let locked: Vec<&str> = locked.into_iter().map(|word| if word == "run" { "locked" } else { word }).collect();
     assert!(succeed(at, &locked)?.lines().last().is_some_and(|last| last.contains("no validation part")));
+    // Where nothing validates no epoch is the best.
+    let text = std::fs::read_to_string(at.join("train.toml")).map_err(Error::io("train.toml"))?;
+    std::fs::write(at.join("best.toml"), format!("keep_best = true\n{text}")).map_err(Error::io("best.toml"))?;
+    let best: Vec<&str> = locked.into_iter().map(|word| if word == "train.toml" { "best.toml" } else { word }).collect();
+    assert!(refused(at, &[&best[..], &["--force"]].concat())?.contains("`keep_best` is true, expected false"));
     Ok(())
 }
 

@@ -128,6 +128,33 @@ fn a_resumed_run_is_the_uninterrupted_one_bit_for_bit_on_any_number_of_threads()
     Ok(())
 }
 
+#[test]
+fn the_best_epoch_is_kept_whatever_comes_after_it_and_wherever_the_run_was_stopped() -> Result<()> {
+    let mut job = job()?;
+    job.config.keep_best = true;
+    // So fast that a later epoch undoes what an earlier one learned.
+    (job.config.peak_rate, job.config.epochs) = (0.3, 6);
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let (_, whole) = train(&job, &RunFolder::create(place.path().join("whole"))?, None, 1, None)?;
+    let parts = RunFolder::create(place.path().join("parts"))?;
+    train(&job, &parts, None, 2, Some(whole.step / 2 + 1))?;
+    let (_, resumed) = train(&job, &parts, Some(parts.resume(&job.config, DATA)?), 2, None)?;
+    assert_eq!(whole, resumed, "losses and best weights, too");
+    let losses: Vec<f64> = whole.curve.iter().filter_map(|epoch| epoch.validation).collect();
+    let best = whole.best.clone().ok_or(Error::Undetermined("no best epoch".into()))?;
+    let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
+    assert_eq!((losses.len(), losses[best.epoch], best.loss), (6, least, least), "{losses:?}");
+    assert_ne!(best.epoch, 5, "this training was to end badly: {losses:?}");
+    let network = job.description.network(false)?;
+    let sequences = sequence::sequences(&job.set.flights, &job.description)?;
+    let trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, Some(whole), Threads(2))?;
+    let mut trainer = trainer.with_validation(&job.validation);
+    trainer.take_best();
+    assert_eq!(bits(&trainer.state().parameters), bits(&best.parameters));
+    assert_eq!(trainer.validation_loss()?, Some(best.loss));
+    Ok(())
+}
+
 /// The lines of a run's metrics, without the time that each took.
 fn metrics(folder: &std::path::Path) -> Result<Vec<serde_json::Value>> {
     let path = folder.join("metrics.jsonl");

@@ -14,7 +14,7 @@ use std::io::Write;
 use std::path::Path;
 
 /// First seed of the runs that are reported.
-pub const REPORTED: u64 = 90_000;
+pub const REPORTED: u64 = 100_000;
 /// First seed of development.
 pub const DEVELOPMENT: u64 = 40;
 /// Data sets without a hidden effect.

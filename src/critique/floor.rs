@@ -1,5 +1,6 @@
 //! The floor: what no model can remove of the error, where the explainable part of the flights is known, as it is of simulated ones.
 
+use super::Row;
 use super::channels::ChannelValues;
 use crate::error::{Error, Result};
 use crate::flight::{Column, Flight, PerChannel, Span, Window};
@@ -22,6 +23,19 @@ pub fn floor(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> 
         }
     }
     Ok(ChannelValues::new(squares.map(|sum| (!windows.is_empty()).then(|| (sum / windows.len() as f64).sqrt()))))
+}
+
+/// The explainable accelerations at the last row of each window, as a row to hold beside others.
+///
+/// # Errors
+/// As [`floor()`].
+pub fn explainable_at(flights: &[Flight], windows: &[Window], explainable: &[Flight]) -> Result<Row> {
+    let partners = partners(flights, windows, explainable)?;
+    let at = |window: &Window| {
+        let calm = partners[window.flight].expect("a flight with a window has a partner");
+        PerChannel::from_fn(|channel| calm.column(channel.column())[window.last])
+    };
+    Ok(Row { name: "floor".into(), predicted: windows.iter().map(at).collect() })
 }
 
 /// The same over every sample of the spans.

@@ -26,7 +26,7 @@ pub use channels::{ChannelValues, Intervals};
 pub use compare::{Comparison, ModelError, PartError, compare, paired};
 pub use contest::{Best, Difference};
 pub use coverage::{Coverage, coverage};
-pub use floor::{floor, floor_of_spans};
+pub use floor::{explainable_at, floor, floor_of_spans};
 pub use predictions::Row;
 pub use regime::Regime;
 pub use rollout::Rollouts;

@@ -1,4 +1,5 @@
-//! Which samples may be learned from and which only judge: the paper's two protocols, and a chronological one for a single log.
+//! Which samples may be learned from and which only judge: the paper's two protocols, one for histories that are to be compared, and a
+//! chronological one for a single log.
 //!
 //! A split is made before anything else (calibration, scaling, windows), and what follows sees only [`Span`]s. No window
 //! crosses a span, so no window crosses a partition and no time stamp is in two of them (paper section 4.1).
@@ -13,12 +14,18 @@ use std::str::FromStr;
 /// Length of a segment of the benchmark split, s (paper section 4.1).
 pub const SEGMENT_S: f64 = 10.0;
 
+/// Length of a stretch of the split `stretches`, s: its first ten seconds are history, and twenty are left to judge.
+pub const STRETCH_S: f64 = 30.0;
+
 /// Seed of the benchmark split (paper section 4.1).
 pub const BENCHMARK_SEED: u64 = 2030;
 
 /// Shares of the segments that train and validate; the rest tests (paper section 4.1: 70/20/10).
 const TRAINING_SHARE: f64 = 0.7;
 const VALIDATION_SHARE: f64 = 0.2;
+
+/// Of so many segments one validates where the division keeps none for that.
+const VALIDATING: usize = 5;
 
 /// How samples are divided.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -28,6 +35,9 @@ pub enum Protocol {
     /// end of a flight belong to no partition. Written `segments`.
     #[default]
     Segments,
+    /// Random stretches of 30 s in the same shares; what is left over at the end of a flight trains. A history of 10 s fits into one, so that every
+    /// history up to that is judged on the same samples. Written `stretches`.
+    Stretches,
     /// The first share of every flight trains, the rest tests; no validation. Written `first 0.75`.
     First(f64),
 }
@@ -36,6 +46,7 @@ impl fmt::Display for Protocol {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Segments => f.write_str("segments"),
+            Self::Stretches => f.write_str("stretches"),
             Self::First(share) => write!(f, "first {share}"),
         }
     }
@@ -62,14 +73,26 @@ impl FromStr for Protocol {
         let first = || text.strip_prefix("first")?.trim().parse().ok().filter(|share: &f64| *share > 0.0 && *share < 1.0);
         match text.trim() {
             "segments" => Ok(Self::Segments),
+            "stretches" => Ok(Self::Stretches),
             _ => first().map(Self::First).ok_or_else(|| Error::Config {
                 place: "split".into(),
                 field: "split".into(),
                 found: format!("`{text}`"),
                 expected:
-                    "`segments` (random 10-s segments, 70/20/10) or `first SHARE` with a share between 0 and 1, as in `first 0.75`"
+                    "`segments` (random 10-s segments, 70/20/10), `stretches` (of 30 s) or `first SHARE` with a share between 0 and 1, as in `first 0.75`"
                         .into(),
             }),
+        }
+    }
+}
+
+impl Protocol {
+    /// Time at the beginning of a stretch of test samples that is history and not judged, s: the longest history that is judged on the same
+    /// samples as all shorter ones. 0 where each history is judged wherever it fits.
+    pub const fn lead_s(&self) -> f64 {
+        match self {
+            Self::Stretches => SEGMENT_S,
+            Self::Segments | Self::First(_) => 0.0,
         }
     }
 }
@@ -182,11 +205,34 @@ impl Split {
     /// goes with the rest.
     #[must_use]
     pub fn with_less_training(&self, flights: &[Flight], share: f64, seed: u64) -> Self {
-        let of_span = |span: &Span| segments(*span, flights[span.flight].step_s).collect::<Vec<_>>();
+        let of_span = |span: &Span| segments(*span, flights[span.flight].step_s, SEGMENT_S).collect::<Vec<_>>();
         let sorted: Vec<Span> = self.training.iter().flat_map(of_span).collect();
         let kept = (sorted.len() as f64 * share).round() as usize;
         let chosen = permutation(sorted.len(), seed, 0).into_iter().take(kept).map(|index| sorted[index as usize]);
         Self { training: joined(chosen.collect()), ..self.clone() }
+    }
+}
+
+impl Split {
+    /// The same division where nothing validates, with a fifth of the training part's segments of a length taken for that.
+    #[must_use]
+    pub fn with_validation(&self, flights: &[Flight], length_s: f64, seed: u64) -> Self {
+        let of_span = |span: &Span| segments(*span, flights[span.flight].step_s, length_s).collect::<Vec<_>>();
+        let sorted: Vec<Span> = self.training.iter().flat_map(of_span).collect();
+        let count = sorted.len() / VALIDATING;
+        let mut validation: Vec<Span> =
+            permutation(sorted.len(), seed, 0).into_iter().take(count).map(|index| sorted[index as usize]).collect();
+        validation.sort_unstable();
+        let mut training = self.training.clone();
+        for taken in &validation {
+            let holds = |span: &Span| span.flight == taken.flight && span.start <= taken.start && taken.end <= span.end;
+            let at = training.iter().position(holds).expect("it was cut from one of them");
+            let span = training.remove(at);
+            let parts = [Span { end: taken.start, ..span }, Span { start: taken.end, ..span }];
+            training.extend(parts.into_iter().filter(|part| part.start < part.end));
+        }
+        training.sort_unstable();
+        Self { training, validation: joined(validation), ..self.clone() }
     }
 }
 
@@ -242,8 +288,9 @@ fn by_protocol(flights: &[Flight], protocol: &Protocol, seed: u64) -> Split {
                 split.test.extend((cut < span.end).then_some(Span { start: cut, ..span }));
             }
         }
-        Protocol::Segments => {
-            let sorted: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s)).collect();
+        Protocol::Segments | Protocol::Stretches => {
+            let (length_s, rest_trains) = if *protocol == Protocol::Segments { (SEGMENT_S, false) } else { (STRETCH_S, true) };
+            let sorted: Vec<Span> = whole(flights).flat_map(|span| segments(span, flights[span.flight].step_s, length_s)).collect();
             let mut segments: Vec<Span> =
                 permutation(sorted.len(), seed, 0).into_iter().map(|index| sorted[index as usize]).collect();
             let training = (segments.len() as f64 * TRAINING_SHARE).round() as usize;
@@ -252,15 +299,20 @@ fn by_protocol(flights: &[Flight], protocol: &Protocol, seed: u64) -> Split {
             let validation = validation.min(segments.len().saturating_sub(training + 1));
             split.test = joined(segments.split_off(training + validation));
             split.validation = joined(segments.split_off(training));
+            let rest = whole(flights).map(|span| {
+                let ends = sorted.iter().rev().find(|last| last.flight == span.flight).map_or(0, |last| last.end);
+                Span { start: ends, ..span }
+            });
+            segments.extend(rest.filter(|rest| rest_trains && rest.start < rest.end));
             split.training = joined(segments);
         }
     }
     split
 }
 
-/// The whole 10-s segments of a span.
-fn segments(span: Span, step_s: f64) -> impl Iterator<Item = Span> {
-    let samples = (SEGMENT_S / step_s).round().max(1.0) as usize;
+/// The whole segments of a span.
+fn segments(span: Span, step_s: f64, length_s: f64) -> impl Iterator<Item = Span> {
+    let samples = (length_s / step_s).round().max(1.0) as usize;
     (0..(span.end - span.start) / samples).map(move |index| {
         let start = span.start + index * samples;
         Span { flight: span.flight, start, end: start + samples }
@@ -322,6 +374,24 @@ mod tests {
             prop_assert_eq!(samples(&split.training), (whole_segments as f64 * 0.7).round() as usize * 1000);
             let all = samples(&split.training) + samples(&split.validation) + samples(&split.test);
             prop_assert_eq!(all, whole_segments * 1000);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn stretches_take_in_a_history_of_ten_seconds_and_leave_nothing_out(lengths in prop::collection::vec(1usize..20000, 8..16), seed: u64) {
+            let logs = flights(&lengths);
+            let whole_stretches: usize = lengths.iter().map(|length| length / 3000).sum();
+            prop_assume!(whole_stretches >= 10);
+            let split = Split::new(&logs, &[], &Protocol::Stretches, seed).map_err(|error| TestCaseError::fail(error.to_string()))?;
+            let all = samples(&split.training) + samples(&split.validation) + samples(&split.test);
+            prop_assert_eq!(all, lengths.iter().sum::<usize>());
+            prop_assert!(split.test.iter().chain(&split.validation).all(|span| (span.end - span.start).is_multiple_of(3000)));
+            let lead = (Protocol::Stretches.lead_s() / 0.01).round() as usize;
+            for history in [1, 128, 1000] {
+                let judged = crate::flight::windows::windows(&split.test, history.max(lead), 10);
+                prop_assert_eq!(judged, crate::flight::windows::windows(&split.test, 1000, 10));
+            }
         }
     }
 

@@ -1,6 +1,7 @@
 //! How long a run will take: two steps of its network on made-up numbers are timed before the work begins. For the display of time
 //! left; nothing that is written down depends on it.
 
+use super::experiment::Extent;
 use super::plan::{Plan, Run};
 use crate::error::Result;
 use crate::nn::{Network, OutputScale};
@@ -40,14 +41,46 @@ pub fn window_s(config: &TrainConfig, threads: Threads) -> Result<f64> {
     Ok(begun.elapsed().as_secs_f64() / samples as f64)
 }
 
-/// Seconds of a run with so many training and test windows, `window_s` being a training window's and `flight_s` the length of the
-/// training part.
+/// Seconds of a run, `window_s` being a training window's: its trainings, what validates after each epoch, and what is judged.
 ///
 /// # Errors
 /// As [`Plan::training`].
-pub fn run_s(plan: &Plan, run: &Run, window_s: f64, flight_s: f64, training: usize, test: usize) -> Result<f64> {
-    let amended = if run.method()?.predictor.amended() { LOOP_SHARE * flight_s } else { 0.0 };
+pub fn run_s(plan: &Plan, run: &Run, window_s: f64, extent: Extent) -> Result<f64> {
+    let Extent { training, validation, test, training_s } = extent;
+    let amended = if run.method()?.predictor.amended() { LOOP_SHARE * training_s } else { 0.0 };
     let Some(config) = plan.training(run)? else { return Ok(UNTRAINED_S + amended) };
-    let steps = (training * config.epochs) as f64 + FORWARD_SHARE * test as f64;
-    Ok(UNTRAINED_S + amended + window_s * steps)
+    let (rates, tried) = plan.settings.rate_budget();
+    let chosen = !rates.is_empty();
+    let judged = |keeps: bool| if keeps { FORWARD_SHARE * validation as f64 } else { 0.0 };
+    let trials = (rates.len() * tried) as f64 * (training as f64 + judged(chosen));
+    let whole = config.epochs as f64 * (training as f64 + judged(config.keep_best));
+    Ok(UNTRAINED_S + amended + window_s * (trials + whole + FORWARD_SHARE * test as f64))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::tests::plan;
+    use super::super::plan::{Division, TableId, Treatment};
+    use super::super::settings::Settings;
+    use super::*;
+
+    #[test]
+    fn an_estimate_counts_every_window_of_every_training() -> Result<()> {
+        let base = plan(&TableId::ALL);
+        let training = TrainConfig { epochs: 10, keep_best: false, ..base.settings.training.clone() };
+        let plain = Plan { settings: Settings { training, rates: Vec::new(), ..base.settings.clone() }, ..base };
+        let run = Run { method: "tcn".into(), division: Division::Benchmark, treatment: Treatment::Plain, seed: 1 };
+        let extent = Extent { training: 100, validation: 30, test: 60, training_s: 1000.0 };
+        let seconds = |plan: &Plan| run_s(plan, &run, 2.0, extent);
+        let near = |found: f64, expected: f64| (found - expected).abs() < 1e-9;
+        assert!(near(seconds(&plain)?, 2.0 + 2.0 * (10.0 * 100.0 + 20.0)));
+        let mut best = plain.clone();
+        best.settings.training.keep_best = true;
+        assert!(near(seconds(&best)?, 2.0 + 2.0 * (10.0 * 110.0 + 20.0)));
+        (best.settings.rates, best.settings.rate_epochs) = (vec![1e-3, 3e-3], 2);
+        assert!(near(seconds(&best)?, 2.0 + 2.0 * (14.0 * 110.0 + 20.0)));
+        let ridge = Run { method: "amended_physics".into(), ..run.clone() };
+        assert!(near(run_s(&plain, &ridge, 2.0, extent)?, 2.0 + 40.0));
+        Ok(())
+    }
 }

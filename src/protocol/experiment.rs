@@ -1,30 +1,40 @@
 //! One run: divide, make worse where asked, calibrate, train, judge. No tables, and no order of runs.
 //!
 //! Nothing of the test part is seen before the judging: calibration, the search of the loop, scales and training all read the training
-//! part, and the loop confirms what it finds on the validation part (or, where there is none, on every fifth run of training samples).
+//! part, and the loop confirms what it finds on the validation part (or, where there is none, on every fifth run of training samples). The best
+//! epoch and the learning rate are chosen on the validation part.
 
 use super::method::Predictor;
-use super::outcome::{Condition, Outcome, Trace, segments};
+use super::outcome::{Outcome, Trace, segments};
 use super::plan::{Division, Plan, Run, Treatment};
-use crate::critique::diagnose::{Amended, Diagnosis, Options, amend};
-use crate::critique::{Row, centred_difference, finite_difference, ridge};
+use crate::critique::diagnose::{Amended, Options, amend};
+use crate::critique::{Row, centred_difference, explainable_at, finite_difference, ridge};
+use crate::disk::write_atomically;
 use crate::error::{Error, Result};
-use crate::flight::split::{Part, Split};
+use crate::flight::split::{Part, SEGMENT_S, STRETCH_S, Split};
 use crate::flight::windows::windows;
 use crate::flight::{Column, Flight, PerChannel, Span, Window};
+use crate::hybrid::Hybrid;
 use crate::hybrid::linear::LinearConfig;
-use crate::hybrid::{Hybrid, Scale};
 use crate::nn::Init;
 use crate::physics::{Model, calibrate};
 use crate::tape::Threads;
-use crate::train::{Begun, Ended, Event, RunFolder, State, TrainConfig, Training};
+use crate::train::{Begun, Ended, Event, RunFolder, State, TrainConfig, Trained, Training};
 use phyture_kernels::random::Stream;
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Noise of the robustness rows, as a share of each column's standard deviation on the training part.
-pub const NOISE_SHARE: f64 = 0.01;
+/// White noise on a column of the flights: that of a good attitude filter with satellite navigation, one standard deviation. Of a control: a
+/// hundredth of its full deflection.
+const fn noise(column: Column) -> f64 {
+    match column {
+        Column::X | Column::Y | Column::Z | Column::Vx | Column::Vy | Column::Vz => 0.02,
+        Column::Roll | Column::Pitch | Column::Yaw => 0.003,
+        Column::U1 | Column::U2 | Column::U3 | Column::U4 | Column::Wx | Column::Wy | Column::Wz => 0.01,
+        _ => 0.0,
+    }
+}
 
 /// Samples between the points of a trace.
 const TRACE_STRIDE: usize = 4;
@@ -51,27 +61,43 @@ pub struct Experiment<'a> {
     pub model: &'a Model,
     /// Threads of a run.
     pub threads: Threads,
-    /// What the loop made of the model in each division: the same for every seed.
-    amended: Mutex<BTreeMap<Division, (Model, Vec<String>)>>,
+    /// The explainable part of the flights, where it is known: for the floor alone.
+    pub explainable: Option<&'a [Flight]>,
+    /// Where models that the loop has amended are kept: searched once for all seeds.
+    amended: PathBuf,
     /// What a person has to be told, in the order in which it came up.
     notes: Mutex<Vec<String>>,
 }
 
-/// A trained network, and what it took.
-struct Trained {
-    hybrid: Hybrid,
-    parameters: usize,
-    windows: usize,
-    steps: u64,
+/// Numbers of windows of a run, and the time that its training part takes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Windows that train.
+    pub training: usize,
+    /// Windows that validate.
+    pub validation: usize,
+    /// Windows that are judged.
+    pub test: usize,
+    /// Length of the training part, s.
+    pub training_s: f64,
+}
+
+/// What a training of a run works in.
+struct Ground<'g> {
+    run: &'g Run,
+    flights: &'g [Flight],
+    model: &'g Model,
+    split: &'g Split,
+    working: &'g Path,
 }
 
 /// What the training of a run is told and answers: share of its steps done; `false` stops it.
 pub type GoOn<'a> = &'a mut dyn FnMut(f64) -> bool;
 
 impl<'a> Experiment<'a> {
-    /// The runs of `plan` on these flights.
-    pub const fn new(plan: &'a Plan, flights: &'a [Flight], model: &'a Model, threads: Threads) -> Self {
-        Self { plan, flights, model, threads, amended: Mutex::new(BTreeMap::new()), notes: Mutex::new(Vec::new()) }
+    /// The runs of `plan` on these flights; models that the loop amends are kept in the folder `amended`, which exists.
+    pub fn new(plan: &'a Plan, flights: &'a [Flight], model: &'a Model, threads: Threads, amended: impl Into<PathBuf>) -> Self {
+        Self { plan, flights, model, threads, explainable: None, amended: amended.into(), notes: Mutex::new(Vec::new()) }
     }
 
     /// What has come up in the runs since this was asked for last, for a person: each once.
@@ -87,59 +113,75 @@ impl<'a> Experiment<'a> {
     pub fn run(&self, run: &Run, working: &Path, go_on: GoOn<'_>) -> Result<Outcome> {
         let split = self.split(run)?;
         let history = self.plan.settings.phyture()?.history;
-        let judged = windows(&split.test, history, self.plan.settings.test_stride);
+        let judged = self.judged(&split)?;
         if judged.is_empty() {
             return Err(Error::Undetermined(format!(
                 "{run}: no stretch of test samples is as long as the history of {history} samples; shorten `network.history`"
             )));
         }
-        let shown = if run.division == Division::Benchmark { self.trace_windows(&split, history) } else { Vec::new() };
+        let is_shown = run.division == Division::Benchmark && run.treatment == Treatment::Plain;
+        let shown = if is_shown { self.trace_windows(&split, history) } else { Vec::new() };
         let predictor = run.method()?.predictor;
-        let (model, effects) = self.physics(run, predictor, &split, go_on)?;
+        let flights = self.treated(run.treatment)?;
+        let (model, effects) = self.physics(run, predictor, &flights, &split, go_on)?;
         let mut outcome = Outcome {
             run: run.clone(),
             parameters: 0,
             training_windows: 0,
             steps: 0,
             effects,
-            conditions: BTreeMap::new(),
+            peak_rate: None,
+            curve: Vec::new(),
+            epoch: 0,
+            segments: Vec::new(),
             trace: None,
         };
+        let ground = Ground { run, flights: &flights, model: &model, split: &split, working };
         let hybrid = match self.plan.training(run)? {
-            Some(config) => {
-                let trained = self.train(run, &config, &model, &split, working, go_on)?;
-                (outcome.parameters, outcome.training_windows, outcome.steps) =
-                    (trained.parameters, trained.windows, trained.steps);
-                Some(trained.hybrid)
-            }
+            Some(config) => Some(self.train(&ground, config, &mut outcome, go_on)?),
             None => None,
         };
-        let predict = |flights: &[Flight], windows: &[Window]| -> Result<Vec<PerChannel<f64>>> {
+        let predict = |windows: &[Window]| -> Result<Vec<PerChannel<f64>>> {
             let predicted = match (&hybrid, predictor) {
-                (Some(hybrid), _) => hybrid.predict(flights, windows, self.threads)?,
-                (None, Predictor::BackwardDifference) => finite_difference(flights, windows)?.predicted,
-                (None, Predictor::CentredDifference) => centred_difference(flights, windows)?.predicted,
-                (None, Predictor::Ridge) => self.ridge(&split, flights, windows)?.predicted,
-                (None, _) => physics_at(&model, flights, windows)?,
+                (Some(hybrid), _) => hybrid.predict(&flights, windows, self.threads)?,
+                (None, Predictor::BackwardDifference) => finite_difference(&flights, windows)?.predicted,
+                (None, Predictor::CentredDifference) => centred_difference(&flights, windows)?.predicted,
+                (None, Predictor::Ridge { windows: networks }) => self.ridge(&flights, &split, windows, networks)?.predicted,
+                (None, Predictor::Floor) => self.floor(windows)?.predicted,
+                (None, _) => physics_at(&model, &flights, windows)?,
             };
             if predicted.iter().flatten().all(|value| value.is_finite()) {
                 return Ok(predicted);
             }
             Err(Error::Undetermined(format!("{run}: a prediction is not a finite number; lower `peak_rate`")))
         };
-        let mut conditions = vec![Condition::Clean];
-        if run.division == Division::Benchmark && run.treatment == Treatment::Plain {
-            conditions.extend([Condition::StateNoise, Condition::ControlNoise]);
-        }
-        for condition in conditions {
-            let disturbed = self.disturbed(condition, &split)?;
-            let predicted = predict(disturbed.as_deref().unwrap_or(self.flights), &judged)?;
-            outcome.conditions.insert(condition, segments(self.flights, &judged, &predicted));
-        }
+        outcome.segments = segments(&flights, &judged, &predict(&judged)?);
         if let Some(first) = shown.first() {
-            outcome.trace = Some(self.trace(first.flight, &shown, &predict(self.flights, &shown)?));
+            outcome.trace = Some(self.trace(first.flight, &shown, &predict(&shown)?));
         }
         Ok(outcome)
+    }
+
+    /// How much there is for a run to do.
+    ///
+    /// # Errors
+    /// As [`Split::new`].
+    pub fn extent(&self, run: &Run) -> Result<Extent> {
+        let split = self.split(run)?;
+        let (history, stride) = (self.plan.settings.phyture()?.history, self.plan.settings.training.stride);
+        Ok(Extent {
+            training: windows(&split.training, history, stride).len(),
+            validation: windows(&split.validation, history, stride).len(),
+            test: self.judged(&split)?.len(),
+            training_s: split.training.iter().map(|span| (span.end - span.start) as f64 * self.plan.step_s).sum(),
+        })
+    }
+
+    /// Windows that are judged: where the division gives every stretch a lead, the same samples whatever the history.
+    fn judged(&self, split: &Split) -> Result<Vec<Window>> {
+        let lead = (self.model.data.split.lead_s() / self.plan.step_s).round() as usize;
+        let history = self.plan.settings.phyture()?.history;
+        Ok(windows(&split.test, history.max(lead), self.plan.settings.test_stride))
     }
 
     /// The division of a run, with less to train on where the treatment says so.
@@ -155,7 +197,11 @@ impl<'a> Experiment<'a> {
                 expected: format!("1 to {}", self.plan.folds.len()),
             })?,
         };
-        let split = Split::new(self.flights, held_out, &data.split, settings.split_seed)?;
+        let mut split = Split::new(self.flights, held_out, &data.split, settings.split_seed)?;
+        if split.validation.is_empty() && settings.validates_in_folds() {
+            let length_s = if data.split.lead_s() > 0.0 { STRETCH_S } else { SEGMENT_S };
+            split = split.with_validation(self.flights, length_s, settings.split_seed);
+        }
         Ok(match run.treatment {
             Treatment::TrainingShare(percent) => {
                 split.with_less_training(self.flights, f64::from(percent) / 100.0, settings.split_seed)
@@ -165,10 +211,18 @@ impl<'a> Experiment<'a> {
     }
 
     /// The physics of a run: calibrated on the training part, after the loop where it comes first; and what the loop added.
-    fn physics(&self, run: &Run, predictor: Predictor, split: &Split, go_on: GoOn<'_>) -> Result<(Model, Vec<String>)> {
-        let (model, effects) =
-            if predictor.amended() { self.amended(run, split, go_on)? } else { (self.model.clone(), Vec::new()) };
-        let mut model = calibrate(&model, self.flights, &split.training)?.0;
+    fn physics(
+        &self,
+        run: &Run,
+        predictor: Predictor,
+        flights: &[Flight],
+        split: &Split,
+        go_on: GoOn<'_>,
+    ) -> Result<(Model, Vec<String>)> {
+        let model = if predictor.amended() { self.amended(run, flights, split, go_on)? } else { self.model.clone() };
+        let is_new = |name: &String| self.model.effect(name).is_none();
+        let effects = model.effects.iter().map(|effect| effect.name.clone()).filter(is_new).collect();
+        let mut model = calibrate(&model, flights, &split.training)?.0;
         if let Treatment::CoefficientsOff(percent) = run.treatment {
             let factor = 1.0 + f64::from(percent) / 100.0;
             for coefficient in model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients) {
@@ -178,46 +232,61 @@ impl<'a> Experiment<'a> {
         Ok((model, effects))
     }
 
-    /// The model with what the loop finds in the training part of a division, and the names of that.
-    fn amended(&self, run: &Run, split: &Split, go_on: GoOn<'_>) -> Result<(Model, Vec<String>)> {
-        // A poisoned lock holds what was complete before.
-        let mut known = self.amended.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(amended) = known.get(&run.division) {
-            return Ok(amended.clone());
+    /// The model with what the loop finds in the training part of a division: from its file, or searched and written there.
+    fn amended(&self, run: &Run, flights: &[Flight], split: &Split, go_on: GoOn<'_>) -> Result<Model> {
+        let path = self.amended.join(format!("{}.toml", self.plan.amended_key(run)?));
+        if path.exists() {
+            return Model::read(&path);
         }
         let options = Options { seed: SEARCH_SEED, ..Options::default() };
-        let Amended { rounds, model, .. } = amend(self.flights, self.model, &confirming(split), &options, &mut |_, _| {
+        let Amended { model, .. } = amend(flights, self.model, &confirming(split), &options, &mut |_, _| {
             if go_on(0.0) { Ok(()) } else { Err(Error::Interrupted { saved: format!("the run `{run}` starts anew") }) }
         })?;
-        let confirmed = rounds.into_iter().filter(Diagnosis::is_confirmed);
-        let amended = (model, confirmed.flat_map(|round| round.accepted).collect());
-        known.insert(run.division, amended.clone());
-        Ok(amended)
+        let text = model.to_toml()?;
+        write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        // What was written is what every later run reads.
+        Model::read(&path)
     }
 
-    fn train(
-        &self,
-        run: &Run,
-        config: &TrainConfig,
-        model: &Model,
-        split: &Split,
-        working: &Path,
-        go_on: GoOn<'_>,
-    ) -> Result<Trained> {
-        let folder = RunFolder::create(working)?;
+    /// Trains the network of a run, at the learning rate of the plan or at the best of several.
+    fn train(&self, ground: &Ground<'_>, config: TrainConfig, outcome: &mut Outcome, go_on: GoOn<'_>) -> Result<Hybrid> {
+        let (rates, epochs) = self.plan.settings.rate_budget();
+        let whole = (rates.len() * epochs + config.epochs) as f64;
+        let mut best: Option<(f64, f64)> = None;
+        for (index, &peak_rate) in rates.iter().enumerate() {
+            let tried = TrainConfig { peak_rate, epochs, keep_best: true, ..config.clone() };
+            let part = |share: f64| (index as f64 + share) * epochs as f64 / whole;
+            let name = format!("rate-{index}");
+            match self.trained(ground, &tried, &name, &mut |share| go_on(part(share))) {
+                Ok(trained) => {
+                    let loss = trained.curve.iter().filter_map(|epoch| epoch.validation).fold(f64::INFINITY, f64::min);
+                    best = best.filter(|(_, least)| *least <= loss).or(Some((peak_rate, loss)));
+                }
+                // Too fast a rate may diverge: then it is not the best.
+                Err(Error::Undetermined(_)) => {}
+                Err(other) => return Err(other),
+            }
+        }
+        outcome.peak_rate = best.map(|(rate, _)| rate);
+        let config = TrainConfig { peak_rate: outcome.peak_rate.unwrap_or(config.peak_rate), ..config };
+        let before = (rates.len() * epochs) as f64;
+        let part = |share: f64| (before + share * config.epochs as f64) / whole;
+        let Trained { hybrid, begun, curve, epoch, .. } = self.trained(ground, &config, "", &mut |share| go_on(part(share)))?;
+        let Begun { parameters, windows, steps, .. } = begun;
+        (outcome.parameters, outcome.training_windows, outcome.steps) = (parameters, windows, steps);
+        (outcome.curve, outcome.epoch) = (curve, epoch + 1);
+        Ok(hybrid)
+    }
+
+    /// One training, in a folder of its own below the run's. One that has come to its end is not done again.
+    fn trained(&self, ground: &Ground<'_>, config: &TrainConfig, name: &str, go_on: GoOn<'_>) -> Result<Trained> {
+        let Ground { run, flights, model, split, working } = *ground;
+        let working = if name.is_empty() { working.to_path_buf() } else { working.join(name) };
+        let folder = RunFolder::create(&working)?;
         // The key has everything in it that the data of a run depend on.
         let data = u64::from_str_radix(&self.plan.key(run)?, 16).expect("a key is sixteen hexadecimal digits");
-        let state = self.resumed(run, config, data, &folder, working)?;
-        let training = Training {
-            flights: self.flights,
-            split,
-            model,
-            config,
-            data,
-            folder: &folder,
-            with_losses: false,
-            threads: self.threads,
-        };
+        let state = self.resumed(run, config, data, &folder, &working)?;
+        let training = Training { flights, split, model, config, data, folder: &folder, with_losses: false, threads: self.threads };
         let mut steps = 1;
         let ended = training.run(state, &mut |event| {
             Ok(match event {
@@ -229,10 +298,7 @@ impl<'a> Experiment<'a> {
             })
         })?;
         match ended {
-            Ended::Trained(trained) => {
-                let Begun { parameters, windows, steps, .. } = trained.begun;
-                Ok(Trained { hybrid: trained.hybrid, parameters, windows, steps })
-            }
+            Ended::Trained(trained) => Ok(*trained),
             Ended::Stopped { done, steps } => {
                 Err(Error::Interrupted { saved: format!("the run `{run}` goes on from step {done} of {steps}") })
             }
@@ -263,36 +329,37 @@ impl<'a> Experiment<'a> {
         Ok(None)
     }
 
-    fn ridge(&self, split: &Split, flights: &[Flight], judged: &[Window]) -> Result<Row> {
-        let config = LinearConfig::default();
-        let training = windows(&split.training, config.lags, 1);
-        if std::ptr::eq(flights, self.flights) {
-            return ridge(flights, &training, judged, &config);
+    fn ridge(&self, flights: &[Flight], split: &Split, judged: &[Window], networks: bool) -> Result<Row> {
+        let settings = &self.plan.settings;
+        if !networks {
+            let config = LinearConfig::default();
+            return ridge(flights, &windows(&split.training, config.lags, 1), judged, &config);
         }
-        // Fitted on what was recorded, judged on what is disturbed: both stand in one list.
-        let both: Vec<Flight> = self.flights.iter().chain(flights).cloned().collect();
-        let moved: Vec<Window> =
-            judged.iter().map(|window| Window { flight: window.flight + self.flights.len(), ..*window }).collect();
-        ridge(&both, &training, &moved, &config)
+        let inputs = settings.training.inputs.clone();
+        let training = windows(&split.training, settings.phyture()?.history, settings.training.stride);
+        // Of few windows no more rows than they determine.
+        let most = training.len().saturating_sub(1) / inputs.len().max(1);
+        let config = LinearConfig { lags: LinearConfig::default().lags.min(most).max(1), inputs };
+        ridge(flights, &training, judged, &config)
     }
 
-    /// The flights with noise on their inputs; the targets stay. `None` where nothing is disturbed.
-    fn disturbed(&self, condition: Condition, split: &Split) -> Result<Option<Vec<Flight>>> {
-        let control = |column: &Column| matches!(column, Column::U1 | Column::U2 | Column::U3 | Column::U4);
-        let wanted = match condition {
-            Condition::Clean => return Ok(None),
-            Condition::StateNoise => false,
-            Condition::ControlNoise => true,
+    fn floor(&self, judged: &[Window]) -> Result<Row> {
+        let missing = || Error::Undetermined("there is a floor only where the explainable part of the flights is known".into());
+        explainable_at(self.flights, judged, self.explainable.ok_or_else(missing)?)
+    }
+
+    /// The flights with noise on their inputs, where the treatment is that; the targets stay.
+    fn treated(&self, treatment: Treatment) -> Result<Cow<'_, [Flight]>> {
+        let control = |column: Column| matches!(column, Column::U1 | Column::U2 | Column::U3 | Column::U4);
+        let of_controls = match treatment {
+            Treatment::StateNoise => false,
+            Treatment::ControlNoise => true,
+            _ => return Ok(Cow::Borrowed(self.flights)),
         };
-        let deviation = |column: Column| {
-            let recorded: Vec<&[f64]> = self.flights.iter().map(|flight| flight.column(column)).collect();
-            NOISE_SHARE * Scale::of(&recorded, &split.training).deviation
-        };
-        let inputs = Column::STATE.iter().copied().filter(|column| control(column) == wanted);
-        let deviations: Vec<(Column, f64)> = inputs.map(|column| (column, deviation(column))).collect();
         let noisy = |(index, flight): (usize, &Flight)| {
             flight.with_columns(|column| {
-                let (_, deviation) = *deviations.iter().find(|(known, _)| *known == column && !flight.absent.contains(&column))?;
+                let is_one = Column::STATE.contains(&column) && control(column) == of_controls && !flight.absent.contains(&column);
+                let deviation = Some(noise(column)).filter(|deviation| is_one && *deviation > 0.0)?;
                 let mut values = vec![0.0; flight.len()];
                 let stream = Stream::new(self.plan.settings.split_seed, index as u64, column as u64, 0);
                 Init::Normal { deviation }.fill::<f64>(stream, &[], &mut values);
@@ -300,7 +367,7 @@ impl<'a> Experiment<'a> {
                 Some(values)
             })
         };
-        self.flights.iter().enumerate().map(noisy).collect::<Result<Vec<_>>>().map(Some)
+        self.flights.iter().enumerate().map(noisy).collect::<Result<Vec<_>>>().map(Cow::Owned)
     }
 
     /// Windows of the longest stretch of test samples, of the class whose curves the paper shows if it is there.

@@ -5,6 +5,7 @@
 //! | `plan.json` | the plan |
 //! | `runs/KEY.json` | the outcome of the run of that key, sealed; written in one piece when the run is at its end |
 //! | `working/KEY/` | checkpoints of a run that is under way |
+//! | `amended/KEY.toml` | what `loop` made of the model in one division: searched once |
 //! | `tables/` | what `collect` made |
 //!
 //! Several processes may work in one folder: a run is made by the one that has claimed it.
@@ -59,7 +60,7 @@ impl Folder {
     /// [`Error::Io`] if it cannot be made.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self> {
         let folder = Self { path: path.into() };
-        for part in [folder.runs(), folder.path.join("working"), folder.tables()] {
+        for part in [folder.runs(), folder.path.join("working"), folder.amended(), folder.tables()] {
             fs::create_dir_all(&part).map_err(Error::io(&part))?;
         }
         Ok(folder)
@@ -78,6 +79,11 @@ impl Folder {
     /// Where the tables go.
     pub fn tables(&self) -> PathBuf {
         self.path.join("tables")
+    }
+
+    /// Where amended models are kept.
+    pub fn amended(&self) -> PathBuf {
+        self.path.join("amended")
     }
 
     fn runs(&self) -> PathBuf {

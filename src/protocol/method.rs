@@ -33,15 +33,23 @@ pub enum Predictor {
     BackwardDifference,
     /// Centred difference, which looks one row ahead: what the targets give away, and no predictor.
     CentredDifference,
-    /// Ridge regression of the accelerations on the last rows of the log.
-    Ridge,
+    /// Ridge regression of the accelerations on the last rows of the log; `windows`: of the networks' windows and inputs, not of every sample and
+    /// gravity in body axes.
+    Ridge {
+        /// Whether it sees what the networks see.
+        windows: bool,
+    },
     /// A trained network.
     Network {
         /// The network, from the plan's Phy-Ture.
         architecture: fn(&PhyTureConfig) -> Architecture,
         /// Whether the physics below it has been amended by the loop.
         amended: bool,
+        /// Whether a linear history is fitted between the two.
+        linear: bool,
     },
+    /// What is explainable of the flights, where it is known: no predictor.
+    Floor,
 }
 
 impl Predictor {
@@ -51,6 +59,11 @@ impl Predictor {
             Self::Network { architecture, .. } => Some(architecture(base)),
             _ => None,
         }
+    }
+
+    /// Whether a linear history is fitted below the network, whatever the plan says.
+    pub const fn has_linear_history(self) -> bool {
+        matches!(self, Self::Network { linear: true, .. })
     }
 
     /// Whether the loop amends the physics first.
@@ -71,7 +84,7 @@ const fn network(
     note: Option<&'static str>,
     architecture: fn(&PhyTureConfig) -> Architecture,
 ) -> Method {
-    row(id, name, note, Predictor::Network { architecture, amended: false })
+    row(id, name, note, Predictor::Network { architecture, amended: false, linear: false })
 }
 
 /// Every method.
@@ -95,7 +108,26 @@ pub const METHODS: &[Method] = &[
         Some("looks one row ahead: what the targets give away, not a predictor"),
         Predictor::CentredDifference,
     ),
-    row("ridge", "Ridge regression", Some("of the accelerations on the last 11 rows; no physics"), Predictor::Ridge),
+    row(
+        "ridge",
+        "Ridge regression",
+        Some("of the accelerations on the last 11 rows, at every sample; no physics"),
+        Predictor::Ridge { windows: false },
+    ),
+    row(
+        "ridge_windows",
+        "Ridge regression, as the networks see",
+        Some(
+            "of the accelerations on the last 11 rows of the networks' inputs, at their windows (fewer rows where there are few windows); no physics",
+        ),
+        Predictor::Ridge { windows: true },
+    ),
+    row(
+        "floor",
+        "Floor",
+        Some("what the simulator's explainable part leaves: gusts, turbulence and noise that no predictor can know"),
+        Predictor::Floor,
+    ),
     network("cnn", "CNN hybrid", RECONSTRUCTION, |base| {
         let reference = CnnConfig::default();
         CnnConfig {
@@ -129,7 +161,7 @@ pub const METHODS: &[Method] = &[
         }
         .into()
     }),
-    network("timesnet", "TimesNet", None, |base| {
+    network("timesnet", "TimesNet", Some("its periods are chosen for each window by itself, not for a batch"), |base| {
         let reference = TimesNetConfig::default();
         TimesNetConfig {
             history: base.history,
@@ -174,8 +206,17 @@ pub const METHODS: &[Method] = &[
         "phyture_amended",
         "Phy-Ture on the amended physics",
         Some("the baseline with the effects that `loop` found in the training part, under the same network"),
-        Predictor::Network { architecture: |base| base.into(), amended: true },
+        Predictor::Network { architecture: |base| base.into(), amended: true, linear: false },
     ),
+    row(
+        "phyture_linear",
+        "Linear history + Phy-Ture",
+        Some("a ridge regression of what physics leaves on the last 11 rows, and the network on what that leaves"),
+        Predictor::Network { architecture: |base| base.into(), amended: false, linear: true },
+    ),
+    network("phyture_without_dropout", "Phy-Ture without dropout", None, |base| {
+        PhyTureConfig { dropout: 0.0, ..base.clone() }.into()
+    }),
     network("without_paf", "Without PAF", None, |base| variant(base, Variant::WithoutPaf)),
     network("without_mstfe", "Without MSTFE", None, |base| variant(base, Variant::WithoutMstfe)),
     network(
@@ -210,9 +251,12 @@ fn scaled(base: &PhyTureConfig, width: usize) -> usize {
     2 * (width * base.d_model).div_ceil(2 * paper)
 }
 
-/// Blocks of the TCN: its recommended 8, or as few as still see the whole history.
+/// Blocks of the TCN: its recommended 8 at the paper's history, of a shorter one as few as see the whole of it.
 fn tcn_levels(history: usize) -> usize {
     let reference = TcnConfig::default();
+    if history >= PhyTureConfig::default().history {
+        return reference.levels;
+    }
     let sees = |levels: &usize| 1 + 2 * (reference.kernel - 1) * ((1 << levels) - 1) >= history;
     (1..reference.levels).find(sees).unwrap_or(reference.levels)
 }
@@ -256,12 +300,12 @@ mod tests {
         assert_eq!(network("cnn"), Some(CnnConfig::default().into()));
         assert_eq!(network("cnn_lstm"), Some(CnnLstmConfig::default().into()));
         assert_eq!(network("dlinear"), Some(DLinearConfig::default().into()));
-        assert_eq!(network("tcn"), Some(TcnConfig { levels: 7, ..TcnConfig::default() }.into()), "seven levels see the history");
+        assert_eq!(network("tcn"), Some(TcnConfig::default().into()));
     }
 
     #[test]
     fn the_tcn_sees_the_whole_history() {
-        assert_eq!(tcn_levels(1000), 7, "1 + 12·127 = 1525 rows");
+        assert_eq!((tcn_levels(1000), tcn_levels(999)), (8, 7), "1 + 12·127 = 1525 rows");
         assert_eq!(tcn_levels(128), 4);
         assert_eq!(tcn_levels(4000), 8);
     }

@@ -7,6 +7,7 @@
 pub mod estimate;
 pub mod experiment;
 pub mod folder;
+pub mod lead;
 pub mod method;
 pub mod outcome;
 pub mod paper;
@@ -16,10 +17,11 @@ pub mod slurm;
 pub mod table;
 pub mod text;
 
-pub use experiment::Experiment;
+pub use experiment::{Experiment, Extent};
 pub use folder::{Folder, instruction_set};
+pub use lead::Lead;
 pub use method::{METHODS, Method, Predictor, method};
-pub use outcome::{Condition, Outcome, Segment, Trace};
+pub use outcome::{Outcome, Segment, Trace};
 pub use plan::{Division, Plan, Run, TableId, Treatment};
 pub use settings::Settings;
 pub use slurm::JobArray;

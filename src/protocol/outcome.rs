@@ -5,20 +5,8 @@ use super::plan::Run;
 use crate::blocks::{BLOCK_S, Blocks};
 use crate::critique::ChannelValues;
 use crate::flight::{Channel, Flight, PerChannel, Window};
+use crate::train::EpochLoss;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
-
-/// What the trained method is judged under.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Condition {
-    /// The recorded inputs.
-    Clean,
-    /// White noise on all state columns of the test flights.
-    StateNoise,
-    /// White noise on the four controls of the test flights.
-    ControlNoise,
-}
 
 /// One ten-second segment of a test flight. Channels are in the order of [`Channel::ALL`](crate::flight::Channel::ALL), m/s² and rad/s².
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,8 +53,14 @@ pub struct Outcome {
     pub steps: u64,
     /// Effects that the loop added to the physics, where it came first.
     pub effects: Vec<String>,
+    /// The learning rate that the validation part chose, where there was a choice.
+    pub peak_rate: Option<f64>,
+    /// Losses of each epoch of the network, the first one first, and the epoch that was kept, from 1.
+    pub curve: Vec<EpochLoss>,
+    /// 0 for a method that trains nothing.
+    pub epoch: usize,
     /// Errors by segment.
-    pub conditions: BTreeMap<Condition, Vec<Segment>>,
+    pub segments: Vec<Segment>,
     /// A stretch of the test part.
     pub trace: Option<Trace>,
 }

@@ -5,6 +5,7 @@
 use super::method::{Method, Predictor, method};
 use super::settings::Settings;
 use crate::error::{Error, Result};
+use crate::hybrid::linear::LinearConfig;
 use crate::train::TrainConfig;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -13,7 +14,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Version of outcomes: raised whenever the same run would end in other numbers.
-const OUTCOME_VERSION: u32 = 1;
+const OUTCOME_VERSION: u32 = 2;
 
 /// Which part trains and which tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -25,7 +26,7 @@ pub enum Division {
     Fold(usize),
 }
 
-/// What is made worse on purpose.
+/// What is made worse on purpose, in the flights that train and in those that judge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Treatment {
@@ -35,6 +36,10 @@ pub enum Treatment {
     CoefficientsOff(u8),
     /// So many per cent of the training part's ten-second segments train.
     TrainingShare(u8),
+    /// White noise on all state columns of all flights.
+    StateNoise,
+    /// White noise on the four controls of all flights.
+    ControlNoise,
 }
 
 /// A table of the paper, or of ours.
@@ -43,14 +48,24 @@ pub enum Treatment {
 pub enum TableId {
     /// Tables 1 to 6 of the paper.
     Paper(u8),
-    /// Noise, wrong coefficients, less data.
+    /// Noise on the controls, wrong coefficients, less data.
     Robustness,
+    /// Table 1 on flights with white noise on all states.
+    Noise,
 }
 
 impl TableId {
     /// All tables.
-    pub const ALL: [Self; 7] =
-        [Self::Paper(1), Self::Paper(2), Self::Paper(3), Self::Paper(4), Self::Paper(5), Self::Paper(6), Self::Robustness];
+    pub const ALL: [Self; 8] = [
+        Self::Paper(1),
+        Self::Paper(2),
+        Self::Paper(3),
+        Self::Paper(4),
+        Self::Paper(5),
+        Self::Paper(6),
+        Self::Robustness,
+        Self::Noise,
+    ];
 }
 
 impl fmt::Display for TableId {
@@ -58,6 +73,7 @@ impl fmt::Display for TableId {
         match self {
             Self::Paper(number) => write!(f, "{number}"),
             Self::Robustness => f.write_str("robustness"),
+            Self::Noise => f.write_str("noise"),
         }
     }
 }
@@ -84,7 +100,7 @@ impl FromStr for TableId {
             place: "benchmark".into(),
             field: "table".into(),
             found: format!("`{text}`"),
-            expected: "1 to 6, or `robustness`".into(),
+            expected: "1 to 6, `robustness` or `noise`".into(),
         })
     }
 }
@@ -100,12 +116,37 @@ pub(super) const COMPARISON: &[&str] = &[
     "dlinear",
     "informer",
     "phyture",
+    "phyture_without_dropout",
+    "phyture_linear",
     "backward_difference",
     "centred_difference",
     "ridge",
+    "ridge_windows",
     "amended_physics",
     "phyture_amended",
+    "floor",
 ];
+
+/// Rows of the table on noisy flights: the networks that learned most where it was quiet, and what they have to beat.
+pub(super) const NOISY: &[&str] = &[
+    "physical_baseline",
+    "cnn",
+    "cnn_lstm",
+    "timemixer",
+    "dlinear",
+    "phyture",
+    "phyture_without_dropout",
+    "phyture_linear",
+    "backward_difference",
+    "centred_difference",
+    "ridge",
+    "ridge_windows",
+    "amended_physics",
+    "floor",
+];
+
+/// Runs that come first, seed by seed: what trains nothing, then what the comparison is about.
+const FIRST: [&str; 2] = ["phyture", "dlinear"];
 
 /// Rows of Table 4.
 pub(super) const ABLATION: &[&str] = &["without_paf", "without_mstfe", "without_tsdp_linear", "without_tsdp_last", "phyture"];
@@ -119,12 +160,10 @@ pub(super) const FUSION: &[&str] = &["state_control_only", "direct_concatenation
 /// Methods of the robustness table.
 pub(super) const ROBUST: &[&str] = &["physical_baseline", "cnn_lstm", "phyture"];
 
-/// Yardsticks that stand in it under noise only: nothing else that it does reaches them.
-pub(super) const ROBUST_YARDSTICKS: &[&str] = &["backward_difference", "ridge"];
-
-/// Treatments of the robustness table; noise is a condition of every outcome.
+/// Treatments of the robustness table. Noise on the states has a table of its own, with every yardstick in it.
 pub(super) const TREATMENTS: &[Treatment] = &[
     Treatment::Plain,
+    Treatment::ControlNoise,
     Treatment::CoefficientsOff(10),
     Treatment::CoefficientsOff(30),
     Treatment::TrainingShare(50),
@@ -170,6 +209,8 @@ impl fmt::Display for Run {
             Treatment::Plain => {}
             Treatment::CoefficientsOff(percent) => write!(f, ", coefficients {percent} % off")?,
             Treatment::TrainingShare(percent) => write!(f, ", {percent} % of the training data")?,
+            Treatment::StateNoise => f.write_str(", noise on the states")?,
+            Treatment::ControlNoise => f.write_str(", noise on the controls")?,
         }
         if self.seed > 0 { write!(f, ", seed {}", self.seed) } else { Ok(()) }
     }
@@ -188,6 +229,8 @@ pub struct Plan {
     pub step_s: f64,
     /// Manoeuvre classes held out in each fold; empty where there are fewer than two classes.
     pub folds: Vec<Vec<String>>,
+    /// SHA-256 of the explainable part of the flights, where it is known, as of simulated ones: then there is a floor.
+    pub explainable_sha256: Option<String>,
     /// What is wanted.
     pub tables: Vec<TableId>,
     /// Rows that are wanted, by method; all if empty.
@@ -203,7 +246,8 @@ impl Plan {
     pub fn runs_of(&self, id: &str, division: Division, treatment: Treatment) -> Vec<Run> {
         let random = method(id).is_some_and(|method| matches!(method.predictor, Predictor::Network { .. }));
         let run = |seed: usize| Run { method: id.to_owned(), division, treatment, seed: seed as u64 };
-        if random { (1..=self.settings.seeds).map(run).collect() } else { vec![run(0)] }
+        let seeds = if self.settings.one_seed.iter().any(|one| one == id) { 1 } else { self.settings.seeds };
+        if random { (1..=seeds).map(run).collect() } else { vec![run(0)] }
     }
 
     /// Whether outcomes of the other plan are of use here: everything is the same but which tables, rows and how many seeds are wanted,
@@ -248,7 +292,9 @@ impl Plan {
 
     /// Rows of a table that are wanted.
     pub(super) fn wanted<'i>(&self, ids: &'i [&'static str]) -> impl Iterator<Item = &'static str> + use<'i, '_> {
-        ids.iter().copied().filter(|id| self.methods.is_empty() || self.methods.iter().any(|method| method == id))
+        let is_wanted = |id: &&str| self.methods.is_empty() || self.methods.iter().any(|method| method == id);
+        let is_known = |id: &&str| *id != "floor" || self.explainable_sha256.is_some();
+        ids.iter().copied().filter(move |id| is_wanted(id) && is_known(id))
     }
 
     /// Every run that the tables need, each once, seed by seed: what is there early is a whole comparison at few seeds.
@@ -261,6 +307,7 @@ impl Plan {
             let plain = |ids: &'static [&'static str], division: Division| -> Vec<Run> {
                 self.wanted(ids).flat_map(|id| self.runs_of(id, division, Treatment::Plain)).collect()
             };
+            let noisy = |id| self.runs_of(id, Division::Benchmark, Treatment::StateNoise);
             all.extend(match table {
                 TableId::Paper(1 | 2) => plain(COMPARISON, Division::Benchmark),
                 TableId::Paper(3) => (0..self.folds.len()).flat_map(|fold| plain(COMPARISON, Division::Fold(fold))).collect(),
@@ -271,12 +318,14 @@ impl Plan {
                     let treated = TREATMENTS.iter().flat_map(|&treatment| {
                         self.wanted(ROBUST).flat_map(move |id| self.runs_of(id, Division::Benchmark, treatment))
                     });
-                    treated.chain(plain(ROBUST_YARDSTICKS, Division::Benchmark)).collect()
+                    treated.collect()
                 }
+                TableId::Noise => self.wanted(NOISY).flat_map(noisy).collect(),
             });
         }
-        // Stable: within a seed, the order of the tables.
-        all.sort_by_key(|run| run.seed);
+        // Stable: within a seed, what comes first and then the order of the tables.
+        let place = |run: &Run| FIRST.iter().position(|id| *id == run.method).unwrap_or(FIRST.len());
+        all.sort_by_key(|run| (run.seed, place(run)));
         let mut known = BTreeSet::new();
         let mut unique = Vec::new();
         for run in all {
@@ -287,13 +336,16 @@ impl Plan {
         Ok(unique)
     }
 
-    /// The training configuration of a run; `None` for a method that trains nothing.
+    /// The training configuration of a run at the plan's own learning rate; `None` for a method that trains nothing.
     ///
     /// # Errors
     /// [`Error::Config`] for an unknown method.
     pub fn training(&self, run: &Run) -> Result<Option<TrainConfig>> {
-        let network = run.method()?.predictor.network(self.settings.phyture()?);
-        Ok(network.map(|network| TrainConfig { network, seed: run.seed, ..self.settings.training.clone() }))
+        let predictor = run.method()?.predictor;
+        let network = predictor.network(self.settings.phyture()?);
+        let plain = &self.settings.training;
+        let linear = if predictor.has_linear_history() { Some(LinearConfig::default()) } else { plain.linear.clone() };
+        Ok(network.map(|network| TrainConfig { network, linear, seed: run.seed, ..plain.clone() }))
     }
 
     /// Name of a run's outcome: the first 16 digits of the SHA-256 of data, model, division, treatment, configuration, seed and version.
@@ -310,6 +362,8 @@ impl Plan {
             split_seed: u64,
             test_stride: usize,
             held_out: Option<&'a Vec<String>>,
+            explainable_sha256: Option<&'a String>,
+            rates: Option<(&'a [f64], usize)>,
             treatment: Treatment,
             history: usize,
             /// The predictor but for its network: what tells methods without one apart, and whether the loop comes first.
@@ -325,17 +379,40 @@ impl Plan {
             model: &self.model,
             split_seed: self.settings.split_seed,
             test_stride: self.settings.test_stride,
-            held_out: match run.division {
-                Division::Benchmark => None,
-                Division::Fold(fold) => self.folds.get(fold),
-            },
+            held_out: self.held_out(run.division),
+            explainable_sha256: self.explainable_sha256.as_ref().filter(|_| run.method == "floor"),
+            rates: training.as_ref().filter(|_| !self.settings.rates.is_empty()).map(|_| self.settings.rate_budget()),
             treatment: run.treatment,
             history: self.settings.phyture()?.history,
             predictor: if training.is_some() { format!("network, amended {}", predictor.amended()) } else { run.method.clone() },
             training,
         };
-        let text = serde_json::to_vec(&everything).map_err(|error| Error::Undetermined(error.to_string()))?;
-        Ok(Sha256::digest(text).iter().take(8).map(|byte| format!("{byte:02x}")).collect())
+        hash(&everything)
+    }
+
+    /// Name of what the loop makes of the model for a run: the hash of what that depends on.
+    ///
+    /// # Errors
+    /// [`Error::Undetermined`] if a number of it is none.
+    pub fn amended_key(&self, run: &Run) -> Result<String> {
+        hash(&(
+            "amended",
+            OUTCOME_VERSION,
+            &self.version,
+            &self.data_sha256,
+            &self.model,
+            self.settings.split_seed,
+            self.settings.validates_in_folds(),
+            self.held_out(run.division),
+            run.treatment,
+        ))
+    }
+
+    fn held_out(&self, division: Division) -> Option<&Vec<String>> {
+        match division {
+            Division::Benchmark => None,
+            Division::Fold(fold) => self.folds.get(fold),
+        }
     }
 
     /// The runs of shard `shard` of `shards`, from 1: every `shards`-th in the order of their keys, which is a random one. In the order
@@ -359,6 +436,12 @@ impl Plan {
     }
 }
 
+/// The first 16 digits of the SHA-256 of something as compact JSON.
+fn hash(everything: &impl Serialize) -> Result<String> {
+    let text = serde_json::to_vec(everything).map_err(|error| Error::Undetermined(error.to_string()))?;
+    Ok(Sha256::digest(text).iter().take(8).map(|byte| format!("{byte:02x}")).collect())
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -371,6 +454,7 @@ pub(super) mod tests {
             model: String::new(),
             step_s: 0.01,
             folds: vec![vec!["a".into()], vec!["b".into()]],
+            explainable_sha256: Some("1".into()),
             tables: tables.into(),
             methods: Vec::new(),
             settings: Settings { seeds: 3, ..Settings::quick() },
@@ -453,7 +537,7 @@ pub(super) mod tests {
 
     proptest! {
         #[test]
-        fn shards_are_a_partition(shards in 1_usize..9, tables in prop::sample::subsequence(TableId::ALL.to_vec(), 1..=7)) {
+        fn shards_are_a_partition(shards in 1_usize..9, tables in prop::sample::subsequence(TableId::ALL.to_vec(), 1..=8)) {
             let plan = plan(&tables);
             let mut found = Vec::new();
             for shard in 1..=shards {

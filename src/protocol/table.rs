@@ -2,12 +2,11 @@
 //! `experiment`.
 
 use super::folder::Folder;
+use super::lead::{Lead, lead};
 use super::method::{Method, method};
-use super::outcome::{Condition, Outcome, Segment, Sums, Trace};
-use super::paper::{self, Printed};
-use super::plan::{
-    ABLATION, COMPARISON, Division, FUSION, Plan, ROBUST, ROBUST_YARDSTICKS, Run, SWEEP, TREATMENTS, TableId, Treatment,
-};
+use super::outcome::{Outcome, Segment, Sums, Trace};
+use super::paper;
+use super::plan::{ABLATION, COMPARISON, Division, FUSION, NOISY, Plan, ROBUST, Run, SWEEP, TREATMENTS, TableId, Treatment};
 use crate::critique::ChannelValues;
 use crate::error::Result;
 use crate::flight::{Channel, PerChannel};
@@ -68,10 +67,10 @@ pub struct TableRow {
     pub seeds: usize,
     /// Seeds of the plan; 1 for a method without randomness.
     pub planned: usize,
-    /// Whether it predicts at all: the zero-phase difference looks ahead and competes with nobody.
+    /// Whether it predicts at all.
     pub competes: bool,
-    /// What the paper prints.
-    pub paper: Option<Printed>,
+    /// What the paper prints, with its deviations where it prints any.
+    pub paper: Option<[Cell; 7]>,
 }
 
 /// A table.
@@ -83,6 +82,8 @@ pub struct Table {
     pub title: String,
     /// Rows in order.
     pub rows: Vec<TableRow>,
+    /// Phy-Ture held against each other row.
+    pub leads: Vec<Lead>,
 }
 
 /// The finished runs of a plan.
@@ -95,6 +96,14 @@ pub struct Finished {
     pub missing: Vec<Run>,
     /// Instruction sets that made them.
     pub instruction_sets: BTreeSet<String>,
+}
+
+/// The method that the others are held against.
+const FRONT: &str = "phyture";
+
+/// Whether a method predicts at all: the zero-phase difference looks ahead, and the floor knows the truth.
+fn competes(id: &str) -> bool {
+    !["centred_difference", "floor"].contains(&id)
 }
 
 /// One measure of the sums of errors.
@@ -137,6 +146,15 @@ impl Finished {
         runs.iter().filter_map(|run| self.outcome(run)).collect()
     }
 
+    /// Every network that was trained on the benchmark division as it is, with its outcomes, one a seed.
+    pub fn trained(&self) -> Vec<(&'static Method, Vec<&Outcome>)> {
+        let one = |method: &'static Method| {
+            let outcomes = self.seeds(method.id, Treatment::Plain);
+            (outcomes.first().is_some_and(|outcome| outcome.epoch > 0)).then_some((method, outcomes))
+        };
+        self.plan.wanted(COMPARISON).filter_map(method).filter_map(one).collect()
+    }
+
     /// The stretch of test flight that every method of Table 1 was drawn on; of a network with several seeds, the first.
     pub fn traces(&self) -> impl Iterator<Item = (&'static Method, &Trace)> {
         let trace = move |id: &&'static str| {
@@ -152,6 +170,7 @@ impl Finished {
         for table in &self.plan.tables {
             match table {
                 TableId::Paper(1) => tables.push(self.plain(1, "RMSE of every method, benchmark division", COMPARISON)),
+                TableId::Noise => tables.push(self.noisy()),
                 TableId::Paper(2) => tables.extend(self.worst_case()),
                 TableId::Paper(3) => tables.extend(self.folds()),
                 TableId::Paper(4) => tables.push(self.plain(4, "RMSE without one module each", ABLATION)),
@@ -165,18 +184,39 @@ impl Finished {
 
     fn plain(&self, number: u8, title: &str, ids: &[&'static str]) -> Table {
         let rows = self.plan.wanted(ids).filter_map(method).map(|method| {
-            let mut row = self.row(method, Treatment::Plain, Condition::Clean, RMSE);
+            let mut row = self.row(method, Treatment::Plain, RMSE);
             row.paper = paper::printed(number, method.id);
             row
         });
-        Table { id: format!("table{number}"), title: title.into(), rows: rows.collect() }
+        let leads = self.leads(ids, Treatment::Plain);
+        Table { id: format!("table{number}"), title: title.into(), rows: rows.collect(), leads }
+    }
+
+    /// Table 1 where white noise is on the states that train and on those that are judged.
+    fn noisy(&self) -> Table {
+        let rows = self.plan.wanted(NOISY).filter_map(method).map(|method| self.row(method, Treatment::StateNoise, RMSE));
+        let title =
+            "RMSE with white noise on the states of all flights, training and test: 0.02 m, 0.02 m/s, 0.003 rad, 0.01 rad/s";
+        Table { id: "noise".into(), title: title.into(), rows: rows.collect(), leads: self.leads(NOISY, Treatment::StateNoise) }
+    }
+
+    /// Phy-Ture held against each other method that has a run, under one treatment.
+    fn leads(&self, ids: &[&'static str], treatment: Treatment) -> Vec<Lead> {
+        let of = self.seeds(FRONT, treatment);
+        let others = self.plan.wanted(ids).filter_map(method).filter(|method| method.id != FRONT && competes(method.id));
+        let one = |method: &Method| {
+            let over = self.seeds(method.id, treatment);
+            let is_same = of.first().zip(over.first()).is_some_and(|(one, other)| std::ptr::eq(*one, *other));
+            let (percent, percent_ci95) = lead(&of, &over).filter(|_| !is_same)?;
+            Some(Lead { of: FRONT.into(), over: method.id.into(), over_name: method.name.into(), percent, percent_ci95 })
+        };
+        others.filter_map(one).collect()
     }
 
     /// A method on the benchmark division.
-    fn row(&self, method: &Method, treatment: Treatment, condition: Condition, measure: Measure) -> TableRow {
+    fn row(&self, method: &Method, treatment: Treatment, measure: Measure) -> TableRow {
         let outcomes = self.seeds(method.id, treatment);
-        let of = |outcome: &&Outcome| outcome.conditions.get(&condition).map(|segments| measure.1(&Sums::of(segments)));
-        let found: Vec<ChannelValues> = outcomes.iter().filter_map(of).collect();
+        let found: Vec<ChannelValues> = outcomes.iter().map(|outcome| measure.1(&Sums::of(&outcome.segments))).collect();
         let planned = self.plan.runs_of(method.id, Division::Benchmark, treatment).len();
         let effects = outcomes.first().filter(|_| method.predictor.amended()).map(|outcome| &outcome.effects);
         row(method, measure.0, &found, planned, effects)
@@ -192,24 +232,24 @@ impl Finished {
         table
     }
 
-    /// Table 2: Phy-Ture and the best of the paper's other methods in Table 1. `None` until both have a run.
+    /// Table 2: the paper's two methods, and the best of the others in our Table 1 where that is another. `None` until Phy-Ture and one other have a
+    /// run.
     fn worst_case(&self) -> Option<Table> {
-        let rivals = self.plan.wanted(COMPARISON).filter(|id| *id != "phyture" && paper::printed(1, id).is_some());
-        let mean = |id: &'static str| {
-            let row = self.row(method(id)?, Treatment::Plain, Condition::Clean, RMSE);
-            Some((id, row.cells[6]?.mean))
-        };
+        let rivals = self.plan.wanted(COMPARISON).filter(|id| *id != FRONT && paper::printed(1, id).is_some());
+        let mean = |id: &'static str| Some((id, self.row(method(id)?, Treatment::Plain, RMSE).cells[6]?.mean));
         let (strongest, _) = rivals.filter_map(mean).min_by(|a, b| a.1.total_cmp(&b.1))?;
         let measures: [Measure; 2] = [("MAE", Sums::mae), ("MaxAE", Sums::max_abs)];
-        let rows = [strongest, "phyture"].into_iter().filter_map(method).flat_map(|method| {
-            measures.map(|measure| {
-                let mut row = self.row(method, Treatment::Plain, Condition::Clean, measure);
+        let papers = self.plan.wanted(COMPARISON).filter(|id| *id != strongest && paper::printed_worst(id, "MAE").is_some());
+        let mut rows: Vec<TableRow> = Vec::new();
+        for method in [strongest].into_iter().chain(papers).filter_map(method) {
+            for measure in measures {
+                let mut row = self.row(method, Treatment::Plain, measure);
                 row.paper = paper::printed_worst(method.id, measure.0);
-                row
-            })
-        });
-        let title = "MAE and MaxAE of Phy-Ture and of the method next to it in Table 1".into();
-        Some(Table { id: "table2".into(), title, rows: rows.collect() })
+                rows.push(row);
+            }
+        }
+        let title = "MAE and MaxAE of the paper's two methods and of the strongest peer of Table 1".into();
+        Some(Table { id: "table2".into(), title, rows, leads: Vec::new() })
     }
 
     /// Table 3 twice: squared errors pooled over the folds, and the mean of the folds' errors.
@@ -230,7 +270,7 @@ impl Finished {
                 row.paper = paper::printed(3, method.id).filter(|_| printed);
                 row
             });
-            Table { id: id.into(), title: title.into(), rows: rows.collect() }
+            Table { id: id.into(), title: title.into(), rows: rows.collect(), leads: Vec::new() }
         };
         let count = self.plan.folds.len();
         [
@@ -245,8 +285,8 @@ impl Finished {
             (0..self.plan.folds.len()).map(|fold| self.plan.runs_of(method.id, Division::Fold(fold), Treatment::Plain)).collect();
         let planned = folds.first().map_or(0, Vec::len);
         let of_seed = |seed: usize| {
-            let clean = |runs: &Vec<Run>| self.outcome(runs.get(seed)?)?.conditions.get(&Condition::Clean).cloned();
-            let folds: Option<Vec<Vec<Segment>>> = folds.iter().map(clean).collect();
+            let of_fold = |runs: &Vec<Run>| Some(self.outcome(runs.get(seed)?)?.segments.clone());
+            let folds: Option<Vec<Vec<Segment>>> = folds.iter().map(of_fold).collect();
             folds.map(|folds| combine(&folds))
         };
         ((0..planned).filter_map(of_seed).collect(), planned)
@@ -254,30 +294,22 @@ impl Finished {
 
     fn robustness(&self) -> Table {
         let mut rows = Vec::new();
-        let mut add = |method: &Method, treatment: Treatment, condition: Condition, words: String| {
-            let mut row = self.row(method, treatment, condition, RMSE);
-            row.name = format!("{}, {words}", method.name);
-            rows.push(row);
-        };
-        for method in self.plan.wanted(ROBUST).chain(self.plan.wanted(ROBUST_YARDSTICKS)).filter_map(method) {
-            add(method, Treatment::Plain, Condition::Clean, "as recorded".into());
-            add(method, Treatment::Plain, Condition::StateNoise, "noise on the states".into());
-            add(method, Treatment::Plain, Condition::ControlNoise, "noise on the controls".into());
-            let treatments: &[Treatment] = if ROBUST.contains(&method.id) { TREATMENTS } else { &[] };
-            for treatment in treatments {
+        for method in self.plan.wanted(ROBUST).filter_map(method) {
+            for &treatment in TREATMENTS {
                 let words = match treatment {
-                    Treatment::Plain => continue,
+                    Treatment::Plain => "as recorded".into(),
                     Treatment::CoefficientsOff(percent) => format!("coefficients {percent} % too large"),
                     Treatment::TrainingShare(percent) => format!("{percent} % of the training data"),
+                    Treatment::StateNoise => "noise on the states".into(),
+                    Treatment::ControlNoise => "noise on the controls".into(),
                 };
-                add(method, *treatment, Condition::Clean, words);
+                let mut row = self.row(method, treatment, RMSE);
+                row.name = format!("{}, {words}", method.name);
+                rows.push(row);
             }
         }
-        Table {
-            id: "robustness".into(),
-            title: "RMSE with noise (1 % of each column's deviation, test flights only), wrong coefficients, less data".into(),
-            rows,
-        }
+        let title = "RMSE with white noise of 0.01 on the controls of all flights, wrong coefficients, less data";
+        Table { id: "robustness".into(), title: title.into(), rows, leads: Vec::new() }
     }
 
     /// Mean RMSE over the seeds of every method of Table 1 on every part of the test flights that `part` names (Figure 6 and the errors by
@@ -288,7 +320,7 @@ impl Finished {
             let mut errors: BTreeMap<String, Vec<ChannelValues>> = BTreeMap::new();
             for outcome in self.seeds(method.id, Treatment::Plain) {
                 let mut groups: BTreeMap<String, Vec<&Segment>> = BTreeMap::new();
-                for segment in outcome.conditions.get(&Condition::Clean).into_iter().flatten() {
+                for segment in &outcome.segments {
                     groups.entry(part(segment)).or_default().push(segment);
                 }
                 for (name, group) in groups {
@@ -325,7 +357,7 @@ fn row(method: &Method, measure: &'static str, found: &[ChannelValues], planned:
         cells: cells(found),
         seeds: found.len(),
         planned,
-        competes: method.id != "centred_difference",
+        competes: competes(method.id),
         paper: None,
     }
 }
@@ -355,7 +387,10 @@ mod tests {
             training_windows: 0,
             steps: 0,
             effects: vec!["drag".into()],
-            conditions: BTreeMap::from([(Condition::Clean, segments)]),
+            peak_rate: None,
+            curve: Vec::new(),
+            epoch: 0,
+            segments,
             trace: None,
         }
     }
@@ -399,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn table_2_names_the_strongest_of_the_papers_methods() -> Result<()> {
+    fn table_2_has_the_papers_rows_and_the_strongest_of_its_methods() -> Result<()> {
         let finished = finished(&[TableId::Paper(2)], |run| {
             Some(match run.method.as_str() {
                 "tcn" => 0.25,
@@ -410,7 +445,7 @@ mod tests {
         let rows = &finished.tables()[0].rows;
         assert_eq!(
             rows.iter().map(|row| (row.method.as_str(), row.measure)).collect::<Vec<_>>(),
-            [("tcn", "MAE"), ("tcn", "MaxAE"), ("phyture", "MAE"), ("phyture", "MaxAE")]
+            ["tcn", "cnn_lstm", "phyture"].map(|id| [(id, "MAE"), (id, "MaxAE")]).as_flattened()
         );
         assert!(close(rows[1].cells[0], 1.0, Some(0.5)), "largest errors are 2·0.25·seed");
         Ok(())
@@ -440,11 +475,14 @@ mod tests {
         assert!(nothing.tables().iter().flat_map(|table| &table.rows).all(|row| row.seeds == 0 && row.cells == [None; 7]));
         let all = finished(&TableId::ALL, |_| Some(1.0))?;
         let names: Vec<String> = all.tables().into_iter().map(|table| table.id).collect();
-        assert_eq!(names, ["table1", "table2", "table3", "table3_fold_mean", "table4", "table5", "table6", "robustness"]);
+        assert_eq!(names, ["table1", "table2", "table3", "table3_fold_mean", "table4", "table5", "table6", "robustness", "noise"]);
         let tables = all.tables();
         let residual = tables[6].rows.iter().find(|row| row.name == "Residual Correction");
         let without = tables[4].rows.iter().find(|row| row.name == "Without PAF");
         assert_eq!(residual.map(|row| row.cells), without.map(|row| row.cells));
+        let over: Vec<&str> = tables[0].leads.iter().map(|lead| lead.over.as_str()).collect();
+        assert!(over.contains(&"ridge") && !over.contains(&"floor") && !over.contains(&"phyture"), "{over:?}");
+        assert!(tables[5].leads.iter().all(|lead| lead.over != "average_25"), "it is the same run");
         Ok(())
     }
 

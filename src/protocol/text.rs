@@ -1,5 +1,6 @@
 //! Tables as Markdown, CSV and JSON, and the data of the figures as CSV. Layout alone; the same outcomes give the same bytes.
 
+use super::lead::Lead;
 use super::outcome::Segment;
 use super::plan::Treatment;
 use super::table::{Cell, Finished, Table, TableRow};
@@ -52,9 +53,9 @@ pub fn basis(finished: &Finished) -> Vec<String> {
     let plan = &finished.plan;
     let mut sentences = vec![format!("{}.", plan.settings.budget(plan.step_s))];
     let judged = finished.seeds("physical_baseline", Treatment::Plain);
-    if let Some(clean) = judged.first().and_then(|outcome| outcome.conditions.values().next()) {
-        let windows: usize = clean.iter().map(|segment| segment.windows).sum();
-        sentences.push(format!("Benchmark division: {windows} test windows in {} segments of at most 10 s.", clean.len()));
+    if let Some(segments) = judged.first().map(|outcome| &outcome.segments) {
+        let windows: usize = segments.iter().map(|segment| segment.windows).sum();
+        sentences.push(format!("Benchmark division: {windows} test windows in {} segments of at most 10 s.", segments.len()));
     }
     if let Some(trained) = finished.seeds("phyture", Treatment::Plain).first() {
         sentences.push(format!(
@@ -64,7 +65,7 @@ pub fn basis(finished: &Finished) -> Vec<String> {
     }
     let random =
         if plan.settings.seeds > 1 { "mean ± standard deviation over seeds" } else { "one seed, so no deviation is known" };
-    sentences.push(format!("Networks: {random}. All networks see the same history and the same inputs. Model of the last epoch."));
+    sentences.push(format!("Networks: {random}. All networks see the same history and the same inputs."));
     sentences.push(
         "The paper's figures are of other flights (the Stanford set) and its own budget: orders compare, sizes do not.".into(),
     );
@@ -76,6 +77,25 @@ pub fn basis(finished: &Finished) -> Vec<String> {
         ));
     }
     sentences
+}
+
+/// What [`leads`] are.
+pub const LEADS: &str =
+    "Phy-Ture's mean error beside each other row's, 95 % interval over segments of flight, paired, and over seeds";
+
+/// Phy-Ture beside each other row, in words.
+pub fn leads(table: &Table) -> Vec<String> {
+    let one = |lead: &Lead| {
+        let way = if lead.percent < 0.0 { "above" } else { "below" };
+        // From the smaller size to the larger, in the direction that is told.
+        let sign = if lead.percent < 0.0 { -1.0 } else { 1.0 };
+        let interval = lead.percent_ci95.map_or_else(String::new, |[low, high]| {
+            let ends = if sign < 0.0 { [-high, -low] } else { [low, high] };
+            format!(" [{:.0}, {:.0}]", ends[0], ends[1])
+        });
+        format!("{:.0} %{interval} {way} {}", lead.percent.abs(), lead.over_name)
+    };
+    table.leads.iter().map(one).collect()
 }
 
 /// A table as Markdown, the paper's rows below it.
@@ -101,13 +121,17 @@ pub fn markdown(finished: &Finished, table: &Table) -> String {
     if !notes.is_empty() {
         let _ = write!(text, "\n{notes}");
     }
+    let leads: String = leads(table).iter().map(|lead| format!("- {lead}\n")).collect();
+    if !leads.is_empty() {
+        let _ = write!(text, "\n{LEADS}:\n\n{leads}");
+    }
     if table.rows.iter().any(|row| row.paper.is_some()) {
         text += "\nAs the paper prints it:\n\n";
         text += &line(&head);
         text += &line(&rule);
         for row in &table.rows {
             if let Some(paper) = row.paper {
-                let figures = paper.iter().map(|value| format!("{value:.DECIMALS$}"));
+                let figures = paper.map(|value| cell(Some(value)));
                 text += &line(&[row.title()].into_iter().chain(figures).collect::<Vec<_>>());
             }
         }
@@ -124,7 +148,7 @@ fn csv(table: &Table) -> String {
     for row in &table.rows {
         let figures = (0..7).flat_map(|column| {
             let cell = row.cells[column];
-            [cell.map(|cell| cell.mean), cell.and_then(|cell| cell.deviation), row.paper.map(|paper| paper[column])]
+            [cell.map(|cell| cell.mean), cell.and_then(|cell| cell.deviation), row.paper.map(|paper| paper[column].mean)]
         });
         let figures: Vec<String> = figures.map(number).collect();
         let _ = writeln!(text, "{},{},{},{},{}", row.method, quoted(&row.name), row.measure, row.seeds, figures.join(","));
@@ -215,19 +239,33 @@ mod tests {
             seeds: 1,
             planned: 2,
             competes,
-            paper: Some([1.0; 7]),
+            paper: Some([Cell { mean: 1.0, deviation: None }; 7]),
         }
     }
 
     #[test]
     fn the_lowest_that_competes_is_the_best_and_ties_share_it() {
         let rows = vec![row("a", 0.501, true), row("b", 0.499, true), row("c", 0.4, false), row("d, e", 0.6, true)];
-        let table = Table { id: "t".into(), title: "t".into(), rows };
+        let table = Table { id: "t".into(), title: "t".into(), rows, leads: Vec::new() };
         let best: Vec<bool> = table.rows.iter().map(|row| is_best(&table, row, 3)).collect();
         assert_eq!(best, [true, true, false, false], "0.501 and 0.499 print alike");
         assert_eq!(row_name(&table.rows[0]), "a (1 of 2 seeds)");
         let csv = csv(&table);
         assert!(csv.lines().all(|line| line.matches(',').count() == 24 + usize::from(line.contains("\"d, e\""))), "{csv}");
+    }
+
+    #[test]
+    fn a_lead_is_told_in_the_direction_in_which_it_is() {
+        let lead = |percent: f64, ends: [f64; 2]| Lead {
+            of: "phyture".into(),
+            over: "ridge".into(),
+            over_name: "Ridge".into(),
+            percent,
+            percent_ci95: Some(ends),
+        };
+        let told = vec![lead(42.0, [35.2, 48.0]), lead(-80.0, [-95.0, -64.0])];
+        let table = Table { id: "t".into(), title: "t".into(), rows: Vec::new(), leads: told };
+        assert_eq!(leads(&table), ["42 % [35, 48] below Ridge", "80 % [64, 95] above Ridge"]);
     }
 
     #[test]

@@ -7,11 +7,14 @@ use crate::critique::ChannelValues;
 use crate::critique::digits::{DIGITS, significant};
 use crate::flight::{Channel, Column};
 use crate::protocol::table::{self, Finished, TableRow};
-use crate::protocol::text::{basis, cell, is_best, row_name};
-use crate::protocol::{Method, Segment};
+use crate::protocol::text::{self, basis, cell, is_best, row_name};
+use crate::protocol::{Method, Outcome, Segment};
 
 /// Methods whose lines are drawn; the first is in focus.
 const SHOWN: [&str; 4] = ["phyture", "phyture_amended", "cnn_lstm", "physical_baseline"];
+
+/// Networks whose losses are drawn: more lines cannot be told apart.
+const MOST_CURVES: usize = 6;
 
 /// A method's errors on one part of the flights.
 type Errors = Vec<(&'static Method, ChannelValues)>;
@@ -29,6 +32,7 @@ pub fn benchmark_page(finished: &Finished) -> Page {
         let parts = vec![Part::Figure(segments_figure(finished, name))];
         sections.push(Section { title: "Error on each segment of the test flights".into(), parts });
     }
+    sections.extend(trainings(finished));
     sections.extend(traces(finished));
     Page { title: format!("Every method on {}", finished.plan.data), summary: basis(finished), first: Vec::new(), sections }
 }
@@ -57,8 +61,10 @@ fn table_parts(table: &table::Table) -> Vec<Part> {
         rows: table.rows.iter().map(figures).collect(),
     })];
     parts.extend(table.notes().into_iter().map(Part::Text));
+    let leads = text::leads(table);
+    parts.extend((!leads.is_empty()).then(|| Part::Text(format!("{}: {}.", text::LEADS, leads.join("; ")))));
     let printed = table.rows.iter().filter_map(|row| {
-        let figures = row.paper?.map(|value| Cell::from(format!("{value:.2}")));
+        let figures = row.paper?.map(|value| Cell::from(cell(Some(value))));
         Some([Cell::from(row.title())].into_iter().chain(figures).collect())
     });
     let printed: Vec<Vec<Cell>> = printed.collect();
@@ -114,6 +120,48 @@ fn segments_figure(finished: &Finished, part: impl Fn(&Segment) -> String) -> fi
     let panels: Vec<(String, String)> = channels().collect();
     let caption = "RMSE of each method on each segment, in the order of the file figure6.csv, which has those of all methods; mean over seeds.";
     figures::log_lines("RMSE by test segment", caption, "segment", &panels, &lines)
+}
+
+/// Losses of each network over its epochs.
+fn trainings(finished: &Finished) -> Option<Section> {
+    let mut trained = finished.trained();
+    trained.sort_by_key(|(method, _)| rank(method));
+    let row = |(method, outcomes): &(&'static Method, Vec<&Outcome>)| {
+        let joined = |of: &dyn Fn(&Outcome) -> String| outcomes.iter().map(|outcome| of(outcome)).collect::<Vec<_>>().join(", ");
+        vec![
+            Cell::from(method.name.to_owned()),
+            Cell::from(joined(&|outcome| outcome.peak_rate.map_or_else(|| "the plan's".into(), |rate| rate.to_string()))),
+            Cell::from(joined(&|outcome| format!("{} of {}", outcome.epoch, outcome.curve.len()))),
+            Cell::from(joined(&|outcome| {
+                let kept = outcome.epoch.checked_sub(1).and_then(|epoch| outcome.curve.get(epoch)?.validation);
+                kept.map_or_else(|| "–".into(), |loss| significant(loss, DIGITS))
+            })),
+        ]
+    };
+    let columns = ["network", "learning rate, by seed", "epoch kept", "validation loss there"];
+    let table = Table {
+        caption: "What each network was trained with, seed by seed".into(),
+        columns: columns.map(|name| (name.to_owned(), String::new())).into(),
+        rows: trained.iter().map(row).collect(),
+    };
+    let line = |(method, outcomes): &(&'static Method, Vec<&Outcome>)| {
+        let curve = &outcomes.first()?.curve;
+        let validation = curve.iter().map(|epoch| epoch.validation.unwrap_or(f64::NAN)).collect();
+        Some(LineData {
+            name: method.name.into(),
+            x: (1..=curve.len()).map(|epoch| epoch as f64).collect(),
+            y: vec![curve.iter().map(|epoch| epoch.training).collect(), validation],
+        })
+    };
+    let lines: Vec<LineData> = trained.iter().filter_map(line).filter(|line| line.x.len() > 1).take(MOST_CURVES).collect();
+    let mut parts = vec![Part::Table(table)];
+    if !lines.is_empty() {
+        let panels =
+            ["training loss", "validation loss"].map(|name| (name.to_owned(), "Σ of squares over the channels".to_owned()));
+        let caption = "Mean over the windows of each epoch, dropout on in training; the first seed of each network.";
+        parts.push(Part::Figure(figures::log_lines("Losses by epoch", caption, "epoch", &panels, &lines)));
+    }
+    (!trained.is_empty()).then(|| Section { title: "How the networks were trained".into(), parts })
 }
 
 /// Figures 7 and 8.

@@ -12,6 +12,7 @@ pub mod figures;
 mod names;
 pub mod page;
 pub mod rollout;
+pub mod training;
 
 #[cfg(feature = "protocol")]
 pub use benchmark::benchmark_page;
@@ -20,3 +21,4 @@ pub use diagnose::{DiagnoseReport, diagnose_page};
 pub use figures::Figure;
 pub use page::{Cell, DATA_NOTE, Map, MapCell, Page, Part, Section, Table, page};
 pub use rollout::rollout_page;
+pub use training::{TrainingReport, training_page};

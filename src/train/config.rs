@@ -33,7 +33,7 @@ pub struct TrainConfig {
     pub batch: usize,
     /// Peak learning rate. Default 1e-3 (paper section 4.2).
     pub peak_rate: f64,
-    /// Epochs of warm-up; at most a tenth of all are taken. Default 10 (paper section 4.2).
+    /// Epochs of warm-up; at most a tenth of all where there are ten or fewer, or no more than these. Default 10 (paper section 4.2).
     pub warmup_epochs: usize,
     /// Samples between training windows, at most 1 000 000. Default 50.
     pub stride: usize,
@@ -45,6 +45,9 @@ pub struct TrainConfig {
     /// Every so many-th 10-s block of the training part is kept from the network to measure how far its predictions stray, where neither a gate
     /// nor the split keeps any; 0 keeps none, and then there are no intervals. Default 0; 8 in [`TrainConfig::in_minutes`].
     pub interval_every: usize,
+    /// Whether the weights of the epoch with the smallest loss on the validation part are kept instead of the last epoch's. Default off, as in the
+    /// paper.
+    pub keep_best: bool,
     /// Seed of initial weights, order and dropout. Default 0.
     pub seed: u64,
     /// Seconds between checkpoints, at most a day. Default 30.
@@ -65,6 +68,7 @@ impl Default for TrainConfig {
             standardise_loss: false,
             gate_every: 0,
             interval_every: 0,
+            keep_best: false,
             seed: 0,
             checkpoint_s: 30.0,
         }
@@ -83,7 +87,7 @@ impl TrainConfig {
     /// window every 12 samples.
     pub fn in_minutes() -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        Self { network: network.into(), epochs: 20, stride: 12, interval_every: 8, ..Self::default() }
+        Self { network: network.into(), epochs: 20, warmup_epochs: 2, stride: 12, interval_every: 8, ..Self::default() }
     }
 
     /// Checks every field against its range, and that no input is a target or made of one.

@@ -19,8 +19,8 @@ use std::path::Path;
 
 const MAGIC: [u8; 8] = *b"PHYTURE\n";
 
-/// Version written and read. 2: a convolution's weight lies as `[taps, in, out]`.
-pub const VERSION: u32 = 2;
+/// Version written and read. 2: a convolution's weight lies as `[taps, in, out]`. 3: a state holds the losses of its epochs and the best one.
+pub const VERSION: u32 = 3;
 
 fn codec(limit: u64) -> impl Options {
     bincode::DefaultOptions::new().with_fixint_encoding().reject_trailing_bytes().with_limit(limit)

@@ -142,7 +142,7 @@ impl RunFolder {
                 }
             };
             let ends_epoch = step.step.is_multiple_of(trainer.steps_an_epoch() as u64);
-            let validation_loss = if ends_epoch { trainer.validation_loss()? } else { None };
+            let validation_loss = if ends_epoch { trainer.end_epoch()? } else { None };
             metrics.line(&step, validation_loss, begun.elapsed().as_secs_f64())?;
             let stop = !go_on(&Report { step, steps: trainer.steps(), validation_loss });
             if stop || saved.elapsed().as_secs_f64() >= config.checkpoint_s {

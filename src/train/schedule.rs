@@ -5,9 +5,10 @@ pub const WARMUP_EPOCHS: usize = 10;
 
 /// Learning rate as a function of the step, over a fixed number of epochs.
 ///
-/// With N steps an epoch, E epochs and W = min(`warmup_epochs`, ⌈E/10⌉) of warm-up, for s = 0, 1, …:
+/// With N steps an epoch, E epochs and W epochs of warm-up, for s = 0, 1, …:
 /// s < W·N: rate = peak·(s+1)/(W·N); otherwise rate = ½·peak·(1 + cos(π·(s−W·N)/((E−W)·N))).
-/// The paper warms up for 10 epochs of an unstated number; short runs scale the warm-up so that it never eats the training.
+/// W = `warmup_epochs`, but at most ⌈E/10⌉ where E is 10 or less or no more than `warmup_epochs`: the paper warms up for 10 epochs of an unstated
+/// number, and nothing would be left of so short a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Schedule {
     peak: f64,
@@ -18,7 +19,8 @@ pub struct Schedule {
 impl Schedule {
     /// A schedule of `epochs` epochs of `steps_an_epoch` steps, both at least 1.
     pub fn new(peak: f64, warmup_epochs: usize, epochs: usize, steps_an_epoch: usize) -> Self {
-        let warmup = warmup_epochs.min(epochs.div_ceil(10));
+        let is_short = epochs <= WARMUP_EPOCHS.max(warmup_epochs);
+        let warmup = if is_short { warmup_epochs.min(epochs.div_ceil(10)) } else { warmup_epochs };
         Self { peak, warmup_steps: warmup * steps_an_epoch, steps: epochs * steps_an_epoch }
     }
 
@@ -48,9 +50,14 @@ mod tests {
     }
 
     #[test]
-    fn a_short_run_warms_up_for_a_tenth_of_it() {
-        let schedule = Schedule::new(1.0, WARMUP_EPOCHS, 5, 10);
-        assert!((schedule.rate(9) - 1.0).abs() < 1e-15);
-        assert!(schedule.rate(49) > 0.0 && schedule.rate(49) < 0.01);
+    fn a_run_of_ten_epochs_and_fewer_warms_up_for_a_tenth_of_it_and_a_longer_one_for_ten() {
+        for (epochs, warm) in [(1, 1), (5, 1), (10, 1), (11, 10), (20, 10), (100, 10)] {
+            let schedule = Schedule::new(1.0, WARMUP_EPOCHS, epochs, 10);
+            assert!((schedule.rate(10 * warm - 1) - 1.0).abs() < 1e-15, "{epochs}");
+            assert!((schedule.rate(0) - 0.1 / warm as f64).abs() < 1e-15, "{epochs}");
+            let last = schedule.rate(10 * epochs - 1);
+            assert!(epochs == 1 || last > 0.0 && last < 0.03, "{epochs}: {last}");
+        }
+        assert!((Schedule::new(1.0, 0, 5, 10).rate(0) - 1.0).abs() < 1e-15, "none at all");
     }
 }

@@ -15,18 +15,19 @@ const KIND: &str = "kind";
 const PHYTURE: &str = "phyture";
 
 /// Comments of the fields, in the order in which they are written.
-const FIELDS: [(&str, &str); 12] = [
+const FIELDS: [(&str, &str); 13] = [
     ("epochs", "Passes over the training windows; the paper does not state its number."),
     ("batch", "Windows a step."),
     ("stride", "Samples between training windows."),
     ("peak_rate", "Peak learning rate."),
-    ("warmup_epochs", "Epochs of linear warm-up; at most a tenth of all are taken. Half a cosine follows."),
+    ("warmup_epochs", "Epochs of linear warm-up; at most a tenth of all where there are ten or fewer. Half a cosine follows."),
     ("standardise_loss", "Divide each channel's error by its standard deviation in the loss."),
     ("gate_every", "Keep every so many-th 10-s block from the network to fit a gate on, a factor a channel; 0: no gate."),
     (
         "interval_every",
         "Keep every so many-th 10-s block from the network for its intervals, where neither gate nor split keeps any; 0: no intervals.",
     ),
+    ("keep_best", "Keep the weights of the epoch with the smallest loss on the validation part, not the last epoch's."),
     ("seed", "Seed of initial weights, order and dropout; --seed goes before it."),
     ("checkpoint_s", "Seconds between checkpoints."),
     ("inputs", "What the network sees, as formulas of the log's columns; as many as network.state_channels. No acceleration."),

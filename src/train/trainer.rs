@@ -22,6 +22,32 @@ pub struct State {
     pub first_moment: Vec<f32>,
     /// Adam's v.
     pub second_moment: Vec<f32>,
+    /// Σ of the losses of the steps of the epoch under way.
+    pub loss_sum: f64,
+    /// Losses of the epochs that have ended.
+    pub curve: Vec<EpochLoss>,
+    /// The epoch with the smallest validation loss so far, where it is to be kept.
+    pub best: Option<Best>,
+}
+
+/// Losses of an epoch, in the unit of [`StepReport::loss`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpochLoss {
+    /// Mean over its steps, dropout on, while the weights moved.
+    pub training: f64,
+    /// Of its last weights on the validation windows, without dropout; none if there are none.
+    pub validation: Option<f64>,
+}
+
+/// The weights of an epoch.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Best {
+    /// Epoch, from 0.
+    pub epoch: usize,
+    /// Loss on the validation windows.
+    pub loss: f64,
+    /// θ, flat.
+    pub parameters: Vec<f32>,
 }
 
 /// What one step did.
@@ -91,8 +117,12 @@ impl<'a> Trainer<'a> {
             parameters: network.initial(config.seed),
             first_moment: vec![0.0; count],
             second_moment: vec![0.0; count],
+            loss_sum: 0.0,
+            curve: Vec::new(),
+            best: None,
         });
-        if [&state.parameters, &state.first_moment, &state.second_moment].iter().any(|slab| slab.len() != count) {
+        let kept = state.best.as_ref().map_or(&state.parameters, |best| &best.parameters);
+        if [kept, &state.parameters, &state.first_moment, &state.second_moment].iter().any(|slab| slab.len() != count) {
             let message = format!("holds {} parameters, and the network of this configuration has {count}", state.parameters.len());
             return Err(Error::File { path: "checkpoint".into(), message });
         }
@@ -134,6 +164,33 @@ impl<'a> Trainer<'a> {
     /// What has been learned so far.
     pub fn state(&self) -> &State {
         &self.state
+    }
+
+    /// Ends an epoch after its last step: notes its losses, and its weights where they are the best so far and to be kept. Gives the loss on the
+    /// validation windows; `None` if there are none.
+    ///
+    /// # Errors
+    /// As [`Trainer::training_loss`].
+    pub fn end_epoch(&mut self) -> Result<Option<f64>> {
+        let validation = self.validation_loss()?;
+        let keep = self.config.keep_best;
+        let steps = self.steps_an_epoch() as f64;
+        let state = &mut self.state;
+        let epoch = state.curve.len();
+        state.curve.push(EpochLoss { training: state.loss_sum / steps, validation });
+        state.loss_sum = 0.0;
+        let is_best = |loss: &f64| keep && state.best.as_ref().is_none_or(|best| *loss < best.loss);
+        if let Some(loss) = validation.filter(is_best) {
+            state.best = Some(Best { epoch, loss, parameters: state.parameters.clone() });
+        }
+        Ok(validation)
+    }
+
+    /// Goes back to the weights of the best epoch at the end of a run, where they were kept.
+    pub fn take_best(&mut self) {
+        if let Some(best) = &self.state.best {
+            self.state.parameters.clone_from(&best.parameters);
+        }
     }
 
     /// Mean loss of the present weights on the training windows, without dropout; the unit is that of [`StepReport::loss`].
@@ -207,6 +264,7 @@ impl<'a> Trainer<'a> {
         self.session.adam(&adam, done + 1, parameters, first_moment, second_moment)?;
         self.session.settle(parameters);
         self.state.step += 1;
+        self.state.loss_sum += loss;
         Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
     }
 }

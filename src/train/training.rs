@@ -1,8 +1,8 @@
 //! One training run, from flights and a calibrated model to a hybrid, whoever asked for it: with checkpoints, stopped and gone on with as the
 //! caller wants. What trains step by step is the trainer.
 
-use super::{Job, Outcome, Report, RunFolder, State, TrainConfig, Trainer};
-use crate::error::Result;
+use super::{EpochLoss, Job, Outcome, Report, RunFolder, State, TrainConfig, Trainer};
+use crate::error::{Error, Result};
 use crate::flight::Flight;
 use crate::flight::split::Split;
 use crate::hybrid::Hybrid;
@@ -72,6 +72,10 @@ pub struct Trained {
     pub gate_windows: usize,
     /// If they were asked for.
     pub losses: Option<Losses>,
+    /// Losses of each epoch.
+    pub curve: Vec<EpochLoss>,
+    /// The epoch whose weights these are, from 0.
+    pub epoch: usize,
 }
 
 /// How a run ended.
@@ -91,13 +95,23 @@ impl Training<'_> {
     /// Trains from the beginning, or from where `state` was left. `observe` hears what happens, and says after each step whether to go on.
     ///
     /// # Errors
-    /// As [`Job::new`], [`Trainer::new`], [`RunFolder::train`]; those of `observe`.
+    /// As [`Job::new`], [`Trainer::new`], [`RunFolder::train`]; those of `observe`; [`Error::Config`] if the best epoch is to be kept and nothing
+    /// validates.
     pub fn run(&self, state: Option<State>, observe: &mut dyn FnMut(Event<'_>) -> Result<bool>) -> Result<Ended> {
         let Self { flights, split, model, config, data, folder, with_losses, threads } = *self;
         let mut job = Job::new(flights, split, model, config)?;
+        if config.keep_best && job.validation.is_empty() {
+            return Err(Error::Config {
+                place: "training configuration".into(),
+                field: "keep_best".into(),
+                found: "true".into(),
+                expected: "false: this division has no validation part to judge an epoch on, and the split `segments` has one"
+                    .into(),
+            });
+        }
         let network = job.description.network(config.standardise_loss)?;
         let mut trainer = Trainer::new(config, &network, &job.sequences, &job.windows, state, threads)?;
-        if with_losses {
+        if with_losses || config.keep_best {
             trainer = trainer.with_validation(&job.validation);
         }
         let begun = Begun {
@@ -122,17 +136,20 @@ impl Training<'_> {
         if outcome == Outcome::Stopped {
             return Ok(Ended::Stopped { done: trainer.state().step, steps: begun.steps });
         }
+        trainer.take_best();
         let losses = match with_losses {
             true => Some(Losses { training: trainer.training_loss()?, validation: trainer.validation_loss()? }),
             false => None,
         };
-        let (gate_windows, parameters) = (job.gate_windows.len(), trainer.state().parameters.clone());
+        let State { parameters, curve, best, .. } = trainer.state().clone();
+        let epoch = best.map_or(curve.len().saturating_sub(1), |best| best.epoch);
+        let gate_windows = job.gate_windows.len();
         drop(trainer);
         let interval_windows = std::mem::take(&mut job.interval_windows);
         let mut hybrid = job.hybrid(flights, parameters, threads)?;
         if with_losses {
             hybrid.set_intervals(flights, &split.training, &interval_windows, threads)?;
         }
-        Ok(Ended::Trained(Box::new(Trained { hybrid, begun, gate_windows, losses })))
+        Ok(Ended::Trained(Box::new(Trained { hybrid, begun, gate_windows, losses, curve, epoch })))
     }
 }

@@ -6,7 +6,7 @@ use crate::flight::DataSet;
 use crate::flight::split::Split;
 use crate::hybrid::Hybrid;
 use crate::physics::Model;
-use crate::train::{Ended, Event, Report, Trained, Training};
+use crate::train::{Ended, EpochLoss, Event, Report, Trained, Training};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::PathBuf;
@@ -80,6 +80,10 @@ pub struct TrainedNetwork {
     pub validation_windows: usize,
     /// Mean over the steps of the last epoch, dropout on; none if a finished run was gone on with.
     pub last_epoch_loss: Option<f64>,
+    /// Losses of each epoch, the first one first.
+    pub curve: Vec<EpochLoss>,
+    /// The epoch whose weights these are, from 1: the last one, or the best where that is to be kept.
+    pub epoch: usize,
     /// Time that it took, s.
     pub seconds: f64,
 }
@@ -118,7 +122,7 @@ pub fn train(training: &Training<'_>, resume: bool, observe: &mut dyn FnMut(Even
         }
         Ok(goes_on)
     })?;
-    let Trained { hybrid, begun: did, gate_windows, losses } = match ended {
+    let Trained { hybrid, begun: did, gate_windows, losses, curve, epoch: of_epoch } = match ended {
         Ended::Trained(trained) => *trained,
         Ended::Stopped { done, steps } => {
             let saved = format!("saved after step {done} of {steps} in {}; go on with --resume", folder.checkpoint().display());
@@ -136,6 +140,8 @@ pub fn train(training: &Training<'_>, resume: bool, observe: &mut dyn FnMut(Even
         validation_loss: losses.validation,
         validation_windows: did.validation_windows,
         last_epoch_loss: epoch.loss(),
+        curve,
+        epoch: of_epoch + 1,
         seconds: begun.elapsed().as_secs_f64(),
     };
     Ok(Run { hybrid, gate_windows, network })

@@ -65,7 +65,7 @@ pub struct Division {
     /// Manoeuvre class or flight that is never trained on; repeatable; adds to `locked` of the model file
     #[arg(long, value_name = "NAME")]
     pub lock: Vec<String>,
-    /// Without locked flights: `segments` (random 10-s segments, 70/20/10) or `first SHARE` [default: the model file's, or segments]
+    /// Without locked flights: `segments` (random 10-s segments, 70/20/10), `stretches` (of 30 s) or `first SHARE` [default: the model file's, or segments]
     #[arg(long)]
     pub split: Option<Protocol>,
 }

@@ -22,6 +22,13 @@ pub(super) struct Found {
 }
 
 impl Found {
+    /// What it takes by itself from a channel's mean squared error, of which `left` remains: from what was there when it was found, or, where all are
+    /// judged at once, from what is there without it.
+    pub(super) fn took(&self, channel: Channel, left: f64) -> f64 {
+        let fall = self.step.held_out_mse_fall.get(channel.name()).copied().unwrap_or(0.0);
+        self.removed[channel].max(left * fall / (1.0 - fall))
+    }
+
     /// Effects that lose nearly all of their gain beside this one, while this one would lose nearly all of its beside them, cannot be
     /// told from it. `scored` are gains beside it, `earlier` those of the effects that passed when it was chosen.
     pub(super) fn shadows(&mut self, scored: &[Scored<'_>], earlier: &BTreeMap<String, f64>) {

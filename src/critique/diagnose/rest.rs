@@ -42,24 +42,30 @@ fn least(unknown: &Unknown) -> f64 {
     if of_loop.contains(&first) { LEAST_OF_LOOP } else { 0.0 }
 }
 
-/// Whether an effect may only stand in for a dependence: `removed` and `left` are the mean squared errors of each channel that the
-/// effects accepted there took away and that remain. Where the effect reads the very variable, the dependence need be only half as
-/// large as what was removed. An effect that is worth while in another channel as well is not one.
-pub(super) fn stands_in(
-    effect: &Effect,
-    channels: &[Channel],
-    removed: &PerChannel<f64>,
-    left: &PerChannel<f64>,
-    unknown: &[Unknown],
-) -> bool {
+/// What an effect took from a channel's mean squared error, and what is left there.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Share {
+    /// Taken by all effects that were accepted.
+    pub by_all: f64,
+    /// Taken by this effect beside them.
+    pub by_itself: f64,
+    /// Left with all of them.
+    pub left: f64,
+}
+
+/// Whether an effect may only stand in for a dependence: more of the error depends so than the accepted effects took away. Where the effect reads the
+/// very variable, the dependence need be only half as large, or larger than what this effect took by itself: beside strong effects the
+/// sum says nothing of a weak one. An effect that is worth while in another channel as well is not one.
+pub(super) fn stands_in(effect: &Effect, channels: &[Channel], shares: &PerChannel<Share>, unknown: &[Unknown]) -> bool {
     channels.iter().all(|&channel| {
         unknown.iter().filter(|unknown| unknown.channel == channel.name()).any(|unknown| {
             let variable = unknown.depends_on.first().map_or("", |first| first.variable.as_str());
             let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
             let mut formulas = terms.chain(effect.swaps.iter().map(|swap| &swap.with));
             let reads = formulas.any(|formula| formula.names().iter().any(|name| related(name, variable)));
-            let bar = if reads { 0.5 } else { 1.0 };
-            unknown.r2 * left[channel] > bar * removed[channel]
+            let Share { by_all, by_itself, left } = shares[channel];
+            let bar = if reads { by_itself.min(0.5 * by_all) } else { by_all };
+            unknown.r2 * left > bar
         })
     })
 }
@@ -90,5 +96,36 @@ pub(super) fn channel(unknown: &Unknown, tried: Option<TriedFormula>) -> Unknown
         suggested_formula: stands.map(|tried| tried.formula.clone()),
         suggested_coefficient: stands.map(|tried| tried.coefficient),
         tried,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::critique::unknown::Dependence;
+    use crate::physics::catalogue;
+
+    fn stands(kind: &str, variable: &str, share: Share) -> bool {
+        let effect = catalogue::definition(kind).expect("in the catalogue").effect(4.58, 0.8);
+        let unknown = Unknown {
+            channel: "vz_dot",
+            r2: 0.5,
+            r2_with_feedback: 0.5,
+            null_r2_95: 0.1,
+            depends_on: vec![Dependence { variable: variable.into(), share: 1.0 }],
+            suggested_formula: None,
+            skeleton: String::new(),
+        };
+        stands_in(&effect, &[Channel::VzDot], &PerChannel::splat(share), &[unknown])
+    }
+
+    #[test]
+    fn a_straight_line_in_the_variable_of_a_curve_stands_in_for_it_whatever_other_effects_removed() {
+        let weak = Share { by_all: 20.0, by_itself: 0.4, left: 1.0 };
+        assert!(stands("vel_cross", "vy", weak));
+        assert!(!stands("vel_cross", "height", weak), "it reads no height");
+        assert!(!stands("vel_cross", "vy", Share { by_itself: 0.6, ..weak }), "it does more than is left");
+        assert!(stands("vel_cross", "vy", Share { by_all: 0.9, by_itself: 0.6, left: 1.0 }));
+        assert!(stands("vel_cross", "height", Share { by_all: 0.4, by_itself: 0.4, left: 1.0 }));
     }
 }

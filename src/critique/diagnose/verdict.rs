@@ -14,7 +14,7 @@ use super::gates::{
 use super::gram::blocks;
 use super::own::prediction_errors;
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
-use super::rest::{channel, dependences, stands_in};
+use super::rest::{Share, channel, dependences, stands_in};
 use super::search::{Options, Search};
 use super::significance::Flips;
 use super::signs::wrong_signs;
@@ -271,10 +271,14 @@ impl Search<'_> {
             bare = self.engine.pass(&bare, &[])?.base.model;
         }
         let [whole, left] = [mse(&bare)?, mse(&last.model)?];
-        let removed: PerChannel<f64> = PerChannel::from_fn(|channel| whole[channel] - left[channel]);
         let is_one = |found: &&Found| {
+            let shares = PerChannel::from_fn(|channel| Share {
+                by_all: whole[channel] - left[channel],
+                by_itself: found.took(channel, left[channel]),
+                left: left[channel],
+            });
             let effect = found.model.effect(&found.step.effect);
-            effect.is_some_and(|effect| stands_in(effect, &found.channels, &removed, &left, unknown))
+            effect.is_some_and(|effect| stands_in(effect, &found.channels, &shares, unknown))
         };
         Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
     }
@@ -332,7 +336,7 @@ mod tests {
         let options = Options::default();
         let search = Search { flips: Flips::new(engine.blocks.len(), 1), engine, largest_p: 0.05, options: &options };
         let found = [Found {
-            step: Step { effect: "stick".into(), ..Step::default() },
+            step: Step { effect: "stick".into(), held_out_mse_fall: [("vx_dot".into(), 0.99)].into(), ..Step::default() },
             gain: 1.0,
             model: before.clone(),
             channels: vec![Channel::VxDot],

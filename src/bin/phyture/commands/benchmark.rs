@@ -1,16 +1,17 @@
 //! `benchmark`: the runs of the paper's tables, and the tables of finished runs.
 
+use super::explainable;
 use crate::arguments::{Data, count};
 use crate::context::{Context, data_sha256, interruption};
 use crate::output::Progress;
 use crate::pages::write_page;
 use phyture::disk::{Existing, Target};
 use phyture::flight::DataSet;
-use phyture::flight::split::{Split, class_folds};
-use phyture::flight::windows::windows;
+use phyture::flight::split::{Protocol, class_folds};
 use phyture::physics::Model;
 use phyture::protocol::{
-    Division, Experiment, Finished, Folder, JobArray, Plan, Run, Settings, TableId, estimate, instruction_set, method, text,
+    Division, Experiment, Extent, Finished, Folder, JobArray, Plan, Run, Settings, TableId, Treatment, estimate, instruction_set,
+    method, text,
 };
 use phyture::report::benchmark_page;
 use phyture::train::TrainConfig;
@@ -53,7 +54,7 @@ const MOST_SHARDS: usize = 10_000;
 #[command(
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
-    after_help = "Examples:\n  phyture benchmark flights -o bench --plan hour --table 1\n  phyture benchmark flights -o bench --plan hour --table 1 --resume   # after a kill\n  phyture benchmark flights -o bench --shard 2/8                       # one part of eight\n  phyture benchmark flights -o bench --emit slurm --shards 20 > array.sh\n  phyture benchmark collect bench"
+    after_help = "Examples:\n  phyture benchmark flights -o bench --plan hour --table 1\n  phyture benchmark flights -o bench --plan hour --table 1 --resume   # after a kill\n  phyture benchmark flights -o bench --plan question --estimate\n  phyture benchmark flights -o bench --shard 2/8                       # one part of eight\n  phyture benchmark flights -o bench --emit slurm --shards 20 > array.sh\n  phyture benchmark collect bench"
 )]
 pub struct Args {
     /// Finished runs to tables.
@@ -68,7 +69,7 @@ pub struct Args {
     /// Folder of the benchmark
     #[arg(short, long, required = true)]
     pub output: Option<PathBuf>,
-    /// Table of the paper, 1 to 6, or `robustness`; repeatable [default: all]
+    /// Table of the paper, 1 to 6, `robustness` or `noise`; repeatable [default: all]
     #[arg(long, value_name = "TABLE")]
     pub table: Vec<TableId>,
     /// Row of the tables by identifier, such as `timesnet`; repeatable [default: all]
@@ -77,9 +78,20 @@ pub struct Args {
     /// Seeds of each network, at most 1000 [default: the plan's]
     #[arg(long, allow_negative_numbers = true, value_parser = count(1..=Settings::MOST_SEEDS))]
     pub seeds: Option<usize>,
-    /// Budget: the paper's (days), an hour's for table 1, or one that only shows that it works
+    /// Budget: the paper's (months on two cores), `question` (a history of 1.28 s trained to the end, some ten hours), an hour's for table 1, or one
+    /// that only shows that it works
     #[arg(long, value_enum, default_value_t = Plans::Paper)]
     pub plan: Plans,
+    /// How flights are divided where none is locked: `segments`, `stretches` or `first SHARE` [default: the model file's; stretches in the plan
+    /// `question`]
+    #[arg(long)]
+    pub split: Option<Protocol>,
+    /// The explainable part of simulated flights, as `simulate --explainable` writes it: adds the row of the floor
+    #[arg(long, value_name = "DIR")]
+    pub explainable: Option<PathBuf>,
+    /// Run nothing; say what there is to do and how long it would take here
+    #[arg(long)]
+    pub estimate: bool,
     /// Training configuration (TOML) in place of the plan's: sizes of Phy-Ture, inputs, epochs, strides
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -114,6 +126,8 @@ pub enum Action {
 pub enum Plans {
     /// The paper's sizes, 100 epochs, 10 seeds.
     Paper,
+    /// 1.28 s of history, the paper's width, 20 epochs of dense windows, 3 seeds, learning rate and epoch chosen on the validation part.
+    Question,
     /// Table 1 in an hour on two cores.
     Hour,
     /// A few minutes; the figures mean nothing.
@@ -148,9 +162,15 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
 /// Makes the runs that are not done yet.
 fn make(context: &Context, data: &Data, output: &Path, wanted: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
-    let (settings, model) = (settings(context, wanted)?, context.model(wanted.model.as_deref(), data)?);
+    let (settings, mut model) = (settings(context, wanted)?, context.model(wanted.model.as_deref(), data)?);
+    let of_plan = (wanted.plan == Plans::Question).then_some(Protocol::Stretches);
+    model.data.split = wanted.split.clone().or(of_plan).unwrap_or(model.data.split);
     let set = context.flights(data, settings.phyture()?.history)?;
-    let plan = plan(&set, data, settings, &model, wanted)?;
+    let explainable = wanted.explainable.as_deref().map(|folder| explainable::read_set(data, folder)).transpose()?;
+    let plan = plan(&set, explainable.as_ref(), data, settings, &model, wanted)?;
+    if wanted.estimate {
+        return estimate_only(context, &plan, &set, &model);
+    }
     let folder = Folder::create(output)?;
     open(&folder, &plan, wanted)?;
     context.say(format!("\n{}", plan.settings.budget(plan.step_s)));
@@ -177,7 +197,8 @@ fn make(context: &Context, data: &Data, output: &Path, wanted: &Args) -> Result<
         ));
     }
     let done_before = runs.len() - left.len();
-    let experiment = Experiment::new(&plan, &set.flights, &model, context.threads());
+    let mut experiment = Experiment::new(&plan, &set.flights, &model, context.threads(), folder.amended());
+    experiment.explainable = explainable.as_ref().map(|set| &set.flights[..]);
     let interrupted = interruption()?;
     Queue { context, folder: &folder, experiment: &experiment, left: &left }.work(&interrupted)?;
     context.say(format!(
@@ -194,6 +215,7 @@ fn make(context: &Context, data: &Data, output: &Path, wanted: &Args) -> Result<
 fn settings(context: &Context, wanted: &Args) -> Result<Settings> {
     let mut settings = match wanted.plan {
         Plans::Paper => Settings::paper(),
+        Plans::Question => Settings::question(),
         Plans::Hour => Settings::hour(),
         Plans::Quick => Settings::quick(),
     };
@@ -206,7 +228,25 @@ fn settings(context: &Context, wanted: &Args) -> Result<Settings> {
     Ok(settings)
 }
 
-fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &Args) -> Result<Plan> {
+/// Says what there is to do and how long it would take, and does nothing.
+fn estimate_only(context: &Context, plan: &Plan, set: &DataSet, model: &Model) -> Result<ExitCode> {
+    let runs = plan.runs()?;
+    let experiment = Experiment::new(plan, &set.flights, model, context.threads(), "");
+    let costs = costs(&experiment, &runs)?;
+    context.say(format!("\n{}", plan.settings.budget(plan.step_s)));
+    announce(context, &runs, &costs);
+    context.json(&json!({ "plan": plan, "runs": runs.len(), "estimated_seconds": costs.iter().sum::<f64>() }))?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn plan(
+    set: &DataSet,
+    explainable: Option<&DataSet>,
+    data: &Data,
+    settings: Settings,
+    model: &Model,
+    wanted: &Args,
+) -> Result<Plan> {
     let folds = class_folds(&set.manoeuvres(), settings.folds);
     let all = TableId::ALL.into_iter().filter(|table| wanted.table.is_empty() || wanted.table.contains(table));
     let possible = |table: &TableId| *table != TableId::Paper(3) || folds.len() > 1;
@@ -218,6 +258,7 @@ fn plan(set: &DataSet, data: &Data, settings: Settings, model: &Model, wanted: &
         data: data.data.display().to_string(),
         model: model.to_toml()?,
         step_s: set.flights.first().map_or(f64::NAN, |flight| flight.step_s),
+        explainable_sha256: explainable.map(data_sha256),
         tables: all.filter(possible).collect(),
         folds: if folds.len() > 1 { folds } else { Vec::new() },
         settings,
@@ -263,9 +304,9 @@ struct Queue<'a> {
 impl Queue<'_> {
     fn work(&self, interrupted: &AtomicBool) -> Result<()> {
         let plan = self.experiment.plan;
-        let costs = self.costs()?;
+        let costs = costs(self.experiment, self.left)?;
         let total: f64 = costs.iter().sum();
-        self.announce(&costs);
+        announce(self.context, self.left, &costs);
         // In milliseconds of the estimate.
         let mut progress = Progress::new("benchmark", (1e3 * total) as u64, 0);
         let mut behind = 0.0;
@@ -324,62 +365,54 @@ impl Queue<'_> {
         }
         Ok(())
     }
+}
 
-    /// What is to be done, by method, with the time that it will take.
-    fn announce(&self, costs: &[f64]) {
-        self.context.say(format!("{} runs to do, about {} on this machine", self.left.len(), duration(costs.iter().sum())));
-        let mut methods: Vec<(&str, Vec<f64>)> = Vec::new();
-        for (run, cost) in self.left.iter().zip(costs) {
-            match methods.iter_mut().find(|(id, _)| *id == run.method) {
-                Some((_, known)) => known.push(*cost),
-                None => methods.push((&run.method, vec![*cost])),
+/// What is to be done, by method, with the time that it will take.
+fn announce(context: &Context, left: &[Run], costs: &[f64]) {
+    context.say(format!("{} runs to do, about {} on this machine", left.len(), duration(costs.iter().sum())));
+    let mut methods: Vec<(&str, Vec<f64>)> = Vec::new();
+    for (run, cost) in left.iter().zip(costs) {
+        match methods.iter_mut().find(|(id, _)| *id == run.method) {
+            Some((_, known)) => known.push(*cost),
+            None => methods.push((&run.method, vec![*cost])),
+        }
+    }
+    for (id, costs) in methods {
+        let name = method(id).map_or(id, |method| method.name);
+        context.say(format!("{:>6} x {name}, {} in all", costs.len(), duration(costs.iter().sum())));
+    }
+}
+
+/// Seconds that each run will take, about.
+fn costs(experiment: &Experiment<'_>, left: &[Run]) -> Result<Vec<f64>> {
+    let plan = experiment.plan;
+    let mut window_s: BTreeMap<String, f64> = BTreeMap::new();
+    let mut extents: Vec<(Division, Treatment, Extent)> = Vec::new();
+    let mut costs = Vec::new();
+    for run in left {
+        if let (Some(config), None) = (plan.training(run)?, window_s.get(&run.method)) {
+            window_s.insert(run.method.clone(), estimate::window_s(&config, experiment.threads)?);
+        }
+        let known = extents.iter().find(|(division, treatment, _)| (*division, *treatment) == (run.division, run.treatment));
+        let extent = match known {
+            Some((.., extent)) => *extent,
+            None => {
+                let extent = experiment.extent(run)?;
+                extents.push((run.division, run.treatment, extent));
+                extent
             }
-        }
-        for (id, costs) in methods {
-            let name = method(id).map_or(id, |method| method.name);
-            self.context.say(format!("{:>6} x {name}, {} in all", costs.len(), duration(costs.iter().sum())));
-        }
+        };
+        costs.push(estimate::run_s(plan, run, window_s.get(&run.method).copied().unwrap_or(0.0), extent)?);
     }
-
-    /// Seconds that each run will take, about.
-    fn costs(&self) -> Result<Vec<f64>> {
-        let Experiment { plan, flights, model, threads, .. } = self.experiment;
-        let history = plan.settings.phyture()?.history;
-        let split = Split::new(flights, &model.data.locked, &model.data.split, plan.settings.split_seed)?;
-        let training = windows(&split.training, history, plan.settings.training.stride).len();
-        let flight_s: f64 = split.training.iter().map(|span| (span.end - span.start) as f64 * plan.step_s).sum();
-        let mut known: BTreeMap<String, f64> = BTreeMap::new();
-        let mut costs = Vec::new();
-        for run in self.left {
-            let window_s = match (plan.training(run)?, known.get(&run.method)) {
-                (Some(_), Some(seconds)) => *seconds,
-                (Some(config), None) => {
-                    let seconds = estimate::window_s(&config, *threads)?;
-                    known.insert(run.method.clone(), seconds);
-                    seconds
-                }
-                (None, _) => 0.0,
-            };
-            let tested = match run.division {
-                Division::Benchmark => split.test.clone(),
-                Division::Fold(_) => flights
-                    .iter()
-                    .enumerate()
-                    .map(|(flight, log)| phyture::flight::Span { flight, start: 0, end: log.len() / plan.folds.len().max(1) })
-                    .collect(),
-            };
-            let test = windows(&tested, history, plan.settings.test_stride).len();
-            costs.push(estimate::run_s(plan, run, window_s, flight_s, training, test)?);
-        }
-        Ok(costs)
-    }
+    Ok(costs)
 }
 
 fn duration(seconds: f64) -> String {
     match seconds {
         seconds if seconds < 120.0 => format!("{seconds:.0} s"),
         seconds if seconds < 7200.0 => format!("{:.0} min", seconds / 60.0),
-        seconds => format!("{:.1} h", seconds / 3600.0),
+        seconds if seconds < 100.0 * 3600.0 => format!("{:.1} h", seconds / 3600.0),
+        seconds => format!("{:.0} days", seconds / 86_400.0),
     }
 }
 

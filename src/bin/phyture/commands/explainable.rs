@@ -2,8 +2,8 @@
 //! and never as part of what is searched or judged.
 
 use crate::arguments::Data;
-use phyture::flight::Flight;
 use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::{DataSet, Flight};
 use phyture::{Error, Result};
 use std::path::Path;
 
@@ -27,7 +27,12 @@ pub fn apart(data: &Data, folder: &Path) -> Result<()> {
 
 /// Reads it as the flights were read.
 pub fn read(data: &Data, folder: &Path) -> Result<Vec<Flight>> {
+    Ok(read_set(data, folder)?.flights)
+}
+
+/// The same with what tells it from another.
+pub fn read_set(data: &Data, folder: &Path) -> Result<DataSet> {
     apart(data, folder)?;
     let options = ReadOptions { split_at_gaps: data.split_at_gaps, dataset: data.dataset.clone(), ..ReadOptions::default() };
-    Ok(data_set(folder, &options)?.flights)
+    data_set(folder, &options)
 }

@@ -3,13 +3,15 @@
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, interruption};
 use crate::output::Progress;
+use crate::pages::Pages;
 use phyture::critique::digits::significant;
 use phyture::critique::wrap::wrapped;
 use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
+use phyture::report::{TrainingReport, training_page};
 use phyture::train::{Begun, Event, RunFolder, TrainConfig, Training};
-use phyture::workflow::{Epoch, Run, train, training_digest};
+use phyture::workflow::{Epoch, Run, TrainedNetwork, provenance, train, training_digest};
 use phyture::{Error, Result};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -22,7 +24,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// samples; days on two cores. After each epoch the loss on the validation part (of the split `segments`) is shown.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume\n  phyture train --print-config > train.toml\n  phyture train flights -m n9-calibrated.toml -o run --config train.toml --epochs 5"
+    after_help = "Examples:\n  phyture train flights -m n9-calibrated.toml -o run\n  phyture train flights -m n9-calibrated.toml -o run --resume\n  phyture train flights -m n9-calibrated.toml -o run --report run/report\n  phyture train --print-config > train.toml\n  phyture train flights -m n9-calibrated.toml -o run --config train.toml --epochs 5"
 )]
 pub struct Args {
     /// Flights.
@@ -52,6 +54,9 @@ pub struct Args {
     /// What trains and what tests.
     #[command(flatten)]
     pub division: Division,
+    /// What is written for people to look at.
+    #[command(flatten)]
+    pub pages: Pages,
 }
 
 impl Args {
@@ -90,11 +95,13 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
             expected: "the flights to train on: phyture train DATA -m MODEL -o RUN".into(),
         });
     };
+    let page = wanted.pages.open(context, "training.html")?;
     let folder = RunFolder::create(output)?;
     if !wanted.resume && folder.is_begun() {
         context.existing().refuse(output, "a training run (which --resume goes on with)")?;
     }
     let set = context.flights(data, config.network.history())?;
+    let names = [model.display().to_string()];
     let model = Model::read(model)?;
     let split = context.split(&set.flights, &model, &wanted.division)?;
     let interrupted = interruption()?;
@@ -109,6 +116,19 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
         threads: context.threads(),
     };
     let run = Told { training, resume: wanted.resume, interrupted: &interrupted }.run(context)?;
+    if let Some(page) = page {
+        let provenance = provenance("train", &data.data, &set, &names.each_ref().map(String::as_str), config.seed);
+        let TrainedNetwork { curve, epoch, parameters, windows, validation_windows, .. } = &run.network;
+        let report = TrainingReport {
+            config: &config,
+            curve,
+            epoch: *epoch,
+            parameters: *parameters,
+            windows: [*windows, *validation_windows],
+            provenance: &provenance,
+        };
+        page.write(context, &training_page(&report))?;
+    }
     context.json(&run.network)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -199,9 +219,11 @@ fn say_trained(context: &Context, Run { hybrid, gate_windows, network }: &Run) {
     say_intervals(context, hybrid);
     let validation = network.validation_loss.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
     context.say(format!(
-        "trained in {:.0} s: {}, training loss {:.4}, validation loss {validation}",
+        "trained in {:.0} s: {}, weights of epoch {} of {}, training loss {:.4}, validation loss {validation}",
         network.seconds,
         network.network.display(),
+        network.epoch,
+        network.curve.len(),
         network.training_loss
     ));
 }

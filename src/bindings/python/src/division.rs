@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 pub struct Division {
     /// Manoeuvre classes or flights that nothing is fitted to.
     lock: Vec<String>,
-    /// `segments` or `first SHARE`.
+    /// `segments`, `stretches` or `first SHARE`.
     split: Option<String>,
     /// Seed of everything random.
     pub seed: u64,
