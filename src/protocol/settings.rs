@@ -147,10 +147,11 @@ impl Settings {
             ours.iter().zip(&whole).filter(|(ours, whole)| ours.always || ours.found != whole.found).map(|(ours, whole)| {
                 let Figure { name, found, .. } = ours;
                 let stated = if whole.stated { "" } else { "not stated, read as " };
-                if *found == whole.found {
+                let of_paper = if whole.found.is_empty() { "none" } else { &whole.found };
+                if found == &whole.found {
                     format!("{name} {found}")
                 } else {
-                    format!("{name} {found} (paper: {stated}{})", whole.found)
+                    format!("{name} {found} (paper: {stated}{of_paper})")
                 }
             });
         let words: Vec<String> = words.collect();
@@ -192,7 +193,7 @@ impl Settings {
             unstated(shown("a training window every", seconds(training.stride))),
             unstated(quiet("weights", weights.into())),
             shown("seeds", self.seeds.to_string()),
-            quiet("of one seed alone", self.one_seed.join(", ")),
+            quiet("of one seed alone", self.one_seed.join(" ")),
             quiet("folds", self.folds.to_string()),
         ])
     }

@@ -261,7 +261,7 @@ proptest! {
     #[test]
     fn columns_are_derivatives_by_every_number_of_every_effect(
         seed in any::<u64>(),
-        chosen in prop::collection::vec(any::<bool>(), 34),
+        chosen in prop::collection::vec(any::<bool>(), definitions().count()),
         size in -1.0..1.0f64,
     ) {
         for (number, deviation) in deviation_of_columns(&with_some(&chosen, size), &motion(seed, 120)?)? {
