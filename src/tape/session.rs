@@ -122,6 +122,17 @@ impl<T: Real> Session<T> {
         })
     }
 
+    /// The same at another instruction-set level than the process's, before it is used: results of different levels differ in the last digits.
+    ///
+    /// # Panics
+    /// If weights have been loaded: they are packed for the level before.
+    #[must_use]
+    pub fn at(mut self, isa: InstructionSet) -> Self {
+        assert!(self.loaded.is_empty(), "weights that are loaded are packed for the level before");
+        self.isa = isa;
+        self
+    }
+
     /// Fills the slab with NaN before each sample: an operation that reads what nobody wrote shows at once. For tests.
     pub fn set_poison(&mut self, poison: bool) {
         self.poison = poison;
@@ -419,6 +430,26 @@ mod tests {
             }
         }
         assert!(session.output(1, 0).is_err() && session.input_gradient(2, 0).is_err(), "no such output or input");
+        Ok(())
+    }
+
+    #[test]
+    fn a_session_works_at_the_level_that_it_is_given() -> Result<()> {
+        let (graph, loss, _) = large_weights::<f64>()?;
+        let parameters = parameters(graph.parameter_count());
+        let at = |isa: InstructionSet| {
+            let mut session = Session::train(&graph, loss, &[], Threads(2))?.at(isa);
+            assert_eq!(session.isa(), isa);
+            let loss = session.step(&parameters, 5, KEY, &fill)?;
+            Ok::<_, Error>((loss, session.gradients().to_vec()))
+        };
+        let plain = at(InstructionSet::PLAIN)?;
+        for isa in InstructionSet::available() {
+            let (loss, gradients) = at(isa)?;
+            let near =
+                |found: f64, expected: f64| (found - expected).abs() <= Tolerance::Close.relative_f64() * (1.0 + expected.abs());
+            assert!(near(loss, plain.0) && gradients.iter().zip(&plain.1).all(|(found, expected)| near(*found, *expected)));
+        }
         Ok(())
     }
 

@@ -8,10 +8,8 @@
 //! The rows are flattened time by time; PyTorch's `flatten` of `[C, n]` goes channel by channel, a permutation of the hidden
 //! layer's columns.
 
-use super::common_fields;
-use crate::nn::configuration::{
-    ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
-};
+use super::{check_convolutions, common_fields};
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH};
 use crate::nn::layers::Recorder;
 use crate::tape::ops::{Activation, Dropout, Ends, Flatten, GeneralConv1d, Place};
 use crate::tape::{Result, Var};
@@ -61,13 +59,7 @@ impl Configuration for CnnConfig {
             ("state_channels", self.state_channels, LARGEST_WIDTH),
             ("hidden", self.hidden, LARGEST_WIDTH),
         ];
-        let each = self.channels.iter().map(|&channels| ("channels", channels, LARGEST_WIDTH));
-        let each = each.chain(self.kernels.iter().map(|&kernel| ("kernels", kernel, LARGEST_KERNEL)));
-        check_ranges(&sizes.into_iter().chain(each).collect::<Vec<_>>(), &[("dropout", self.dropout, 0.0, 0.95)])?;
-        if self.kernels.iter().any(|kernel| kernel.is_multiple_of(2)) {
-            return Err(refused("kernels", format!("{:?}", self.kernels), "odd kernels, which have a middle"));
-        }
-        Ok(())
+        check_convolutions(&sizes, &self.channels, &self.kernels, self.dropout)
     }
 
     fn record<T: Real>(&self, recorder: &mut Recorder<T>, state: Var, _physics: Var) -> Result<Var> {

@@ -5,10 +5,8 @@
 //! same data; sizes are not public to us. Ours: two blocks of convolution, rectifier, maximum of pairs and dropout, an LSTM over the
 //! 250 rows left, and a linear map of its last hidden state.
 
-use super::common_fields;
-use crate::nn::configuration::{
-    ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused,
-};
+use super::{check_convolutions, common_fields};
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, refused};
 use crate::nn::layers::Recorder;
 use crate::tape::ops::{Dropout, Ends, GeneralConv1d, LastRows, Place, Pool};
 use crate::tape::{Result, Var};
@@ -61,12 +59,7 @@ impl Configuration for CnnLstmConfig {
             ("pool", self.pool, LARGEST_KERNEL),
             ("hidden", self.hidden, LARGEST_WIDTH),
         ];
-        let each = self.channels.iter().map(|&channels| ("channels", channels, LARGEST_WIDTH));
-        let each = each.chain(self.kernels.iter().map(|&kernel| ("kernels", kernel, LARGEST_KERNEL)));
-        check_ranges(&sizes.into_iter().chain(each).collect::<Vec<_>>(), &[("dropout", self.dropout, 0.0, 0.95)])?;
-        if self.kernels.iter().any(|kernel| kernel.is_multiple_of(2)) {
-            return Err(refused("kernels", format!("{:?}", self.kernels), "odd kernels, which have a middle"));
-        }
+        check_convolutions(&sizes, &self.channels, &self.kernels, self.dropout)?;
         if self.history < self.pool * self.pool {
             return Err(refused("pool", self.pool, "a width of which two fit into the history, one in the other"));
         }
