@@ -2,56 +2,15 @@
 //!
 //! Listing, messages and reading ask this list. What a file holds is the business of the format's own file.
 
-use super::assemble::{Assembled, Cuts, assemble};
-use super::join::{Joined, Stream, Turn, join};
-use super::listing::Log;
-use super::schema::Schema;
-use super::source::Read;
-use super::table::{RawTable, fault};
-use super::{Description, stanford, table};
-use crate::error::{Error, Result};
+use super::format::{Format, Log, Place};
+use super::table::fault;
+use super::{Description, csv, stanford};
+use crate::error::Result;
 use std::path::Path;
-
-/// Where a log of a format lies.
-pub(super) enum Place {
-    /// A file with this ending, in lower case.
-    File(&'static str),
-    /// A folder that this says is one flight.
-    Folder(fn(&Path) -> bool),
-}
-
-/// What reads those columns of a table that are wanted.
-pub(super) type ReadTable = fn(&Path, &dyn Fn(&str) -> bool) -> Result<RawTable>;
-
-/// What finds the streams of a binary log that a description names, and says what of it is damaged.
-pub(super) type ParseStreams = fn(&Path, &[u8], &Schema) -> Result<(Vec<Stream>, Option<String>)>;
-
-/// What reads a log.
-pub(super) enum Reader {
-    /// This function, of a log that is one table.
-    Table(ReadTable),
-    /// The streams that this function finds, joined on one clock; attitudes among them, by the name of the stream.
-    Streams { parse: ParseStreams, turns: &'static [(&'static str, Turn)] },
-    /// This function.
-    Of(fn(&Log, &Schema, Cuts) -> Result<Assembled>),
-    /// Nothing, as the program was built without this feature.
-    #[cfg(not(feature = "parquet"))]
-    LeftOut(&'static str),
-}
-
-/// A format of logs.
-pub(super) struct Format {
-    /// What its file is, in words: "a CSV file".
-    pub kind: &'static str,
-    pub place: Place,
-    /// What the format states by itself, in the words of `dataset.toml`; in force below the one of the data set.
-    pub description: Option<&'static str>,
-    pub reader: Reader,
-}
 
 /// All of them.
 pub(super) static FORMATS: &[Format] = &[
-    table::CSV,
+    csv::CSV,
     #[cfg(feature = "parquet")]
     super::parquet::PARQUET,
     #[cfg(not(feature = "parquet"))]
@@ -60,44 +19,6 @@ pub(super) static FORMATS: &[Format] = &[
     super::dataflash::DATAFLASH,
     stanford::FORMAT,
 ];
-
-impl Format {
-    #[cfg(not(feature = "parquet"))]
-    const fn left_out(kind: &'static str, ending: &'static str, feature: &'static str) -> Self {
-        Self { kind, place: Place::File(ending), description: None, reader: Reader::LeftOut(feature) }
-    }
-
-    /// The flights of a log.
-    ///
-    /// # Errors
-    /// What is wrong with the log; [`crate::Error::Log`] where the program was built without what reads it.
-    pub fn read(&self, log: &Log, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
-        if let Some(table) = &log.given {
-            return assemble(table.clone(), &log.name, &log.manoeuvre, schema, cuts);
-        }
-        match self.reader {
-            Reader::Table(read) => {
-                let table = read(&log.path, &|name| schema.wants(name))?;
-                assemble(table, &log.name, &log.manoeuvre, schema, cuts)
-            }
-            Reader::Streams { parse, turns } => {
-                let bytes = std::fs::read(&log.path).map_err(Error::io(&log.path))?;
-                let (streams, damage) = parse(&log.path, &bytes, schema)?;
-                let read = Read::of(&log.path, &bytes);
-                let Joined { table, note } = join(&log.path, streams, turns, schema, cuts.split_at_gaps, read)?;
-                let joined = Schema { resample_hz: None, ..schema.clone() };
-                let mut done = assemble(table, &log.name, &log.manoeuvre, &joined, cuts)?;
-                done.own_notes.extend([Some(note), damage].into_iter().flatten().map(|note| format!("`{}`: {note}", log.name)));
-                Ok(done)
-            }
-            Reader::Of(read) => read(log, schema, cuts),
-            #[cfg(not(feature = "parquet"))]
-            Reader::LeftOut(feature) => {
-                Err(fault(&log.path, self.kind, format!("CSV; this program was built without the feature `{feature}`")))
-            }
-        }
-    }
-}
 
 /// The description of logs whose format has one of its own: what `stated` says, and below that what the format does. `None` where no log's format
 /// has one.

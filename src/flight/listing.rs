@@ -3,25 +3,17 @@
 //! Names, endings and kinds of nodes are looked at; no log is opened. Only plain files are logs: pipes and devices are never opened,
 //! and a symbolic link that leads back to the folder itself is not followed.
 
-use super::formats::{self, Format};
+use super::csv::CSV;
+use super::format::{Format, Log};
+use super::formats;
 use super::given::Given;
 use super::names::own_name;
 use super::schema::{Manoeuvre, Schema};
-use super::table::{CSV, RawTable, fault};
+use super::table::fault;
 use crate::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-
-/// A log file or a flight's folder, what it is, and what its flights are called.
-pub(super) struct Log {
-    pub path: PathBuf,
-    pub format: &'static Format,
-    pub name: String,
-    pub manoeuvre: String,
-    /// Its columns, where they were given and are in no file.
-    pub given: Option<RawTable>,
-}
 
 /// What a data set's folder holds.
 #[derive(Default)]

@@ -14,11 +14,15 @@ mod column;
 #[cfg(feature = "files")]
 mod convert;
 #[cfg(feature = "files")]
+mod csv;
+#[cfg(feature = "files")]
 mod dataflash;
 pub mod derived;
 #[cfg(feature = "files")]
 mod description;
 pub mod differentiate;
+#[cfg(feature = "files")]
+mod format;
 #[cfg(feature = "files")]
 mod formats;
 #[cfg(feature = "files")]

@@ -2,7 +2,7 @@
 //!
 //! The column-by-column interface of the `parquet` crate, without Arrow. What the columns mean is not known here.
 
-use super::formats::{Format, Place, Reader};
+use super::format::{Format, Place, Reader};
 use super::guard::guarded;
 use super::source::Read;
 use super::table::{RawTable, check_header, fault};

@@ -5,8 +5,9 @@
 //! filled in, or mended on the description's word is said in [`DataSet::notes`]. What was read is recorded in [`DataSet::source`].
 
 use super::assemble::{Assembled, Cuts, gather};
+use super::format::Log;
 use super::formats;
-use super::listing::{DESCRIPTION, Listing, Log, check_unique, given, list};
+use super::listing::{DESCRIPTION, Listing, check_unique, given, list};
 use super::schema::{LateIn, Schema};
 use super::source::Read;
 use super::table::fault;

@@ -9,7 +9,7 @@
 use super::assemble::{Assembled, Cuts, assemble};
 use super::attitude::{cross, rotate, rotate_back, rotation_body_to_inertial};
 use super::convert::check_finite;
-use super::formats::{Format, Place, Reader};
+use super::format::{Format, Place, Reader};
 use super::hypotheses::{Decided, Smoother, control_scale, decide};
 use super::names::own_name;
 use super::schema::Schema;

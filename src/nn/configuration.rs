@@ -77,6 +77,22 @@ pub(crate) fn check_ranges(sizes: &[(&str, usize, usize)], reals: &[(&str, f64, 
     Ok(())
 }
 
+/// Checks sizes, and those of a stack of convolutions whose kernels have a middle, with dropout after them.
+pub(crate) fn check_convolutions(
+    sizes: &[(&'static str, usize, usize)],
+    channels: &[usize],
+    kernels: &[usize],
+    dropout: f64,
+) -> Result<()> {
+    let channels = channels.iter().map(|&channels| ("channels", channels, LARGEST_WIDTH));
+    let each = channels.chain(kernels.iter().map(|&kernel| ("kernels", kernel, LARGEST_KERNEL)));
+    check_ranges(&sizes.iter().copied().chain(each).collect::<Vec<_>>(), &[("dropout", dropout, 0.0, 0.95)])?;
+    if kernels.iter().any(|kernel| kernel.is_multiple_of(2)) {
+        return Err(refused("kernels", format!("{kernels:?}"), "odd kernels, which have a middle"));
+    }
+    Ok(())
+}
+
 /// The error for a size that cannot be.
 pub(crate) fn refused(field: &str, found: impl std::fmt::Display, expected: impl Into<String>) -> Error {
     Error::Size { field: field.into(), found: found.to_string(), expected: expected.into() }

@@ -4,6 +4,7 @@
 //! by ten-second segment; every table is arithmetic on outcomes. So runs may be made in any order, on any machine, and killed at any
 //! moment. Nothing here parses a command line or draws a page.
 
+pub mod cell;
 pub mod estimate;
 pub mod experiment;
 pub mod folder;
@@ -17,6 +18,7 @@ pub mod slurm;
 pub mod table;
 pub mod text;
 
+pub use cell::Cell;
 pub use experiment::{Experiment, Extent};
 pub use folder::{Folder, instruction_set};
 pub use lead::Lead;

@@ -1,7 +1,7 @@
 //! The numbers that the paper prints in its tables 1 to 6 (RMSE, m/s² and rad/s²; table 2: MAE and MaxAE), to stand beside ours. In Table 1 it prints
 //! mean ± deviation over ten runs. They are of the Stanford flights; no computation uses them.
 
-use super::table::Cell;
+use super::cell::Cell;
 
 /// Six channels in the order of the targets, then their mean.
 pub type Printed = [f64; 7];

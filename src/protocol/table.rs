@@ -1,6 +1,7 @@
 //! Tables from outcomes: means and deviations over seeds. Arithmetic alone; how they are written is in `text`, what a run does in
 //! `experiment`.
 
+use super::cell::Cell;
 use super::folder::Folder;
 use super::lead::{Lead, lead};
 use super::method::{Method, method};
@@ -12,15 +13,6 @@ use crate::error::Result;
 use crate::flight::{Channel, PerChannel};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
-
-/// Mean over seeds and, with at least two, the standard deviation (divisor n − 1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Cell {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation over seeds.
-    pub deviation: Option<f64>,
-}
 
 impl TableRow {
     /// Name and, where it is not the RMSE, measure.
@@ -36,16 +28,6 @@ impl Table {
             self.rows.iter().filter_map(|row| Some(format!("{}: {}.", row.name, row.note.as_ref()?))).collect();
         notes.dedup();
         notes
-    }
-}
-
-impl Cell {
-    /// Of one value a seed; `None` of nothing.
-    pub fn of(values: &[f64]) -> Option<Self> {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        (!values.is_empty()).then(|| Self { mean, deviation: (values.len() > 1).then(|| (squares / (count - 1.0)).sqrt()) })
     }
 }
 

@@ -1,9 +1,10 @@
 //! Tables as Markdown, CSV and JSON, and the data of the figures as CSV. Layout alone; the same outcomes give the same bytes.
 
+use super::cell::Cell;
 use super::lead::Lead;
 use super::outcome::Segment;
 use super::plan::Treatment;
-use super::table::{Cell, Finished, Table, TableRow};
+use super::table::{Finished, Table, TableRow};
 use crate::critique::ChannelValues;
 use crate::disk::write_atomically;
 use crate::error::{Error, Result};

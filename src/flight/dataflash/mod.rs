@@ -5,7 +5,7 @@
 //! Source: ArduPilot, libraries/AP_Logger (LogStructure.h, README.md).
 
 use super::bytes::{Bytes, float, signed, text, unsigned};
-use super::formats::{Format, Place, Reader};
+use super::format::{Format, Place, Reader};
 use super::join::{Stream, Turn};
 use super::schema::{Damaged, Schema};
 use crate::error::{Error, Result};

@@ -11,8 +11,8 @@ mod motion;
 mod text;
 mod vocabulary;
 
-use super::formats::{ReadTable, Reader};
-use super::listing::{Log, list};
+use super::format::{Log, ReadTable, Reader};
+use super::listing::list;
 use super::schema::Schema;
 use super::table::{RawTable, fault};
 use crate::error::{Error, Result};

@@ -8,7 +8,7 @@
 mod format;
 
 use super::bytes::{Bytes, text, unsigned};
-use super::formats::{Format, Place, Reader};
+use super::format::{Format, Place, Reader};
 use super::join::{Stream, Turn};
 use super::schema::{Damaged, Schema};
 use crate::error::{Error, Result};

@@ -8,8 +8,8 @@
 //! The rows are flattened time by time; PyTorch's `flatten` of `[C, n]` goes channel by channel, a permutation of the hidden
 //! layer's columns.
 
-use super::{check_convolutions, common_fields};
-use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH};
+use super::common_fields;
+use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_WIDTH, check_convolutions};
 use crate::nn::layers::Recorder;
 use crate::tape::ops::{Activation, Dropout, Ends, Flatten, GeneralConv1d, Place};
 use crate::tape::{Result, Var};

@@ -5,8 +5,10 @@
 //! same data; sizes are not public to us. Ours: two blocks of convolution, rectifier, maximum of pairs and dropout, an LSTM over the
 //! 250 rows left, and a linear map of its last hidden state.
 
-use super::{check_convolutions, common_fields};
-use crate::nn::configuration::{ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, refused};
+use super::common_fields;
+use crate::nn::configuration::{
+    ACCELERATIONS, Configuration, LARGEST_HISTORY, LARGEST_KERNEL, LARGEST_WIDTH, check_convolutions, refused,
+};
 use crate::nn::layers::Recorder;
 use crate::tape::ops::{Dropout, Ends, GeneralConv1d, LastRows, Place, Pool};
 use crate::tape::{Result, Var};

@@ -20,8 +20,6 @@ pub use tcn::TcnConfig;
 pub use timemixer::TimeMixerConfig;
 pub use timesnet::TimesNetConfig;
 
-use super::configuration::{LARGEST_KERNEL, LARGEST_WIDTH, check_ranges, refused};
-
 /// A configuration's answers about its own fields, which every peer has.
 macro_rules! common_fields {
     () => {
@@ -39,19 +37,3 @@ macro_rules! common_fields {
     };
 }
 use common_fields;
-
-/// Checks sizes, and those of a stack of convolutions whose kernels have a middle, with dropout after them.
-fn check_convolutions(
-    sizes: &[(&'static str, usize, usize)],
-    channels: &[usize],
-    kernels: &[usize],
-    dropout: f64,
-) -> super::Result<()> {
-    let channels = channels.iter().map(|&channels| ("channels", channels, LARGEST_WIDTH));
-    let each = channels.chain(kernels.iter().map(|&kernel| ("kernels", kernel, LARGEST_KERNEL)));
-    check_ranges(&sizes.iter().copied().chain(each).collect::<Vec<_>>(), &[("dropout", dropout, 0.0, 0.95)])?;
-    if kernels.iter().any(|kernel| kernel.is_multiple_of(2)) {
-        return Err(refused("kernels", format!("{kernels:?}"), "odd kernels, which have a middle"));
-    }
-    Ok(())
-}
