@@ -49,6 +49,10 @@ fn killed_ten_times_cut_into_shards_or_left_alone_the_tables_are_the_same_bytes(
     let at = place.path();
     succeed(at, &planned("whole", &["--seeds", "2"]))?;
     let said = succeed(at, &["benchmark", "collect", "whole"])?;
+    assert!(
+        said.contains("On the flights as they are, Phy-Ture's mean error is ") && said.contains(", the best peer network, which "),
+        "{said}"
+    );
     assert!(said.contains("95 % interval over segments") && said.contains("± 0.02"), "{said}");
     assert!(said.contains("SCALED DOWN") && said.contains("Conv–Informer") && said.contains("As the paper prints it"), "{said}");
 

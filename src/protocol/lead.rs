@@ -27,6 +27,22 @@ pub struct Lead {
     pub percent_ci95: Option<[f64; 2]>,
 }
 
+/// What a lead over the best peer network has to be for the paper's claim (48 % there) to be reproduced, and the lower end of its interval, %.
+pub const CLAIM: [f64; 2] = [40.0, 25.0];
+
+impl Lead {
+    /// Whether the lead reproduces the paper's claim, and in what words it does or does not.
+    pub fn claim(&self) -> &'static str {
+        match (self.percent, self.percent_ci95) {
+            (percent, Some([low, _])) if percent >= CLAIM[0] && low > CLAIM[1] => "which reproduces the paper's claim",
+            (_, Some([low, high])) if low <= 0.0 && high >= 0.0 => "which may be none: the paper's claim is not reproduced",
+            (percent, _) if percent < 0.0 => "which is behind: the paper's claim is not reproduced",
+            (_, None) => "of too little flight for an interval",
+            _ => "which is a lead, and not that of the paper",
+        }
+    }
+}
+
 /// The lead of one method over another, one outcome a seed; `None` if either has none or they were not judged on the same segments.
 pub(super) fn lead(of: &[&Outcome], over: &[&Outcome]) -> Option<(f64, Option<[f64; 2]>)> {
     let first = &of.first()?.segments;
@@ -117,6 +133,19 @@ mod tests {
         let [low, high] = interval.expect("twenty segments");
         assert!((percent - 50.0).abs() < 1e-9 && (low - 50.0).abs() < 1e-9 && (high - 50.0).abs() < 1e-9);
         assert!(lead(&[&whole], &[&half]).is_some_and(|(percent, _)| (percent + 100.0).abs() < 1e-9));
+    }
+
+    #[test]
+    fn a_claim_is_judged_by_the_lead_and_by_its_interval() {
+        let claim = |percent: f64, low: f64, high: f64| {
+            let of = |name: &str| name.to_owned();
+            Lead { of: of("a"), over: of("b"), over_name: of("B"), percent, percent_ci95: Some([low, high]) }.claim()
+        };
+        assert!(claim(45.0, 30.0, 55.0).contains("reproduces the paper's claim"));
+        assert!(
+            claim(45.0, 20.0, 60.0).contains("not that of the paper") && claim(10.0, 4.0, 16.0).contains("not that of the paper")
+        );
+        assert!(claim(9.0, -2.0, 20.0).contains("may be none") && claim(-9.0, -20.0, -2.0).contains("behind"));
     }
 
     #[test]

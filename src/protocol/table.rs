@@ -83,6 +83,9 @@ pub struct Finished {
 /// The method that the others are held against.
 const FRONT: &str = "phyture";
 
+/// The networks that the paper compares it with.
+const PEERS: &[&str] = &["cnn", "cnn_lstm", "tcn", "timesnet", "timemixer", "dlinear", "informer"];
+
 /// Whether a method predicts at all: the zero-phase difference looks ahead, and the floor knows the truth.
 fn competes(id: &str) -> bool {
     !["centred_difference", "floor"].contains(&id)
@@ -202,6 +205,17 @@ impl Finished {
         let planned = self.plan.runs_of(method.id, Division::Benchmark, treatment).len();
         let effects = outcomes.first().filter(|_| method.predictor.amended()).map(|outcome| &outcome.effects);
         row(method, measure.0, &found, planned, effects)
+    }
+
+    /// Phy-Ture held against another method.
+    pub fn lead_over(&self, id: &'static str, treatment: Treatment) -> Option<Lead> {
+        self.leads(&[id], treatment).pop()
+    }
+
+    /// Phy-Ture held against the best of the peer networks, by mean error, as the flights are and with noise on the states.
+    pub fn over_best_peer(&self, treatment: Treatment) -> Option<Lead> {
+        let peers = self.leads(PEERS, treatment).into_iter();
+        peers.min_by(|one, other| one.percent.total_cmp(&other.percent))
     }
 
     /// Table 6: its third row is a row of Table 4 under another name.

@@ -80,28 +80,53 @@ pub fn basis(finished: &Finished) -> Vec<String> {
     sentences
 }
 
+/// What the comparison comes to, in a sentence for the flights as they are and one with noise: Phy-Ture beside the best peer network and beside the
+/// ridge regression.
+pub fn verdict(finished: &Finished) -> Vec<String> {
+    let one = |(treatment, where_): (Treatment, &str)| {
+        let best = finished.over_best_peer(treatment)?;
+        let ridge = finished.lead_over("ridge", treatment).map_or_else(String::new, |lead| format!("; {}", told(&lead)));
+        Some(format!("{where_}, Phy-Ture's mean error is {}, the best peer network, {}{ridge}.", told(&best), best.claim()))
+    };
+    [(Treatment::Plain, "On the flights as they are"), (Treatment::StateNoise, "With noise on the states")]
+        .into_iter()
+        .filter_map(one)
+        .collect()
+}
+
 /// What [`leads`] are.
 pub const LEADS: &str =
     "Phy-Ture's mean error beside each other row's, 95 % interval over segments of flight, paired, and over seeds";
 
 /// Phy-Ture beside each other row, in words.
 pub fn leads(table: &Table) -> Vec<String> {
-    let one = |lead: &Lead| {
-        let way = if lead.percent < 0.0 { "above" } else { "below" };
-        // From the smaller size to the larger, in the direction that is told.
-        let sign = if lead.percent < 0.0 { -1.0 } else { 1.0 };
-        let interval = lead.percent_ci95.map_or_else(String::new, |[low, high]| {
-            let ends = if sign < 0.0 { [-high, -low] } else { [low, high] };
-            format!(" [{:.0}, {:.0}]", ends[0], ends[1])
-        });
-        format!("{:.0} %{interval} {way} {}", lead.percent.abs(), lead.over_name)
+    table.leads.iter().map(told).collect()
+}
+
+/// A lead in words, in the direction in which it is.
+fn told(lead: &Lead) -> String {
+    let interval = |ends: Option<[f64; 2]>, decimals: usize| {
+        ends.map_or_else(String::new, |[low, high]| format!(" [{low:.decimals$}, {high:.decimals$}]").replace('-', "−"))
     };
-    table.leads.iter().map(one).collect()
+    let Lead { percent, percent_ci95, over_name, .. } = lead;
+    if *percent <= -100.0 {
+        let times = |percent: f64| 1.0 - percent / 100.0;
+        let ends = percent_ci95.map(|[low, high]| [times(high), times(low)]);
+        return format!("{:.1} times{} that of {over_name}", times(*percent), interval(ends, 1));
+    }
+    if *percent < 0.0 {
+        let ends = percent_ci95.map(|[low, high]| [-high, -low]);
+        return format!("{:.0} %{} above {over_name}", -percent, interval(ends, 0));
+    }
+    format!("{percent:.0} %{} below {over_name}", interval(*percent_ci95, 0))
 }
 
 /// A table as Markdown, the paper's rows below it.
 pub fn markdown(finished: &Finished, table: &Table) -> String {
     let mut text = format!("# {}\n\n", table.title);
+    for sentence in verdict(finished) {
+        let _ = writeln!(text, "{sentence}");
+    }
     for sentence in basis(finished) {
         let _ = writeln!(text, "{sentence}");
     }
@@ -264,9 +289,9 @@ mod tests {
             percent,
             percent_ci95: Some(ends),
         };
-        let told = vec![lead(42.0, [35.2, 48.0]), lead(-80.0, [-95.0, -64.0])];
-        let table = Table { id: "t".into(), title: "t".into(), rows: Vec::new(), leads: told };
-        assert_eq!(leads(&table), ["42 % [35, 48] below Ridge", "80 % [64, 95] above Ridge"]);
+        let of = vec![lead(42.0, [-5.2, 48.0]), lead(-80.0, [-95.0, -64.0]), lead(-738.0, [-770.0, -695.0])];
+        let table = Table { id: "t".into(), title: "t".into(), rows: Vec::new(), leads: of };
+        assert_eq!(leads(&table), ["42 % [−5, 48] below Ridge", "80 % [64, 95] above Ridge", "8.4 times [8.0, 8.7] that of Ridge"]);
     }
 
     #[test]

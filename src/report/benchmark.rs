@@ -34,7 +34,12 @@ pub fn benchmark_page(finished: &Finished) -> Page {
     }
     sections.extend(trainings(finished));
     sections.extend(traces(finished));
-    Page { title: format!("Every method on {}", finished.plan.data), summary: basis(finished), first: Vec::new(), sections }
+    Page {
+        title: format!("Every method on {}", finished.plan.data),
+        summary: text::verdict(finished).into_iter().chain(basis(finished)).collect(),
+        first: Vec::new(),
+        sections,
+    }
 }
 
 /// Place of a method's line: those shown first, in their order.

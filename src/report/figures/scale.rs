@@ -50,10 +50,11 @@ impl Scale {
         (value - self.low) / (self.high - self.low)
     }
 
-    /// About `count` ticks at 1, 2 or 5 times a power of ten; on a logarithmic axis at powers of ten.
+    /// About `count` ticks at 1, 2 or 5 times a power of ten; on a logarithmic axis at powers of ten, where there are two.
     pub fn ticks(&self, count: usize) -> Vec<Tick> {
-        if self.log {
-            return self.powers(count);
+        let powers = if self.log { self.powers(count) } else { Vec::new() };
+        if powers.len() > 1 {
+            return powers;
         }
         let step = round_step((self.high - self.low) / count.max(1) as f64);
         let decimals = (-step.log10().floor()).max(0.0) as usize;
@@ -101,6 +102,8 @@ mod tests {
         assert_eq!(written(Scale::linear(0.0, 20.0), 4), ["0", "5", "10", "15", "20"].map(str::to_owned));
         let decades = Scale { low: 2e-5, high: 30.0, log: true };
         assert_eq!(written(decades, 9), ["1e−4", "0.001", "0.01", "0.1", "1", "10"].map(str::to_owned));
+        // Within a decade there are ticks all the same.
+        assert_eq!(written(Scale { low: 17.0, high: 42.0, log: true }, 4), ["20", "30", "40"].map(str::to_owned));
         assert!((decades.place(30.0) - 1.0).abs() < 1e-12 && decades.place(2e-5).abs() < 1e-12);
     }
 
