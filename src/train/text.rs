@@ -219,6 +219,7 @@ mod tests {
                     standardise_loss: true,
                     gate_every: 5,
                     interval_every: 7,
+                    keep_best: true,
                     seed: i64::MAX as u64,
                     checkpoint_s: 0.1,
                     ..TrainConfig::in_minutes()
@@ -232,8 +233,8 @@ mod tests {
         let text = TrainConfig::default().template()?;
         let fields: Vec<&str> = text.lines().filter_map(|line| line.split_once(" = ")).map(|(field, _)| field).collect();
         let uncommented = fields.iter().filter(|field| !field.starts_with('#')).count();
-        // Eleven fields, nineteen of the network; and a comment for each.
-        assert_eq!(uncommented, 11 + 19, "{text}");
+        // Twelve fields, nineteen of the network; and a comment for each.
+        assert_eq!(uncommented, 12 + 19, "{text}");
         assert!(text.lines().filter(|line| line.starts_with("# ")).count() > uncommented, "{text}");
         Ok(())
     }
