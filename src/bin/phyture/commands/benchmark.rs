@@ -78,8 +78,8 @@ pub struct Args {
     /// Seeds of each network, at most 1000 [default: the plan's]
     #[arg(long, allow_negative_numbers = true, value_parser = count(1..=Settings::MOST_SEEDS))]
     pub seeds: Option<usize>,
-    /// Budget: the paper's (months on two cores), `question` (a history of 1.28 s trained to the end, some ten hours), an hour's for table 1, or one
-    /// that only shows that it works
+    /// Budget: the paper's (on two cores some twelve days for table 1 alone, months for all), `question` (a history of 1.28 s trained to the end, a
+    /// day and a half), an hour's for table 1, or one that only shows that it works
     #[arg(long, value_enum, default_value_t = Plans::Paper)]
     pub plan: Plans,
     /// How flights are divided where none is locked: `segments`, `stretches` or `first SHARE` [default: the model file's; stretches in the plan
