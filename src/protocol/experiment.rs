@@ -285,7 +285,8 @@ impl<'a> Experiment<'a> {
         let folder = RunFolder::create(&working)?;
         // The key has everything in it that the data of a run depend on.
         let data = u64::from_str_radix(&self.plan.key(run)?, 16).expect("a key is sixteen hexadecimal digits");
-        let state = self.resumed(run, config, data, &folder, &working)?;
+        // What is damaged is kept beside the run's folder, whichever of its trainings it is of.
+        let state = self.resumed(run, config, data, &folder, ground.working)?;
         let training = Training { flights, split, model, config, data, folder: &folder, with_losses: false, threads: self.threads };
         let mut steps = 1;
         let ended = training.run(state, &mut |event| {
