@@ -277,6 +277,14 @@ impl Plan {
     /// # Errors
     /// [`Error::Config`] with the identifiers there are.
     pub fn check(&self) -> Result<()> {
+        if self.methods.iter().any(|id| id == "floor") && self.explainable_sha256.is_none() {
+            return Err(Error::Config {
+                place: "benchmark".into(),
+                field: "method".into(),
+                found: "`floor`".into(),
+                expected: "the explainable part of the flights with it: --explainable DIR".into(),
+            });
+        }
         let unknown = self.methods.iter().find(|id| method(id).is_none());
         unknown.map_or(Ok(()), |id| {
             let known: Vec<&str> = super::METHODS.iter().map(|method| method.id).collect();
