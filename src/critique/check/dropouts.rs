@@ -1,8 +1,8 @@
-//! Samples that a recorder dropped and filled with the last ones: all that is measured stands still for a while and then jumps. A single column
-//! that stands still is the business of `streams`.
+//! Samples that a recorder dropped and filled: all that is measured stands still for a while and then jumps, or to the end of the flight; or all sticks
+//! leap to one value, stay, and leap back. A single column that stands still is the business of `streams`.
 
 use super::finding::{Finding, Severity, finding};
-use super::flights::{MOST, in_flights, named};
+use super::flights::{CONTROLS, MOST, in_flights, named};
 use super::robust::median;
 use crate::flight::{Column, Flight};
 
@@ -12,6 +12,14 @@ const LONG_S: f64 = 0.05;
 const JUMP: f64 = 3.0;
 /// … in so many columns.
 const JUMPING: usize = 2;
+/// A rest of all measurements at the end of a flight, s.
+const LAST_S: f64 = 1.0;
+/// A rest of all sticks between leaps, s, …
+const STICKS_S: f64 = 0.3;
+/// … that are so many times their usual change …
+const LEAP: f64 = 10.0;
+/// … and this part of their range.
+const OF_RANGE: f64 = 0.05;
 /// Lost for this share of a flight, samples make effects of their own.
 const MUCH: f64 = 0.03;
 
@@ -26,31 +34,91 @@ struct Lost {
     share: f64,
 }
 
-/// Flights that lost samples.
-pub(super) fn findings(flights: &[Flight]) -> Option<Finding> {
-    let lost: Vec<Lost> = flights.iter().enumerate().filter_map(|(index, flight)| of_flight(index, flight)).collect();
+/// Flights that lost samples of all measurements, that were repeated at their end, or that lost those of all sticks.
+pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
+    let all = |of: fn(usize, &Flight) -> Option<Lost>| -> Vec<Lost> {
+        flights.iter().enumerate().filter_map(|(index, flight)| of(index, flight)).collect()
+    };
+    let held = finding_of("dropouts", &all(of_flight), flights, |lost| {
+        format!("all measurements are held, {}, and then jump: dropped samples", lost.how())
+    });
+    let ends = finding_of("padded", &all(at_the_end), flights, |lost| {
+        format!("the last row is repeated, {}: the recorder went on when nothing was measured any more", lost.how())
+    });
+    let sticks = finding_of("controls_dropout", &all(of_sticks), flights, |lost| {
+        format!(
+            "all controls leap to one value, are held there, {}, and leap back: a dropout or a failsafe of the receiver",
+            lost.how()
+        )
+    });
+    held.into_iter().chain(ends).chain(sticks).collect()
+}
+
+impl Lost {
+    fn how(&self) -> String {
+        let times = if self.times == 1 { "once".to_owned() } else { format!("{} times", self.times) };
+        format!("{times} and for up to {:.2} s, {:.1} % of these flights", self.longest_s, 100.0 * self.share)
+    }
+}
+
+fn finding_of(name: &str, lost: &[Lost], flights: &[Flight], told: impl Fn(&Lost) -> String) -> Option<Finding> {
     let longest_s = lost.iter().map(|one| one.longest_s).reduce(f64::max)?;
     let share = lost.iter().map(|one| one.share).sum::<f64>() / lost.len() as f64;
     let times: usize = lost.iter().map(|one| one.times).sum();
-    let message = format!(
-        "all measurements are held, {times} times and for up to {longest_s:.2} s, and then jump: dropped samples, {:.1} % of these flights",
-        100.0 * share
-    );
+    let message = told(&Lost { flight: 0, times, longest_s, share });
     let indices: Vec<usize> = lost.iter().map(|one| one.flight).collect();
     let verdict = if share > MUCH { Severity::Fault } else { Severity::Warning };
     if indices.len() as f64 > MOST * flights.len() as f64 {
-        return Some(finding("dropouts", verdict, message, None));
+        return Some(finding(name, verdict, message, None));
     }
     let names: Vec<&str> = indices.iter().map(|&index| flights[index].name.as_str()).collect();
     Some(match verdict {
-        Severity::Fault => in_flights("dropouts", &indices, &message, flights),
-        _ => finding("dropouts", verdict, format!("in {}: {message}", named(&names)), None),
+        Severity::Fault => in_flights(name, &indices, &message, flights),
+        _ => finding(name, verdict, format!("in {}: {message}", named(&names)), None),
     })
 }
 
+fn measured(flight: &Flight) -> Vec<&[f64]> {
+    STATE.into_iter().filter(|column| !flight.absent.contains(column)).map(|column| flight.column(column)).collect()
+}
+
+fn at_the_end(index: usize, flight: &Flight) -> Option<Lost> {
+    let columns = measured(flight);
+    let stands = |sample: &usize| columns.iter().all(|values| values[*sample] == values[*sample - 1]);
+    let run = (1..flight.len()).rev().take_while(stands).count();
+    flight.rest();
+    let longest_s = run as f64 * flight.step_s;
+    (longest_s >= LAST_S).then(|| Lost { flight: index, times: 1, longest_s, share: run as f64 / flight.len() as f64 })
+}
+
+fn of_sticks(index: usize, flight: &Flight) -> Option<Lost> {
+    let columns: Vec<&[f64]> = CONTROLS.into_iter().map(|control| flight.column(control)).collect();
+    let least = (STICKS_S / flight.step_s).ceil().max(2.0) as usize;
+    let range = |values: &[f64]| {
+        let [low, high] = values.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], u| [low.min(*u), high.max(*u)]);
+        high - low
+    };
+    let large: Vec<f64> = columns.iter().map(|values| (LEAP * usual_change(values)).max(OF_RANGE * range(values))).collect();
+    let leaps = |sample: usize| {
+        let is_leap = |(values, large): &(&&[f64], &f64)| (values[sample] - values[sample - 1]).abs() > **large;
+        columns.iter().zip(&large).filter(is_leap).count() >= JUMPING
+    };
+    let stands = |sample: usize| columns.iter().all(|values| values[sample] == values[sample - 1]);
+    let (mut times, mut longest, mut total, mut sample) = (0, 0, 0, 1);
+    while sample < flight.len() {
+        let run = if leaps(sample) { (sample + 1..flight.len()).take_while(|next| stands(*next)).count() } else { 0 };
+        if run + 1 >= least && sample + run + 1 < flight.len() && leaps(sample + run + 1) {
+            (times, longest, total) = (times + 1, longest.max(run + 1), total + run + 1);
+        }
+        sample += run + 1;
+    }
+    flight.rest();
+    let [longest_s, share] = [longest as f64 * flight.step_s, total as f64 / flight.len() as f64];
+    (times > 0).then_some(Lost { flight: index, times, longest_s, share })
+}
+
 fn of_flight(index: usize, flight: &Flight) -> Option<Lost> {
-    let columns: Vec<&[f64]> =
-        STATE.into_iter().filter(|column| !flight.absent.contains(column)).map(|column| flight.column(column)).collect();
+    let columns = measured(flight);
     let least = (LONG_S / flight.step_s).ceil().max(2.0) as usize;
     let usual: Vec<f64> = columns.iter().map(|values| usual_change(values)).collect();
     let stands = |sample: usize| columns.iter().all(|values| values[sample] == values[sample - 1]);

@@ -6,7 +6,7 @@
 use super::finding::{Finding, Severity, Subject, finding};
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
-use super::unexplained::{Fit, Left};
+use super::unexplained::{self, Fit, Left};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
 
@@ -25,6 +25,8 @@ const TURNED: f64 = 0.17;
 /// Where the nose turns faster, rad/s, a heading that comes late looks turned.
 const SLOW: f64 = 0.5;
 
+/// How a message begins of a gain that no unit explains.
+pub(super) const FAR: &str = "the gain of this axis is far from 1";
 /// How findings on offsets begin, and the name of that on the heading.
 pub(super) const OFFSET: &str = "offset_";
 pub(super) const HEADING: &str = "heading";
@@ -146,7 +148,7 @@ impl Gains {
         type Names = [[&'static str; 3]; 3];
         const LINEAR: Names = [["vx", "vx_dot", "vx_dot says"], ["vy", "vy_dot", "vy_dot says"], ["vz", "vz_dot", "vz_dot says"]];
         const ANGULAR: Names = [["wx", "wx_dot", "wx_dot says"], ["wy", "wy_dot", "wy_dot says"], ["wz", "wz_dot", "wz_dot says"]];
-        let position = Fit::Mechanics { name: "position", changes: "the position (x, y, z)", says: "velocity and attitude say" };
+        let position = unexplained::POSITION;
         let attitude = Fit::Mechanics { name: "attitude", changes: "the attitude (roll, pitch, yaw)", says: "the rates say" };
         let three = |names: Names, all: &[BlockRegression<1>; 3]| {
             let of = |(names, one): ([&'static str; 3], &BlockRegression<1>)| {
@@ -305,7 +307,7 @@ fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<
         finding.message = match known {
             _ if (value + 1.0).abs() < WARNING_MARGIN => "the gain of this axis is that of the other sign".into(),
             Some((_, says, _)) => format!("the gain of this axis is that of {says}"),
-            None => "the gain of this axis is far from 1".into(),
+            None => format!("{FAR}: what {column} says, times {value:.2}, is what happens"),
         };
         finding.set = Some(match known {
             _ if value < 0.0 => format!("[columns] {column} = \"-{column}\", with the file's name"),

@@ -8,8 +8,13 @@
 //! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
+mod blame;
+mod causes;
 mod cells;
+mod channels;
 mod clocks;
+mod copies;
+mod dead_zone;
 mod dropouts;
 mod evidence;
 mod excitation;
@@ -19,6 +24,7 @@ mod forces;
 mod gains;
 mod increments;
 mod limits;
+mod lines;
 mod mounts;
 mod odd;
 mod regression;
@@ -44,6 +50,7 @@ pub use timing::DelayProfile;
 use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Targets};
 use crate::physics::Model;
+use blame::Blamed;
 use evidence::Evidence;
 use finding::{RELATIONS, finding};
 use flights::{CONTROLS, of_all};
@@ -53,6 +60,8 @@ use sticks::Sticks;
 
 /// Largest magnitude of a control that is still "about [−1, 1]".
 const LARGEST_CONTROL: f64 = 1.5;
+/// Pitch up to here, rad, is a quarter turn that is off.
+const LARGEST_OFF: f64 = 2.5;
 /// Share of the samples that may exceed it: glitches and full deflections are no other scale.
 const RARE_SHARE: f64 = 0.01;
 
@@ -132,7 +141,7 @@ impl Gathered {
         let Read { each, sticks, piled } = read(data, quaternion, step_s);
         let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
         let poor = streams::findings(&data.flights).into_iter().chain(spikes);
-        let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).collect();
+        let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).chain(copies::findings(&data.flights)).collect();
         let faults = poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
@@ -152,13 +161,16 @@ impl Gathered {
         unjudged.extend(&odd.flights);
         let left = each.iter().map(|own| (own.flight, own.left.iter().cloned().chain(sticks.unexplained(own.flight)).collect()));
         let left: Vec<unexplained::OfFlight> = left.collect();
+        let blamed = if misread { Blamed::default() } else { blamed(&judged, &odd, &left, data) };
+        except.extend(&blamed.flights);
+        unjudged.extend(&blamed.flights);
         let strange = if misread { None } else { unexplained::of_mechanics(&left, &unjudged, &data.flights) };
         let named: BTreeSet<&String> = strange.iter().flat_map(|finding| &finding.flights).collect();
         let of_strange: Vec<usize> = (0..data.flights.len()).filter(|&flight| named.contains(&data.flights[flight].name)).collect();
         except.extend(&of_strange);
         unjudged.extend(&of_strange);
         let stamps = stamps::findings(&judged, &unjudged, &data.flights);
-        let odd = odd.findings.into_iter().chain(strange).chain(stamps).collect();
+        let odd = blamed.findings.into_iter().chain(odd.findings).chain(strange).chain(stamps).collect();
         Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, left }
     }
 
@@ -175,6 +187,7 @@ impl Gathered {
         let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Severity::Fault;
         findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
+            findings.extend(dead_zone::findings(&data.flights));
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
@@ -201,6 +214,17 @@ impl Gathered {
         }
         if self.misread { findings.into_iter().map(symptom).collect() } else { findings }
     }
+}
+
+/// What is wrong with single columns of flights of which nothing else says more than that they do not fit.
+fn blamed(judged: &[&Own], odd: &Odd, left: &[unexplained::OfFlight], data: &DataSet) -> Blamed {
+    let is_named = |flight: usize| {
+        let mut own = odd.findings.iter().filter(|finding| finding.flights.contains(&data.flights[flight].name));
+        own.any(|finding| finding.verdict == Severity::Fault && !finding.message.contains(gains::FAR))
+    };
+    let unnamed = judged.iter().filter(|own| !is_named(own.flight));
+    let causes: Vec<(usize, Option<&[causes::Cause]>)> = unnamed.map(|own| (own.flight, own.causes.as_deref())).collect();
+    blame::gathered(&causes, &unexplained::outstanding(left), &data.flights)
 }
 
 /// Flights that are read side by side, and then leave the memory.
@@ -310,9 +334,14 @@ fn plausibility(flights: &[&Flight]) -> Vec<Finding> {
     let pitch = largest(&[Column::Pitch]);
     // Half a degree of slack for rounding in the log.
     if pitch > std::f64::consts::FRAC_PI_2 + 0.01 {
-        let message =
-            format!("pitch reaches {pitch:.1}, beyond a quarter turn: angles are in degrees, or are not ZYX Euler angles");
-        findings.push(finding("angle_range", Severity::Fault, message, Some("[units] angles = \"deg\"")));
+        // Degrees go far beyond; the relations between streams know better what is a little beyond.
+        let (message, set) = if pitch > LARGEST_OFF {
+            ("angles are in degrees, or are not ZYX Euler angles", Some("[units] angles = \"deg\""))
+        } else {
+            ("it has an offset or drifts at the start, or the angles are not ZYX Euler angles", None)
+        };
+        let message = format!("pitch reaches {pitch:.2} rad, beyond a quarter turn: {message}");
+        findings.push(finding("angle_range", Severity::Fault, message, set));
     }
     let beyond = |column: Column| {
         let samples: usize = flights.iter().map(|flight| flight.len()).sum();

@@ -1,6 +1,7 @@
 //! Flights that are read otherwise than the others: one in feet, one whose attitude comes late, one with a sign reversed. Each flight has been judged
 //! by itself; what most of them keep and some break is a fault of those, and they are left out of what all together are judged by.
 
+use super::causes::{self, Cause};
 use super::clocks::CLOCK;
 use super::evidence::Evidence;
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
@@ -9,7 +10,7 @@ use super::increments::{Motion, TOGETHER};
 use super::mounts::{self, Turns};
 use super::robust::{NORMAL, median};
 use super::timing::{Acts, Timing};
-use super::unexplained::Left;
+use super::unexplained::{self, Left};
 use crate::flight::Flight;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -44,6 +45,8 @@ pub(super) struct Own {
     pub acts: [Option<Acts>; 3],
     /// How its sensors sit.
     turns: Turns,
+    /// What would mend its relations, where they leave much.
+    pub causes: Option<Vec<Cause>>,
 }
 
 impl Own {
@@ -60,7 +63,9 @@ impl Own {
         let mut evidence = Evidence::new(quaternion, step_s);
         // A block of usual length is longer than most manoeuvres.
         evidence.absorb(&short, TOGETHER);
-        Self { flight, evidence, findings, left: short.unexplained(), acts: short.timing.acts(), turns: short.turns() }
+        let left = short.unexplained();
+        let causes = unexplained::is_worth_asking(&left).then(|| causes::of(motion));
+        Self { flight, evidence, findings, left, acts: short.timing.acts(), turns: short.turns(), causes }
     }
 }
 

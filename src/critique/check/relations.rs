@@ -68,6 +68,17 @@ const YAW_DEGREES: &str = "[columns] yaw = \"yaw * 0.017453292519943295\", with 
 const EXCHANGED: &str = "roll and pitch are exchanged";
 const ROLL_PITCH: &str = "[columns] roll = \"pitch\", pitch = \"roll\", with the file's names";
 
+const LEVEL: &str = "the velocity is written in level axes, which turn with the heading alone and neither roll nor pitch";
+const UNLEVEL: &str = "[columns] vx, vy, vz in body axes: turn them by pitch, then by roll";
+const OF_ANGLES: &str = "the rates are those of the angles roll, pitch and yaw (Euler rates), not about the axes of the body";
+const TO_BODY: &str = "[columns] wx = \"wx - wz * sin(pitch)\", wy = \"wy * cos(roll) + wz * sin(roll) * cos(pitch)\", wz = \"wz * cos(roll) * cos(pitch) - wy * sin(roll)\", with the file's names";
+
+/// Body rates of the rates of roll, pitch and yaw (Stevens, Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., eq. 1.4-3).
+fn of_angles([roll, pitch, _]: Vector, [roll_rate, pitch_rate, yaw_rate]: Vector) -> Vector {
+    let ((sr, cr), (sp, cp)) = (roll.sin_cos(), pitch.sin_cos());
+    [roll_rate - yaw_rate * sp, pitch_rate * cr + yaw_rate * sr * cp, yaw_rate * cr * cp - pitch_rate * sr]
+}
+
 /// Two columns of a vector in each other's place.
 const fn first_two([x, y, z]: Vector) -> Vector {
     [y, x, z]
@@ -149,6 +160,7 @@ impl Relation {
             read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
             read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
             read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(first_two(i.angles)), i.velocity))),
+            read(LEVEL, UNLEVEL, at, |i| stack(rotate(&turned(scaled(i.angles, [0.0, 0.0, 1.0])), i.velocity))),
         ], order.into_iter().collect()].concat())
     }
 
@@ -197,6 +209,7 @@ impl Relation {
             read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
             read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
             read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(first_two(i.angles))), |i| turning(&turned(first_two(i.angles)), i.rates)),
+            read(OF_ANGLES, TO_BODY, |i| axes(&i.rotation), |i| turning(&i.rotation, of_angles(i.angles, i.rates))),
         ], order.into_iter().collect()].concat())
     }
 
@@ -220,6 +233,7 @@ impl Relation {
             read("the targets are specific force in units of g", "targets = \"specific_force\" and [units] acceleration = \"g\"", |i| without_turning(add(i.linear_target.map(|value| GRAVITY_M_S2 * value), i.gravity), i)),
             read("the targets are nose-port-up while the velocity is not", "[columns] vy_dot = \"-vy_dot\", vz_dot = \"-vz_dot\"", |i| stack(scaled(i.linear_target, FLIP))),
             Hypothesis { says: "the velocity is written in inertial axes", set: "velocity = \"inertial\"", state: |i| stack(rotate_back(&i.rotation, i.velocity)), rate: |i| stack(i.linear_target) },
+            Hypothesis { says: LEVEL, set: UNLEVEL, state: |i| stack(rotate_back(&turned(scaled(i.angles, [1.0, 1.0, 0.0])), i.velocity)), rate: |i| stack(i.linear_target) },
             read("vx_dot and vy_dot are exchanged", "[columns] vx_dot = \"vy_dot\", vy_dot = \"vx_dot\", with the file's names", |i| stack(first_two(i.linear_target))),
             read("vy_dot and vz_dot are exchanged", "[columns] vy_dot = \"vz_dot\", vz_dot = \"vy_dot\", with the file's names", |i| stack(last_two(i.linear_target))),
             read("vx_dot and vz_dot are exchanged", "[columns] vx_dot = \"vz_dot\", vz_dot = \"vx_dot\", with the file's names", |i| stack(outer_two(i.linear_target))),
@@ -241,6 +255,7 @@ impl Relation {
             read("wy_dot and wz_dot are exchanged", "[columns] wy_dot = \"wz_dot\", wz_dot = \"wy_dot\", with the file's names", |i| stack(last_two(i.angular_target))),
             read("wx_dot and wz_dot are exchanged", "[columns] wx_dot = \"wz_dot\", wz_dot = \"wx_dot\", with the file's names", |i| stack(outer_two(i.angular_target))),
             read("the angular targets have the other sign", "[columns] wx_dot = \"-wx_dot\", wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(i.angular_target.map(|value| -value))),
+            Hypothesis { says: OF_ANGLES, set: TO_BODY, state: |i| stack(of_angles(i.angles, i.rates)), rate: |i| stack(i.angular_target) },
         ])
     }
 

@@ -3,8 +3,9 @@
 
 use super::finding::{Finding, Severity, finding};
 use super::flights::{CONTROLS, MOST, in_flights, of_all};
+use super::lines;
 use super::robust::{lower_quartile, median};
-use crate::flight::{Column, Flight};
+use crate::flight::{Column, Flight, Targets};
 use std::collections::BTreeMap;
 use std::ops::Range;
 
@@ -76,11 +77,14 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         }
     }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
+    findings.extend(lines::findings(flights, &|column| is_rounded(column)));
     let rounded: Vec<(Column, Finding)> =
         grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
     // Steps of rounding look like noise.
     let is_smooth = |column: &Column| !rounded.iter().any(|(other, finding)| other == column && finding.verdict == Severity::Fault);
-    let noisy = NOISY.into_iter().chain(CONTROLS).filter(present).filter(is_smooth).filter_map(|column| noise(flights, column));
+    let recorded = flights.iter().all(|flight| flight.targets == Targets::Recorded);
+    let looked_at = NOISY.into_iter().chain(CONTROLS).chain(Column::TARGETS.into_iter().filter(|_| recorded));
+    let noisy = looked_at.filter(present).filter(is_smooth).filter_map(|column| noise(flights, column));
     let noisy: Vec<Finding> =
         noisy.chain(CONTROLS.into_iter().filter(is_smooth).filter_map(|column| rough(flights, column))).collect();
     findings.extend(rounded.into_iter().map(|(_, finding)| finding));
@@ -250,7 +254,7 @@ impl Grains {
 }
 
 /// Whether there are values enough to tell, and the step that all are whole multiples apart by, if they are.
-fn grain(mut values: Vec<f64>) -> (bool, Option<f64>) {
+pub(super) fn grain(mut values: Vec<f64>) -> (bool, Option<f64>) {
     let looked_at = values.len();
     values.sort_unstable_by(f64::total_cmp);
     let range = values.last().zip(values.first()).map_or(0.0, |(last, first)| last - first);

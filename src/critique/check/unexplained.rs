@@ -39,6 +39,15 @@ pub(super) enum Fit {
     Answer { axis: &'static str },
 }
 
+/// Of the position.
+pub(super) const POSITION: Fit =
+    Fit::Mechanics { name: "position", changes: "the position (x, y, z)", says: "velocity and attitude say" };
+
+/// Whether a relation of mechanics leaves so much that it is worth asking why.
+pub(super) fn is_worth_asking(left: &[Left]) -> bool {
+    left.iter().any(|left| matches!(left.fit, Fit::Mechanics { .. }) && left.share > LEAST_SHARE)
+}
+
 /// What a fit leaves in one flight.
 #[derive(Clone, Debug)]
 pub(super) struct Left {
@@ -83,6 +92,12 @@ fn places(errors: &[f64]) -> Vec<usize> {
 /// A flight by its place, and what is left in it.
 pub(super) type OfFlight = (usize, Vec<Left>);
 
+/// Flights that break with mechanics where others do not.
+pub(super) fn outstanding(each: &[OfFlight]) -> BTreeSet<usize> {
+    let broken = broken(each, |fit| matches!(fit, Fit::Mechanics { .. }), &BTreeSet::new());
+    broken.iter().flat_map(|one| one.flights.iter().map(|entry| entry.0)).collect()
+}
+
 /// Flights that break with mechanics, in one finding for all relations; none of those in `except`, of which more is known.
 pub(super) fn of_mechanics(each: &[OfFlight], except: &BTreeSet<usize>, flights: &[Flight]) -> Option<Finding> {
     let broken = broken(each, |fit| matches!(fit, Fit::Mechanics { .. }), except);
@@ -102,7 +117,12 @@ pub(super) fn of_mechanics(each: &[OfFlight], except: &BTreeSet<usize>, flights:
         Fit::Mechanics { name, .. } => format!("{UNEXPLAINED}{name}"),
         Fit::Answer { .. } => unreachable!("only mechanics was asked"),
     };
-    Some(in_flights(&name, &indices.into_iter().collect::<Vec<_>>(), &message, flights))
+    let finding = in_flights(&name, &indices.iter().copied().collect::<Vec<_>>(), &message, flights);
+    // Where the aircraft is drives nothing; but derived accelerations agree with any velocity, be it right or wrong.
+    let knows_velocity = |entry: &OfFlight| entry.1.iter().any(|left| matches!(left.fit, Fit::Mechanics { name: "vx_dot", .. }));
+    let is_position = worst.fit == POSITION && broken.len() == 1;
+    let is_harmless = is_position && each.iter().filter(|entry| indices.contains(&entry.0)).all(knows_velocity);
+    Some(if is_harmless { Finding { verdict: Severity::Warning, ..finding } } else { finding })
 }
 
 /// Flights whose axes answer to nothing, a finding for each axis; none of those in `except`.
@@ -176,7 +196,7 @@ fn told(such: &[(usize, &Left)]) -> String {
 mod tests {
     use super::*;
 
-    const FIT: Fit = Fit::Mechanics { name: "position", changes: "the position (x, y, z)", says: "velocity and attitude say" };
+    const FIT: Fit = POSITION;
 
     /// A regression of 30 blocks of ten rows, with an error of this size in each block.
     fn regression(error: impl Fn(usize) -> f64) -> BlockRegression<1> {

@@ -1,0 +1,199 @@
+//! Causes of single flights, gathered: flights with the same cause make one finding, and a cause that most flights share is one of the set. What the
+//! causes are, and how they are found, is in `causes`.
+
+use super::causes::{Cause, Kind};
+use super::finding::{Finding, Severity, finding};
+use super::flights::{MOST, in_flights};
+use super::robust::median;
+use crate::flight::{Column, Flight};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What was found, and in which flights.
+#[derive(Default)]
+pub(super) struct Blamed {
+    pub findings: Vec<Finding>,
+    /// The flights that have a cause which others have not.
+    pub flights: BTreeSet<usize>,
+}
+
+/// Streams this much apart, or filtered so, change verdicts, s: lags of rotor and servo are as long.
+const SLOW_S: f64 = 0.04;
+
+/// Gathers the causes of flights; of a flight with sound relations there are none to look for. Noise is one in `outstanding` flights alone: every sensor has
+/// some.
+pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTreeSet<usize>, flights: &[Flight]) -> Blamed {
+    let sound = causes.iter().filter(|entry| entry.1.is_none()).count();
+    let mut alike: BTreeMap<(&'static str, Option<&'static str>), Vec<(usize, &Cause)>> = BTreeMap::new();
+    for (flight, of_flight) in causes {
+        let is_one = |cause: &&Cause| !matches!(cause.kind, Kind::Noise(_)) || outstanding.contains(flight);
+        for cause in of_flight.iter().copied().flatten().filter(is_one) {
+            let stream = cause.columns.first().map(|column| stream_of(*column));
+            alike.entry((cause.kind.name(), stream)).or_default().push((*flight, cause));
+        }
+    }
+    let mut order: Vec<Vec<(usize, &Cause)>> = alike.into_values().collect();
+    order.sort_by_key(|alike| std::cmp::Reverse(alike.len()));
+    let mut blamed = Blamed { findings: Vec::new(), flights: BTreeSet::new() };
+    for alike in order {
+        let columns = common(&alike);
+        let of_all: Vec<&Cause> = alike.iter().map(|entry| entry.1).collect();
+        let first = columns.first().map_or("", |column| column.name());
+        let name = if first.is_empty() { alike[0].1.kind.name().to_owned() } else { format!("{}_{first}", alike[0].1.kind.name()) };
+        let message = told(&of_all, &columns);
+        let indices: BTreeSet<usize> = alike.iter().map(|entry| entry.0).collect();
+        let indices: Vec<usize> = indices.into_iter().collect();
+        let is_set = indices.len() as f64 > MOST * (sound + indices.len()) as f64;
+        let found = if is_set {
+            finding(&name, Severity::Fault, message, mend(&of_all, &columns).as_deref())
+        } else {
+            in_flights(&name, &indices, &message, flights)
+        };
+        let verdict = if matters(&of_all, &columns) { Severity::Fault } else { Severity::Warning };
+        blamed.findings.push(Finding { verdict, ..found });
+        if !is_set {
+            blamed.flights.extend(indices);
+        }
+    }
+    blamed
+}
+
+/// Columns of a kind are a stream.
+const fn stream_of(column: Column) -> &'static str {
+    match column {
+        Column::X | Column::Y | Column::Z => "position",
+        Column::Roll | Column::Pitch | Column::Yaw => "attitude",
+        Column::Vx | Column::Vy | Column::Vz => "velocity",
+        Column::Wx | Column::Wy | Column::Wz => "rates",
+        Column::U1 | Column::U2 | Column::U3 | Column::U4 => "controls",
+        Column::VxDot | Column::VyDot | Column::VzDot => "linear accelerations",
+        Column::WxDot | Column::WyDot | Column::WzDot => "angular accelerations",
+    }
+}
+
+/// Whether the physics would be wrong: where the aircraft is does not drive it, if it is the position that is wrong.
+fn matters(all: &[&Cause], columns: &[Column]) -> bool {
+    let slow_s = usual(all, |kind| match *kind {
+        Kind::Late(time_s) | Kind::Filtered(time_s) => time_s.abs(),
+        _ => f64::INFINITY,
+    });
+    if slow_s < SLOW_S {
+        return false;
+    }
+    let is_position = columns.iter().all(|column| stream_of(*column) == "position");
+    columns.is_empty() || !is_position || all.iter().any(|cause| cause.or.is_some())
+}
+
+/// Columns that at least half of the flights name, or else the one that most do.
+fn common(alike: &[(usize, &Cause)]) -> Vec<Column> {
+    let mut counts: BTreeMap<Column, usize> = BTreeMap::new();
+    alike.iter().flat_map(|entry| &entry.1.columns).for_each(|column| *counts.entry(*column).or_default() += 1);
+    let most = counts.values().copied().max().unwrap_or(0);
+    let least = alike.len().div_ceil(2).min(most);
+    counts.into_iter().filter(|(_, count)| *count >= least).map(|entry| entry.0).collect()
+}
+
+/// A number of the kinds, as usual among the flights.
+fn usual(all: &[&Cause], of: impl Fn(&Kind) -> f64) -> f64 {
+    median(all.iter().map(|cause| of(&cause.kind)).collect()).unwrap_or(0.0)
+}
+
+const CONTROLS: [&str; 4] = ["u1", "u2", "u3", "u4"];
+
+/// What is wrong, as a sentence.
+fn told(all: &[&Cause], columns: &[Column]) -> String {
+    let names = columns.iter().map(|column| column.name()).collect::<Vec<_>>().join(", ");
+    let (stream, unit) = columns.first().map_or(("", ""), |column| (stream_of(*column), column.unit()));
+    let names = if columns.len() == 3 { format!("{stream} ({names})") } else { names };
+    let or = all[0].or.map(|or| format!(", or {or} the other way")).unwrap_or_default();
+    let first_s = all.iter().filter_map(|cause| cause.from_s).reduce(f64::min);
+    let since = first_s.map(|from_s| format!(", from {from_s:.0} s on in the first of them")).unwrap_or_default();
+    let places = first_s.map(|from_s| format!(", first at {from_s:.0} s")).unwrap_or_default();
+    let number = |of: fn(&Kind) -> f64| usual(all, of);
+    let only = |kind: &Kind| match *kind {
+        Kind::Late(value) | Kind::Filtered(value) | Kind::Scaled(value) | Kind::Off(value) => value,
+        Kind::Follows(_, value) | Kind::Settles(value, _) | Kind::Overflows(value) | Kind::Noise(value) | Kind::Rounded(value) => {
+            value
+        }
+        Kind::SignLost | Kind::Leaps | Kind::OffCentre(_) | Kind::Rows => 0.0,
+    };
+    let value = number(only);
+    let does = |one: &str, more: &str| if columns.len() > 1 { more.to_owned() } else { one.to_owned() };
+    match all[0].kind {
+        Kind::Late(_) => {
+            let how = if value < 0.0 { "early" } else { "late" };
+            format!("{names} {} {how} by about {:.0} ms{or}{since}", does("comes", "come"), 1e3 * value.abs())
+        }
+        Kind::Filtered(_) => format!(
+            "{names} {} as behind a filter with a time constant of about {value:.2} s: smoothed, slow and late{or}{since}",
+            does("comes", "come")
+        ),
+        Kind::Scaled(_) => format!(
+            "{names} {} about {value:.3} times as large as it should be: other units or a wrong scale{or}{since}",
+            does("is", "are")
+        ),
+        Kind::Off(_) => format!("{names} {} an offset of about {value:.3} {unit}{or}{since}", does("has", "have")),
+        Kind::Follows(control, _) => format!(
+            "{names} {} with {}: {value:.3} {unit} for one of it that no motion explains, a disturbance by what the control drives, such as a \
+             magnetic one{since}",
+            does("goes", "go"),
+            CONTROLS[control]
+        ),
+        Kind::Settles(..) => {
+            let time_s = number(|kind| if let Kind::Settles(_, time_s) = kind { *time_s } else { 0.0 });
+            format!(
+                "{names} {} about {value:.3} {unit} off and settles with a time constant of about {time_s:.1} s: a filter that converges from a wrong start",
+                does("starts", "start")
+            )
+        }
+        Kind::SignLost => format!(
+            "{names} {} never on both sides of 0 and would fit with both signs: the minus signs were lost",
+            does("is", "are")
+        ),
+        Kind::Overflows(_) => {
+            format!("{names} leaps from one end to the other of ±{value:.2} {unit}: it overflows there and wraps round{places}")
+        }
+        Kind::Leaps => format!("{names} leaps, while all that says how fast it changes does not: errors in few places{places}"),
+        Kind::Rounded(_) => format!("{names} {} rounded to steps of {value:.3} {unit}", does("is", "are")),
+        Kind::Noise(_) => format!(
+            "{names} {} noise or vibration of about {value:.3} {unit} (rms) that nothing it belongs to has{or}",
+            does("has", "have")
+        ),
+        Kind::OffCentre(_) => {
+            let [x, y, z] = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
+            format!(
+                "the linear accelerations are those of a sensor that is mounted off the centre of gravity by ({x:.2}, {y:.2}, {z:.2}) m, a lever arm: forward, \
+                 to the right, down"
+            )
+        }
+        Kind::Rows => format!(
+            "rows do not follow each other: most columns leap at once; a gap, rows repeated or in the wrong order, or parts joined so{places}"
+        ),
+    }
+}
+
+/// The line of `dataset.toml` that mends all flights, where one can.
+fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
+    if all.iter().any(|cause| cause.or.is_some() || cause.from_s.is_some()) {
+        return None;
+    }
+    let lines = |line: &dyn Fn(&str) -> String| columns.iter().map(|column| line(column.name())).collect::<Vec<_>>().join(", ");
+    match all[0].kind {
+        Kind::Late(_) => {
+            let late_s = usual(all, |kind| if let Kind::Late(late_s) = kind { *late_s } else { 0.0 });
+            Some(format!("[late] {}", lines(&|name| format!("{name} = {late_s:.3}"))))
+        }
+        Kind::Scaled(_) => {
+            let times = usual(all, |kind| if let Kind::Scaled(times) = kind { *times } else { 1.0 });
+            Some(format!("[columns] {}, with the file's name", lines(&|name| format!("{name} = \"{name} / {times:.5}\""))))
+        }
+        Kind::Off(_) => {
+            let by = usual(all, |kind| if let Kind::Off(by) = kind { *by } else { 0.0 });
+            let sign = if by < 0.0 { '+' } else { '-' };
+            Some(format!(
+                "[columns] {}, with the file's name",
+                lines(&|name| format!("{name} = \"{name} {sign} {:.4}\"", by.abs()))
+            ))
+        }
+        _ => None,
+    }
+}

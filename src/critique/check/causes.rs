@@ -1,0 +1,464 @@
+//! What would mend a broken relation of mechanics where no reading of whole streams does: one column that is late, filtered, scaled or off, that goes
+//! with a stick, settles from its start, lost its sign, overflows or is noisy, an accelerometer beside the centre of gravity, rows that do not follow each other.
+//! Each is tried on the channels of one flight, and the one that leaves least is the cause if it leaves little. Which flights stand out from the others is
+//! the business of `unexplained`; here each is taken by itself.
+
+use super::channels::{Channel, Stream, difference, summed};
+use super::increments::{Motion, Vector};
+use super::robust::median;
+use super::streams::grain;
+use crate::flight::Column;
+use crate::flight::attitude::cross;
+use std::ops::Range;
+
+/// A relation is broken where this share of the root mean square of the changes is left.
+const LEAST_SHARE: f64 = 0.05;
+/// A cause is one where with it this part of the squared errors is left at most.
+const LITTLE: f64 = 0.2;
+/// A channel of a stream is not broken by itself where it is so much less than another of the same stream: angles turn into each other.
+const BY_ITSELF: f64 = 0.1;
+/// What is wrong with a state is wrong in both of its relations: another one is broken as well from this part of the share on.
+const AS_WELL: f64 = 0.02;
+/// Pieces at least, for a fit.
+const FEWEST_PIECES: usize = 40;
+
+/// Shifts that are tried, s.
+const LATEST_S: f64 = 0.6;
+/// Time constants of a filter, s.
+const FILTERS_S: [f64; 9] = [0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.7, 1.0];
+/// Time constants of what settles, s.
+const SETTLING_S: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+/// What settles does so within this part of the flight: a slower decay is a drift.
+const SETTLED: f64 = 0.25;
+
+/// Where so much of the squares lies in this share of the pieces, a column leaps …
+const HELD: f64 = 0.8;
+/// … and rows do, where so many channels leap.
+const IN_PLACES: f64 = 0.1;
+const LEAPING: usize = 5;
+/// A leap is the work of one step where that makes this part of it.
+const IN_ONE_STEP: f64 = 0.5;
+/// Ends of a range agree with a leap to this part of it.
+const NEAR: f64 = 0.25;
+
+/// Noise is white where squares of pieces are those that steps of independent noise make, to this factor.
+const WHITE: f64 = 2.0;
+/// Rounding makes errors of the size of its step, to this factor: two of them make up a change, each a step over √12.
+const ROUNDING: f64 = 5.0;
+/// From a time on, where less than this part of the squares lies before it …
+const BEFORE: f64 = 0.01;
+/// … and that lies within this part of the flight.
+const WITHIN: [f64; 2] = [0.15, 0.85];
+
+/// What is wrong with a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Kind {
+    /// It comes late, s; early, if negative.
+    Late(f64),
+    /// It passed a filter of first order with this time constant, s.
+    Filtered(f64),
+    /// It is so many times what it should be.
+    Scaled(f64),
+    /// It has this too much.
+    Off(f64),
+    /// It goes with a control, in its unit for one of the control.
+    Follows(usize, f64),
+    /// It starts so far off, and settles with this time constant, s.
+    Settles(f64, f64),
+    /// It has only one sign.
+    SignLost,
+    /// It goes on from the other end of this range.
+    Overflows(f64),
+    /// It leaps.
+    Leaps,
+    /// White noise, or vibration: root mean square.
+    Noise(f64),
+    /// It is rounded to this step.
+    Rounded(f64),
+    /// Measured so far from the centre of gravity, m.
+    OffCentre(Vector),
+    /// Rows do not follow each other.
+    Rows,
+}
+
+impl Kind {
+    /// Begin of the finding's name.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Late(_) => "late",
+            Self::Filtered(_) => "filtered",
+            Self::Scaled(_) => "scaled",
+            Self::Off(_) => "off",
+            Self::Follows(..) => "disturbed",
+            Self::Settles(..) => "settling",
+            Self::SignLost => "sign_lost",
+            Self::Overflows(_) => "overflow",
+            Self::Leaps => "leaps",
+            Self::Noise(_) => "noisy",
+            Self::Rounded(_) => "rounded",
+            Self::OffCentre(_) => "off_centre",
+            Self::Rows => "rows",
+        }
+    }
+}
+
+/// What is wrong in one flight.
+#[derive(Clone, Debug)]
+pub(super) struct Cause {
+    pub kind: Kind,
+    /// The columns that it is wrong with.
+    pub columns: Vec<Column>,
+    /// Where the accelerations or the position are missing, what it may be in their place.
+    pub or: Option<&'static str>,
+    /// The first of the few places where it is wrong, or since when it is, s.
+    pub from_s: Option<f64>,
+}
+
+/// The causes in a flight.
+pub(super) fn of(motion: &Motion) -> Vec<Cause> {
+    let channels = Channel::all(motion);
+    let broken: Vec<Broken<'_>> = channels.iter().filter_map(Broken::of).collect();
+    let leaping = broken.iter().filter(|one| one.leaps().is_some()).count();
+    if leaping >= LEAPING {
+        let from_s = broken.iter().filter_map(|one| Some(one.at_s(*one.leaps()?.first()?))).reduce(f64::min);
+        return vec![Cause { kind: Kind::Rows, columns: Vec::new(), or: None, from_s }];
+    }
+    let off_centre = off_centre(motion, &broken);
+    let is_told = |one: &&Broken<'_>| off_centre.is_none() || one.channel.stream != Stream::Velocity;
+    let mut causes: Vec<(Option<Blame>, Cause)> = off_centre.iter().cloned().map(|cause| (None, cause)).collect();
+    for one in broken.iter().filter(is_told) {
+        let Some(blame) = one.blamed(&channels, &broken) else { continue };
+        let Some((kind, from_s)) = one.cause(blame.is_state, motion) else { continue };
+        let is_alike = |(other, cause): &&mut (Option<Blame>, Cause)| {
+            let same = |other: Blame| (other.stream, other.is_state) == (blame.stream, blame.is_state);
+            other.is_some_and(same) && std::mem::discriminant(&cause.kind) == std::mem::discriminant(&kind)
+        };
+        match causes.iter_mut().find(is_alike) {
+            Some((_, other)) => other.columns.push(blame.column),
+            None => {
+                let cause = Cause { kind, columns: vec![blame.column], or: blame.or, from_s };
+                causes.push((Some(blame), cause));
+            }
+        }
+    }
+    causes.into_iter().map(|entry| entry.1).collect()
+}
+
+/// The column that is to blame for a channel that does not fit.
+#[derive(Clone, Copy)]
+struct Blame {
+    stream: Stream,
+    column: Column,
+    /// It is the one that changes, and not what says how fast.
+    is_state: bool,
+    /// Where no other relation tells the two apart, the other one.
+    or: Option<&'static str>,
+}
+
+/// A channel that does not fit.
+struct Broken<'a> {
+    channel: &'a Channel,
+    errors: Vec<f64>,
+    square: f64,
+    /// Squared errors over the squares of the changes.
+    share: f64,
+}
+
+impl<'a> Broken<'a> {
+    fn of(channel: &'a Channel) -> Option<Self> {
+        let errors = channel.errors();
+        let square: f64 = errors.iter().map(|error| error * error).sum();
+        let share = square / channel.size();
+        (errors.len() >= FEWEST_PIECES && share > LEAST_SHARE * LEAST_SHARE && share.is_finite()).then_some(Self {
+            channel,
+            errors,
+            square,
+            share,
+        })
+    }
+
+    fn at_s(&self, piece: usize) -> f64 {
+        self.channel.pieces[piece].start as f64 * self.channel.step_s
+    }
+
+    /// `None` where another relation tells more.
+    fn blamed(&self, channels: &[Channel], broken: &[Self]) -> Option<Blame> {
+        let has = |stream: Stream| channels.iter().any(|one| one.stream == stream);
+        let largest =
+            |stream: Stream| broken.iter().filter(|one| one.channel.stream == stream).map(|one| one.share).fold(0.0, f64::max);
+        let is_broken = |stream: Stream| largest(stream) > AS_WELL * largest(self.channel.stream);
+        let Channel { stream, column, rate_column, .. } = *self.channel;
+        let state = |or| Some(Blame { stream, column, is_state: true, or });
+        let rate = |or| rate_column.map(|column| Blame { stream, column, is_state: false, or });
+        match stream {
+            Stream::Position if is_broken(Stream::Velocity) || is_broken(Stream::Attitude) => None,
+            Stream::Attitude if is_broken(Stream::Rates) || self.share < BY_ITSELF * largest(stream) => None,
+            Stream::Position => state((!has(Stream::Velocity)).then_some("the velocity")),
+            Stream::Attitude => state((!has(Stream::Rates)).then_some("the rates")),
+            // A wrong velocity moves no position rightly, and wrong rates turn nothing so.
+            Stream::Velocity if is_broken(Stream::Position) => state(None),
+            Stream::Rates if is_broken(Stream::Attitude) => state(None),
+            Stream::Velocity if !has(Stream::Position) => rate(Some(column.name())),
+            Stream::Velocity | Stream::Rates => rate(None),
+        }
+    }
+
+    fn usual_error(&self) -> f64 {
+        (self.square / self.errors.len() as f64).sqrt()
+    }
+
+    /// The pieces that hold most of the squared errors, in order, where they are few and each is the work of one step.
+    fn leaps(&self) -> Option<Vec<usize>> {
+        let mut order: Vec<usize> = (0..self.errors.len()).collect();
+        order.sort_unstable_by(|one, other| self.errors[*other].abs().total_cmp(&self.errors[*one].abs()));
+        let mut rest = HELD * self.square;
+        let last = order.iter().position(|&piece| {
+            rest -= self.errors[piece].powi(2);
+            rest <= 0.0
+        })?;
+        order.truncate(last + 1);
+        order.sort_unstable();
+        let is_leap =
+            |piece: &usize| self.step_errors(*piece).any(|(_, step)| step.abs() > IN_ONE_STEP * self.errors[*piece].abs());
+        let are_few = order.len() as f64 <= IN_PLACES * self.errors.len() as f64;
+        (are_few && order.iter().filter(|piece| is_leap(piece)).count() * 4 >= order.len() * 3).then_some(order)
+    }
+
+    /// What changes from sample to sample beside what f says, with the sample after the step.
+    fn step_errors(&self, piece: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let Channel { state, rate, step_s, .. } = self.channel;
+        let piece = self.channel.pieces[piece].clone();
+        (piece.start + 1..=piece.end).map(move |k| (k, state[k] - state[k - 1] - 0.5 * step_s * (rate[k] + rate[k - 1])))
+    }
+
+    /// What mends it, and from when on it is needed.
+    fn cause(&self, is_state: bool, motion: &Motion) -> Option<(Kind, Option<f64>)> {
+        let column = if is_state { &self.channel.state } else { &self.channel.rate };
+        // Steps that are as large as the errors are make them.
+        let step = grain(column.clone()).1.filter(|step| is_state && (step / self.usual_error()).ln().abs() < ROUNDING.ln());
+        if let Some(step) = step {
+            return Some((Kind::Rounded(step), None));
+        }
+        if let Some(leaps) = self.leaps() {
+            let from_s = Some(self.at_s(leaps[0]));
+            return is_state.then(|| (self.overflow(&leaps).map_or(Kind::Leaps, Kind::Overflows), from_s));
+        }
+        let whole = Trial { broken: self, from: 0, is_state };
+        if let Some(kind) = whole.best(motion) {
+            return Some((kind, None));
+        }
+        let from = self.begin().map(|from| Trial { from, ..whole });
+        let later = from.and_then(|trial| Some((trial.best(motion)?, Some(self.at_s(trial.from)))));
+        later.or_else(|| Some((self.noise(is_state)?, None)))
+    }
+
+    /// Half of the range, where leaps go from one end to the other.
+    fn overflow(&self, leaps: &[usize]) -> Option<f64> {
+        let state = &self.channel.state;
+        let step = |piece: &usize| self.step_errors(*piece).max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()));
+        let steps: Vec<(usize, f64)> = leaps.iter().filter_map(step).collect();
+        let limit = 0.5 * median(steps.iter().map(|step| step.1.abs()).collect())?;
+        let is_near = |value: f64, end: f64| (value - end).abs() < NEAR * limit;
+        let goes_round = |&&(k, step): &&(usize, f64)| {
+            let end = limit * step.signum();
+            is_near(state[k], end) && is_near(state[k - 1], -end)
+        };
+        (steps.iter().filter(goes_round).count() * 4 >= steps.len() * 3).then_some(limit)
+    }
+
+    /// The piece from which on errors are, if there are none before and there is much of the flight on both sides.
+    fn begin(&self) -> Option<usize> {
+        let mut before = 0.0;
+        let begin = self.errors.iter().position(|error| {
+            before += error * error;
+            before > BEFORE * self.square
+        })?;
+        let place = begin as f64 / self.errors.len() as f64;
+        (WITHIN[0]..WITHIN[1]).contains(&place).then_some(begin)
+    }
+
+    /// White noise of the column: steps of a noisy state undo each other, those of a noisy derivative add up, and pieces tell.
+    fn noise(&self, is_state: bool) -> Option<Kind> {
+        let (mut square, mut count) = (0.0, 0.0);
+        for (_, step) in (0..self.errors.len()).flat_map(|piece| self.step_errors(piece)) {
+            square += step * step;
+            count += 1.0;
+        }
+        let of_step = square / count;
+        let of_piece = self.square / self.errors.len() as f64;
+        let steps = count / self.errors.len() as f64;
+        let (white, rms) = if is_state {
+            (of_step, (0.5 * of_step).sqrt())
+        } else {
+            // A step is the mean of two samples times its length; over a piece the samples add up.
+            (2.0 * steps * of_step, (2.0 * of_step).sqrt() / self.channel.step_s)
+        };
+        (1.0 / WHITE..WHITE).contains(&(of_piece / white)).then_some(Kind::Noise(rms))
+    }
+}
+
+/// Causes that are tried on the pieces of a channel from one on.
+#[derive(Clone, Copy)]
+struct Trial<'a> {
+    broken: &'a Broken<'a>,
+    from: usize,
+    /// It is the column that changes that may be wrong, not what says how fast.
+    is_state: bool,
+}
+
+impl Trial<'_> {
+    fn pieces(&self) -> &[Range<usize>] {
+        &self.broken.channel.pieces[self.from..]
+    }
+
+    fn errors(&self) -> &[f64] {
+        &self.broken.errors[self.from..]
+    }
+
+    /// The cause that leaves least, if that is little.
+    fn best(&self, motion: &Motion) -> Option<Kind> {
+        let square: f64 = self.errors().iter().map(|error| error * error).sum();
+        if self.pieces().len() < FEWEST_PIECES {
+            return None;
+        }
+        let mut all = vec![self.late(), self.filtered(), self.scaled(), self.off(), self.settles()];
+        all.extend((0..4).map(|control| self.follows(motion, control)));
+        all.extend(self.sign_lost());
+        let (left, kind) = all.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+        (left < LITTLE * square).then_some(kind)
+    }
+
+    /// Squares that are left where f summed is this.
+    fn left(&self, summed: impl Fn(&Range<usize>) -> f64) -> f64 {
+        self.pieces().iter().map(|piece| (self.broken.channel.change(piece) - summed(piece)).powi(2)).sum()
+    }
+
+    /// The errors on one feature of a piece: what is left, and the coefficient.
+    fn on(&self, feature: impl Fn(&Range<usize>) -> f64) -> (f64, f64) {
+        let (mut moment, mut square, mut error_square) = (0.0, 0.0, 0.0);
+        for (piece, error) in self.pieces().iter().zip(self.errors()) {
+            let feature = feature(piece);
+            moment += feature * error;
+            square += feature * feature;
+            error_square += error * error;
+        }
+        if square > 0.0 { (error_square - moment * moment / square, moment / square) } else { (error_square, 0.0) }
+    }
+
+    fn late(&self) -> (f64, Kind) {
+        let channel = self.broken.channel;
+        let (last, most) = (channel.sum.len() as isize - 1, (LATEST_S / channel.step_s).round() as isize);
+        let at = |sample: usize, shift: isize| channel.sum[(sample as isize - shift).clamp(0, last) as usize];
+        let of = |shift: isize| (self.left(|piece| at(piece.end, shift) - at(piece.start, shift)), shift);
+        let (left, shift) = (-most..=most).map(of).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, 0));
+        let late_s = shift as f64 * channel.step_s;
+        (left, Kind::Late(if self.is_state { late_s } else { -late_s }))
+    }
+
+    fn filtered(&self) -> (f64, Kind) {
+        let channel = self.broken.channel;
+        let of = |time_s: f64| {
+            let left = if self.is_state {
+                let sum = summed(&lagged(&channel.rate, time_s, channel.step_s), channel.step_s);
+                self.left(|piece| difference(&sum, piece))
+            } else {
+                let state = lagged(&channel.state, time_s, channel.step_s);
+                let of_piece = |piece: &Range<usize>| (difference(&state, piece) - difference(&channel.sum, piece)).powi(2);
+                self.pieces().iter().map(of_piece).sum()
+            };
+            (left, Kind::Filtered(time_s))
+        };
+        FILTERS_S.map(of).into_iter().min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, Kind::Leaps))
+    }
+
+    fn scaled(&self) -> (f64, Kind) {
+        let (left, beyond) = self.on(|piece| difference(&self.broken.channel.sum, piece));
+        let times = 1.0 + beyond;
+        (left, Kind::Scaled(if self.is_state { times } else { 1.0 / times }))
+    }
+
+    fn off(&self) -> (f64, Kind) {
+        let step_s = self.broken.channel.step_s;
+        // An offset of a state changes nothing.
+        if self.is_state {
+            return (f64::INFINITY, Kind::Off(0.0));
+        }
+        let (left, by) = self.on(|piece| step_s * (piece.end - piece.start) as f64);
+        (left, Kind::Off(-by))
+    }
+
+    fn settles(&self) -> (f64, Kind) {
+        let step_s = self.broken.channel.step_s;
+        let of = |time_s: f64| {
+            let at = |sample: usize| (-step_s * sample as f64 / time_s).exp();
+            let (left, by) = self.on(|piece| at(piece.end) - at(piece.start));
+            (left, Kind::Settles(by, time_s))
+        };
+        let longest_s = SETTLED * step_s * self.broken.channel.state.len() as f64;
+        let trials = SETTLING_S.into_iter().filter(|time_s| self.is_state && *time_s < longest_s);
+        trials.map(of).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, Kind::Leaps))
+    }
+
+    fn follows(&self, motion: &Motion, control: usize) -> (f64, Kind) {
+        let u = |sample: usize| motion.instants[sample].controls[control];
+        let (left, by) = if self.is_state {
+            self.on(|piece| u(piece.end) - u(piece.start))
+        } else {
+            let mean = (0..motion.instants.len()).map(u).sum::<f64>() / motion.instants.len() as f64;
+            let (left, by) = self.on(|piece| motion.integral(piece, |k| [u(k) - mean])[0]);
+            (left, -by)
+        };
+        (left, Kind::Follows(control, by))
+    }
+
+    fn sign_lost(&self) -> Option<(f64, Kind)> {
+        let channel = self.broken.channel;
+        let column = if self.is_state { &channel.state } else { &channel.rate };
+        let has_one_sign = column.iter().all(|value| *value >= 0.0) || column.iter().all(|value| *value <= 0.0);
+        let of_piece = |piece: &Range<usize>| {
+            let (change, sum) = (channel.change(piece), difference(&channel.sum, piece));
+            (change - sum).abs().min((change + sum).abs()).powi(2)
+        };
+        has_one_sign.then(|| (self.pieces().iter().map(of_piece).sum(), Kind::SignLost))
+    }
+}
+
+/// A series behind a filter of first order that starts at rest.
+fn lagged(series: &[f64], time_s: f64, step_s: f64) -> Vec<f64> {
+    let kept = (-step_s / time_s).exp();
+    let mut state = series.first().copied().unwrap_or(0.0);
+    let follow = |value: &f64| {
+        state = kept * state + (1.0 - kept) * value;
+        state
+    };
+    series.iter().map(follow).collect()
+}
+
+/// Whether linear accelerations are those of a point beside the centre of gravity: a = a₀ + ω' × r + ω × (ω × r), with r fitted on all three axes.
+fn off_centre(motion: &Motion, broken: &[Broken<'_>]) -> Option<Cause> {
+    let such: Vec<&Broken<'_>> = broken.iter().filter(|one| one.channel.stream == Stream::Velocity).collect();
+    if such.len() < 2 || broken.iter().any(|one| one.channel.stream == Stream::Position) {
+        return None;
+    }
+    let (mut gram, mut moment, mut square) = (nalgebra::Matrix3::<f64>::zeros(), nalgebra::Vector3::<f64>::zeros(), 0.0);
+    for one in &such {
+        let axis = one.channel.column as usize - Column::Vx as usize;
+        for (piece, error) in one.channel.pieces.iter().zip(&one.errors) {
+            // The change says less than the derivative by what the arm adds to that.
+            let feature = nalgebra::Vector3::from(motion.integral(piece, |k| {
+                let instant = &motion.instants[k];
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|arm| {
+                    let (along, inwards) = (cross(instant.angular_target, arm), cross(instant.rates, cross(instant.rates, arm)));
+                    -(along[axis] + inwards[axis])
+                })
+            }));
+            gram += feature * feature.transpose();
+            moment += feature * *error;
+            square += error * error;
+        }
+    }
+    let arm = gram.cholesky()?.solve(&moment);
+    let left = square - moment.dot(&arm);
+    let columns = vec![Column::VxDot, Column::VyDot, Column::VzDot];
+    (left < LITTLE * square).then(|| Cause { kind: Kind::OffCentre(arm.into()), columns, or: None, from_s: None })
+}
