@@ -24,6 +24,8 @@ pub const BENCHMARK_SEED: u64 = 2030;
 const TRAINING_SHARE: f64 = 0.7;
 const VALIDATION_SHARE: f64 = 0.2;
 
+/// Of so many flights one is kept from a search.
+const SEARCH_SHARE: usize = 5;
 /// Of so many segments one validates where the division keeps none for that.
 const VALIDATING: usize = 5;
 
@@ -175,12 +177,7 @@ impl Split {
         }
         Ok(split)
     }
-}
 
-/// Of so many flights one is kept from a search.
-const SEARCH_SHARE: usize = 5;
-
-impl Split {
     /// Keeps whole flights from a search: one of every five in the order of class and name, which one by `seed`; of fewer than ten
     /// flights the last fifth of each. Nothing validates.
     pub fn for_search(flights: &[Flight], seed: u64) -> Self {
@@ -198,9 +195,7 @@ impl Split {
         let (test, training) = whole(flights).partition(|span| kept(span.flight));
         Self { training, validation: Vec::new(), test, tested: Part::Test }
     }
-}
 
-impl Split {
     /// The same division with a random share of the training part's 10-s segments; what is left over at the end of a training span
     /// goes with the rest.
     #[must_use]
@@ -211,9 +206,7 @@ impl Split {
         let chosen = permutation(sorted.len(), seed, 0).into_iter().take(kept).map(|index| sorted[index as usize]);
         Self { training: joined(chosen.collect()), ..self.clone() }
     }
-}
 
-impl Split {
     /// The same division where nothing validates, with a fifth of the training part's segments of a length taken for that.
     #[must_use]
     pub fn with_validation(&self, flights: &[Flight], length_s: f64, seed: u64) -> Self {
@@ -374,6 +367,29 @@ mod tests {
             prop_assert_eq!(samples(&split.training), (whole_segments as f64 * 0.7).round() as usize * 1000);
             let all = samples(&split.training) + samples(&split.validation) + samples(&split.test);
             prop_assert_eq!(all, whole_segments * 1000);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_validates_is_a_fifth_of_what_trained_and_nothing_is_lost(lengths in prop::collection::vec(1usize..9000, 4..12), seed: u64) {
+            let logs = flights(&lengths);
+            let before = Split { validation: Vec::new(), ..Split::for_search(&logs, seed) };
+            let after = before.with_validation(&logs, SEGMENT_S, seed);
+            let mut seen: Vec<Vec<u8>> = lengths.iter().map(|length| vec![0; *length]).collect();
+            for span in after.training.iter().chain(&after.validation) {
+                prop_assert!(span.start < span.end);
+                seen[span.flight][span.start..span.end].iter_mut().for_each(|count| *count += 1);
+            }
+            for span in &before.training {
+                prop_assert!(seen[span.flight][span.start..span.end].iter().all(|count| *count == 1), "a sample lost, or taken twice");
+            }
+            prop_assert_eq!(samples(&after.training) + samples(&after.validation), samples(&before.training));
+            prop_assert_eq!(&after.test, &before.test);
+            let segments: usize =
+                before.training.iter().map(|span| segments(*span, logs[span.flight].step_s, SEGMENT_S).count()).sum();
+            prop_assert!(after.validation.len() <= segments / VALIDATING);
+            prop_assert_eq!(after.validation.is_empty(), segments < VALIDATING);
         }
     }
 

@@ -6,7 +6,7 @@
 
 use super::method::Predictor;
 use super::outcome::{Outcome, Trace, segments};
-use super::plan::{Division, Plan, Run, Treatment};
+use super::plan::{Division, Plan, Run, Treatment, noise};
 use crate::critique::diagnose::{Amended, Options, amend};
 use crate::critique::{Row, centred_difference, explainable_at, finite_difference, ridge};
 use crate::disk::write_atomically;
@@ -24,17 +24,6 @@ use phyture_kernels::random::Stream;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-
-/// White noise on a column of the flights: that of a good attitude filter with satellite navigation, one standard deviation. Of a control: a
-/// hundredth of its full deflection.
-const fn noise(column: Column) -> f64 {
-    match column {
-        Column::X | Column::Y | Column::Z | Column::Vx | Column::Vy | Column::Vz => 0.02,
-        Column::Roll | Column::Pitch | Column::Yaw => 0.003,
-        Column::U1 | Column::U2 | Column::U3 | Column::U4 | Column::Wx | Column::Wy | Column::Wz => 0.01,
-        _ => 0.0,
-    }
-}
 
 /// Samples between the points of a trace.
 const TRACE_STRIDE: usize = 4;
@@ -198,7 +187,7 @@ impl<'a> Experiment<'a> {
             })?,
         };
         let mut split = Split::new(self.flights, held_out, &data.split, settings.split_seed)?;
-        if split.validation.is_empty() && settings.validates_in_folds() {
+        if split.validation.is_empty() && settings.chooses_on_validation() {
             let length_s = if data.split.lead_s() > 0.0 { STRETCH_S } else { SEGMENT_S };
             split = split.with_validation(self.flights, length_s, settings.split_seed);
         }

@@ -125,7 +125,9 @@ pub const METHODS: &[Method] = &[
     row(
         "floor",
         "Floor",
-        Some("what the simulator's explainable part leaves: gusts, turbulence and noise that no predictor can know"),
+        Some(
+            "what the simulator's explainable part leaves: gusts, turbulence and noise, which nothing tells beforehand; a method that differentiates the measured history sees gusts as they come, and can lie below",
+        ),
         Predictor::Floor,
     ),
     network("cnn", "CNN hybrid", RECONSTRUCTION, |base| {

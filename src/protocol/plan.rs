@@ -5,6 +5,7 @@
 use super::method::{Method, Predictor, method};
 use super::settings::Settings;
 use crate::error::{Error, Result};
+use crate::flight::Column;
 use crate::hybrid::linear::LinearConfig;
 use crate::train::TrainConfig;
 use serde::{Deserialize, Serialize};
@@ -40,6 +41,17 @@ pub enum Treatment {
     StateNoise,
     /// White noise on the four controls of all flights.
     ControlNoise,
+}
+
+/// White noise on a column of the flights: that of a good attitude filter with satellite navigation, one standard deviation. Of a control: a
+/// hundredth of its full deflection.
+pub(super) const fn noise(column: Column) -> f64 {
+    match column {
+        Column::X | Column::Y | Column::Z | Column::Vx | Column::Vy | Column::Vz => 0.02,
+        Column::Roll | Column::Pitch | Column::Yaw => 0.003,
+        Column::U1 | Column::U2 | Column::U3 | Column::U4 | Column::Wx | Column::Wy | Column::Wz => 0.01,
+        _ => 0.0,
+    }
 }
 
 /// A table of the paper, or of ours.
@@ -410,7 +422,7 @@ impl Plan {
             &self.data_sha256,
             &self.model,
             self.settings.split_seed,
-            self.settings.validates_in_folds(),
+            self.settings.chooses_on_validation(),
             self.held_out(run.division),
             run.treatment,
         ))

@@ -133,7 +133,7 @@ impl Settings {
     }
 
     /// Whether a part of the training flights validates where whole classes are held out: where something is chosen on it.
-    pub const fn validates_in_folds(&self) -> bool {
+    pub const fn chooses_on_validation(&self) -> bool {
         self.training.keep_best || !self.rates.is_empty()
     }
 

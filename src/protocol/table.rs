@@ -7,10 +7,10 @@ use super::lead::{Lead, lead};
 use super::method::{Method, method};
 use super::outcome::{Outcome, Segment, Sums, Trace};
 use super::paper;
-use super::plan::{ABLATION, COMPARISON, Division, FUSION, NOISY, Plan, ROBUST, Run, SWEEP, TREATMENTS, TableId, Treatment};
+use super::plan::{ABLATION, COMPARISON, Division, FUSION, NOISY, Plan, ROBUST, Run, SWEEP, TREATMENTS, TableId, Treatment, noise};
 use crate::critique::ChannelValues;
 use crate::error::Result;
-use crate::flight::{Channel, PerChannel};
+use crate::flight::{Channel, Column, PerChannel};
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -180,9 +180,9 @@ impl Finished {
     /// Table 1 where white noise is on the states that train and on those that are judged.
     fn noisy(&self) -> Table {
         let rows = self.plan.wanted(NOISY).filter_map(method).map(|method| self.row(method, Treatment::StateNoise, RMSE));
-        let title =
-            "RMSE with white noise on the states of all flights, training and test: 0.02 m, 0.02 m/s, 0.003 rad, 0.01 rad/s";
-        Table { id: "noise".into(), title: title.into(), rows: rows.collect(), leads: self.leads(NOISY, Treatment::StateNoise) }
+        let sizes = [Column::X, Column::Vx, Column::Roll, Column::Wx].map(|column| format!("{} {}", noise(column), column.unit()));
+        let title = format!("RMSE with white noise on the states of all flights, training and test: {}", sizes.join(", "));
+        Table { id: "noise".into(), title, rows: rows.collect(), leads: self.leads(NOISY, Treatment::StateNoise) }
     }
 
     /// Phy-Ture held against each other method that has a run, under one treatment.
@@ -304,8 +304,9 @@ impl Finished {
                 rows.push(row);
             }
         }
-        let title = "RMSE with white noise of 0.01 on the controls of all flights, wrong coefficients, less data";
-        Table { id: "robustness".into(), title: title.into(), rows, leads: Vec::new() }
+        let title =
+            format!("RMSE with white noise of {} on the controls of all flights, wrong coefficients, less data", noise(Column::U1));
+        Table { id: "robustness".into(), title, rows, leads: Vec::new() }
     }
 
     /// Mean RMSE over the seeds of every method of Table 1 on every part of the test flights that `part` names (Figure 6 and the errors by

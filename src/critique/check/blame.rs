@@ -19,8 +19,11 @@ pub(super) struct Blamed {
 /// Streams this much apart, or filtered so, change verdicts, s: lags of rotor and servo are as long.
 const SLOW_S: f64 = 0.04;
 
-/// Gathers the causes of flights; of a flight with sound relations there are none to look for. Noise is one in `outstanding` flights alone: every sensor has
-/// some.
+/// A cause of the set is one of so many of its flights.
+const HALF: f64 = 0.5;
+
+/// Gathers the causes of flights; of a flight with sound relations there are none to look for. Noise is one in `outstanding` flights alone, since every sensor
+/// has some, and leaps elsewhere are a warning.
 pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTreeSet<usize>, flights: &[Flight]) -> Blamed {
     let sound = causes.iter().filter(|entry| entry.1.is_none()).count();
     let mut alike: BTreeMap<(&'static str, Option<&'static str>), Vec<(usize, &Cause)>> = BTreeMap::new();
@@ -42,15 +45,19 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
         let message = told(&of_all, &columns);
         let indices: BTreeSet<usize> = alike.iter().map(|entry| entry.0).collect();
         let indices: Vec<usize> = indices.into_iter().collect();
-        let is_set = indices.len() as f64 > MOST * (sound + indices.len()) as f64;
+        let of_those = indices.len() as f64;
+        let is_set = of_those > MOST * (sound as f64 + of_those) && of_those > HALF * causes.len() as f64;
         let found = if is_set {
             finding(&name, Severity::Fault, message, mend(&of_all, &columns).as_deref())
         } else {
             in_flights(&name, &indices, &message, flights)
         };
-        let verdict = if matters(&of_all, &columns) { Severity::Fault } else { Severity::Warning };
+        let leaps_as_usual = alike[0].1.kind == Kind::Leaps && !indices.iter().all(|flight| outstanding.contains(flight));
+        let is_fault = matters(&of_all, &columns) && !leaps_as_usual;
+        let verdict = if is_fault { Severity::Fault } else { Severity::Warning };
         blamed.findings.push(Finding { verdict, ..found });
-        if !is_set {
+        // Of a position that is wrong all is said; a flight that is a little late is as good as any.
+        if !is_set && (is_fault || columns.iter().all(|column| stream_of(*column) == "position")) {
             blamed.flights.extend(indices);
         }
     }

@@ -15,6 +15,8 @@ const MOSTLY: f64 = 0.6;
 const REGULAR: f64 = 0.8;
 /// Corners at least.
 const FEWEST: usize = 20;
+/// Samples of a flight that are looked at, at most.
+const LOOKED_AT: usize = 3_000;
 /// From this period on, s, lines hide what an aircraft does.
 const LONG_S: f64 = 0.05;
 
@@ -24,7 +26,8 @@ pub(super) fn findings(flights: &[Flight], is_rounded: &dyn Fn(Column) -> bool) 
     let mut by_rate: BTreeMap<(usize, Vec<usize>), Vec<Column>> = BTreeMap::new();
     for column in Column::ALL.into_iter().filter(present) {
         let each = flights.iter().enumerate().map(|(index, flight)| {
-            let period = period(flight.column(column));
+            let values = flight.column(column);
+            let period = period(&values[..values.len().min(LOOKED_AT)]);
             flight.rest();
             (index, period)
         });

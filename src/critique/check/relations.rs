@@ -34,13 +34,14 @@ pub(super) struct Relation {
     hypotheses: Vec<Hypothesis>,
     /// Error and size of the measured change by hypothesis, one entry a block.
     misfit: Vec<Vec<(f64, f64)>>,
-    open: Option<(usize, usize)>,
 }
 
 /// Share of the nominal error that another reading may leave at most to be taken for true.
 const CONVINCING_SHARE: f64 = 0.5;
 /// Share of the change that the nominal reading has to leave unexplained before another is considered at all.
 const MATERIAL_SHARE: f64 = 0.02;
+/// A flight in which it leaves less than this holds it, and is not asked for other readings.
+const HOLDS: f64 = 0.25 * MATERIAL_SHARE;
 /// A reading that leaves more than this of the changes unexplained is none.
 const LARGEST_SHARE: f64 = 0.25;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
@@ -133,7 +134,7 @@ fn axes(rotation: &Matrix3) -> Stack {
 impl Relation {
     fn new(name: &'static str, formula: &'static str, applies: fn(&Motion) -> bool, hypotheses: Vec<Hypothesis>) -> Self {
         let misfit = hypotheses.iter().map(|_| Vec::new()).collect();
-        Self { name, formula, applies, hypotheses, misfit, open: None }
+        Self { name, formula, applies, hypotheses, misfit }
     }
 
     /// ṗ = R v.
@@ -265,23 +266,40 @@ impl Relation {
             return;
         }
         let every = motion.pieces(0).count().div_ceil(ENOUGH).max(1);
-        for (piece, block) in motion.pieces(0).step_by(every) {
-            if self.open != Some((flight, block)) {
-                self.open = Some((flight, block));
-                self.misfit.iter_mut().for_each(|blocks| blocks.push((0.0, 0.0)));
+        let first = self.misfit[0].len();
+        self.add_reading(0, flight, motion, every);
+        let (error, size) = total(&self.misfit[0][first..]);
+        // Where the nominal reading holds another leaves all.
+        let holds = error <= HOLDS * size;
+        for reading in 1..self.hypotheses.len() {
+            if holds {
+                let sizes = self.misfit[0][first..].iter().map(|block| (block.1, block.1)).collect::<Vec<_>>();
+                self.misfit[reading].extend(sizes);
+            } else {
+                self.add_reading(reading, flight, motion, every);
             }
-            for (hypothesis, blocks) in self.hypotheses.iter().zip(&mut self.misfit) {
-                let (error, size) = hypothesis.misfit(motion, &piece);
-                if let Some(sums) = blocks.last_mut() {
-                    *sums = (sums.0 + error, sums.1 + size);
-                }
+        }
+    }
+
+    /// Adds the misfits of one reading in a flight, block by block.
+    fn add_reading(&mut self, reading: usize, flight: usize, motion: &Motion, every: usize) {
+        let blocks = &mut self.misfit[reading];
+        let mut open = None;
+        for (piece, block) in motion.pieces(0).step_by(every) {
+            if open != Some((flight, block)) {
+                open = Some((flight, block));
+                blocks.push((0.0, 0.0));
+            }
+            let (error, size) = self.hypotheses[reading].misfit(motion, &piece);
+            if let Some(sums) = blocks.last_mut() {
+                *sums = (sums.0 + error, sums.1 + size);
             }
         }
     }
 
     /// Squared error of a reading over that of the measured changes.
     fn share(&self, index: usize) -> f64 {
-        let (error, size) = self.misfit[index].iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
+        let (error, size) = total(&self.misfit[index]);
         if size > 0.0 { error / size } else { f64::NAN }
     }
 
@@ -312,11 +330,9 @@ impl Relation {
 
     /// Adds the blocks of the same relation elsewhere, so many of them as one.
     pub fn absorb(&mut self, other: &Self, together: usize) {
-        let total = |blocks: &[(f64, f64)]| blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1));
         for (blocks, others) in self.misfit.iter_mut().zip(&other.misfit) {
             blocks.extend(others.chunks(together).map(total));
         }
-        self.open = None;
     }
 
     /// Severity over all flights, `left` as of [`Relation::other_reading`]; `None` where the relation never applied.
@@ -366,6 +382,11 @@ impl Relation {
         });
         BlockMean::new(ratios).and_then(|mean| mean.interval()).is_some_and(|[_, high]| high < 0.0)
     }
+}
+
+/// Errors and sizes of several blocks.
+fn total(blocks: &[(f64, f64)]) -> (f64, f64) {
+    blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1))
 }
 
 impl Hypothesis {

@@ -5,12 +5,16 @@ pub(super) const NORMAL: f64 = 1.4826;
 
 /// The upper of the two middle values, where they are two.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 2).copied()
+    let middle = values.len() / 2;
+    nth(&mut values, middle)
 }
 
 /// The lower quartile: what is usual where half of the flights may be faulty upwards.
 pub(super) fn lower_quartile(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_unstable_by(f64::total_cmp);
-    values.get(values.len() / 4).copied()
+    let quarter = values.len() / 4;
+    nth(&mut values, quarter)
+}
+
+fn nth(values: &mut [f64], place: usize) -> Option<f64> {
+    (place < values.len()).then(|| *values.select_nth_unstable_by(place, f64::total_cmp).1)
 }
