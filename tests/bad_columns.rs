@@ -252,3 +252,31 @@ fn lines_copies_repeated_rows_and_sticks_that_drop_out_are_named() -> Outcome {
         }
     })
 }
+
+#[test]
+fn sticks_behind_a_mixer_and_a_trim_that_was_moved_are_named_in_the_flights_that_have_them() -> Outcome {
+    let turned = checked(flights(
+        |index| index % 2 == 0,
+        |columns| {
+            let (sine, cosine) = 20.0_f64.to_radians().sin_cos();
+            for sample in 0..columns[0].len() {
+                let [u1, u2] = [Column::U1, Column::U2].map(|column| columns[column as usize][sample]);
+                columns[Column::U1 as usize][sample] = cosine * u1 - sine * u2;
+                columns[Column::U2 as usize][sample] = sine * u1 + cosine * u2;
+            }
+        },
+    )?);
+    let finding = turned.findings.iter().find(|finding| finding.name.starts_with("mixed_u")).ok_or_else(|| turned.to_string())?;
+    assert!(finding.verdict == Severity::Fault && finding.message.contains("mixed or turned"), "{}", finding.message);
+    let moved = checked(flights(
+        |index| index == 3,
+        |columns| {
+            let at = 3 * columns[0].len() / 5;
+            columns[Column::U1 as usize][at..].iter_mut().for_each(|u| *u += 0.15);
+        },
+    )?);
+    let finding = moved.findings.iter().find(|finding| finding.name == "trim_moved_u1").ok_or_else(|| moved.to_string())?;
+    assert!(finding.verdict == Severity::Warning && finding.flights.len() == 1, "{}", finding.message);
+    assert!(finding.message.contains("u1 stands 0.1") && finding.message.contains("higher"), "{}", finding.message);
+    Ok(())
+}

@@ -355,9 +355,9 @@ fn leaps_of_the_attitude_are_placed() -> Outcome {
     let name = flights[3].name.clone();
     let set = DataSet { flights, ..DataSet::default() };
     let report = check(&set, None);
-    let finding = report.findings.iter().find(|finding| finding.name == "unexplained_attitude").ok_or("no finding")?;
-    assert_eq!(finding.flights, [name]);
-    assert!(finding.message.contains("leaps") && finding.message.contains("10 s"), "{}", finding.message);
+    let finding = report.findings.iter().find(|finding| finding.name == "leaps_roll").ok_or("no finding")?;
+    assert_eq!((finding.verdict, finding.flights.as_slice()), (Severity::Fault, [name].as_slice()));
+    assert!(finding.message.contains("leaps") && finding.message.contains("11 s"), "{}", finding.message);
     Ok(())
 }
 

@@ -169,7 +169,9 @@ impl<'a> Broken<'a> {
         let errors = channel.errors();
         let square: f64 = errors.iter().map(|error| error * error).sum();
         let share = square / channel.size();
-        (errors.len() >= FEWEST_PIECES && share > LEAST_SHARE * LEAST_SHARE && share.is_finite()).then_some(Self {
+        // A column that stands still is the business of `streams`.
+        let moves = channel.state.windows(2).any(|pair| pair[0] != pair[1]);
+        (moves && errors.len() >= FEWEST_PIECES && share > LEAST_SHARE * LEAST_SHARE && share.is_finite()).then_some(Self {
             channel,
             errors,
             square,
@@ -351,7 +353,13 @@ impl Trial<'_> {
         let at = |sample: usize, shift: isize| channel.sum[(sample as isize - shift).clamp(0, last) as usize];
         let of = |shift: isize| (self.left(|piece| at(piece.end, shift) - at(piece.start, shift)), shift);
         let (left, shift) = (-most..=most).map(of).min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, 0));
-        let late_s = shift as f64 * channel.step_s;
+        // By less than a sample: s is late by as much as it lacks of f's change.
+        let (left_by_part, part_s) = self.on(|piece| difference(&channel.rate, piece));
+        let (left, late_s) = if left_by_part < left && part_s.abs() < channel.step_s {
+            (left_by_part, -part_s)
+        } else {
+            (left, shift as f64 * channel.step_s)
+        };
         (left, Kind::Late(if self.is_state { late_s } else { -late_s }))
     }
 

@@ -25,6 +25,7 @@ mod gains;
 mod increments;
 mod limits;
 mod lines;
+mod mixes;
 mod mounts;
 mod odd;
 mod regression;
@@ -190,6 +191,7 @@ impl Gathered {
             findings.extend(dead_zone::findings(&data.flights));
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
+            of_sticks.extend(mixes::findings(&self.sticks, &data.flights, &self.unjudged));
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
             let faults = of_sticks.iter().filter(|finding| finding.verdict == Severity::Fault);
             let named: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();

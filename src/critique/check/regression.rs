@@ -89,6 +89,27 @@ impl<const K: usize> BlockRegression<K> {
         BlockRegression { blocks: self.blocks.iter().map(of).collect(), open: None }
     }
 
+    /// With one column more: one of the others from this block on, and 0 before. `J` is `K` + 1.
+    pub fn stepped<const J: usize>(&self, column: usize, from: usize) -> BlockRegression<J> {
+        assert_eq!(J, K + 1, "one column more");
+        let of = |(block, sums): (usize, &Sums<K>)| {
+            let is_after = if block < from { 0.0 } else { 1.0 };
+            let place = |i: usize| if i < K { (i, 1.0) } else { (column, is_after) };
+            Sums {
+                gram: std::array::from_fn(|i| {
+                    std::array::from_fn(|j| {
+                        let ((row, one), (along, other)) = (place(i), place(j));
+                        one * other * sums.gram[row][along]
+                    })
+                }),
+                moment: std::array::from_fn(|i| place(i).1 * sums.moment[place(i).0]),
+                square: sums.square,
+                rows: sums.rows,
+            }
+        };
+        BlockRegression { blocks: self.blocks.iter().enumerate().map(of).collect(), open: None }
+    }
+
     /// The blocks of several as one.
     pub fn merged<'a>(parts: impl Iterator<Item = &'a Self>) -> Self {
         Self { blocks: parts.flat_map(|part| part.blocks.iter().cloned()).collect(), open: None }

@@ -1,9 +1,10 @@
-//! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, and one that stands elsewhere in some flights
-//! than in the others for the same answer. Signs, gains and order of the sticks are the business of `sticks`.
+//! Where a stick stands: one that keeps its last value to the end of a flight while its axis moves on, one that stands elsewhere in some flights than
+//! in the others for the same answer, and one that does so from somewhere in a flight on. Signs, gains and order of the sticks are the business of `sticks`.
 
 use super::finding::{Finding, Severity};
 use super::flights::{CONTROLS, in_flights};
 use super::increments::SHORT_BLOCK_S;
+use super::regression::BlockRegression;
 use super::robust::{NORMAL, median};
 use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks};
 use crate::flight::Flight;
@@ -25,6 +26,14 @@ const TRIMMED: f64 = 0.5;
 /// … and where it is so many times as far from them as they scatter.
 const APART: f64 = 6.0;
 
+/// A trim was moved where the same answer needs the stick elsewhere from a time on by this many usual deviations of it …
+const MOVED: f64 = 0.3;
+/// … that is so many times its interval, and leaves this part of the squared errors at most, …
+const CERTAIN: f64 = 5.0;
+const LEFT: f64 = 0.5;
+/// … with so many blocks on either side.
+const BESIDE: usize = 2;
+
 /// What is wrong with where sticks stand; nothing of flights in `except`.
 pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<usize>) -> Vec<Finding> {
     let judged: Vec<&(usize, Regressions)> = sticks.flights.iter().filter(|(flight, _)| !except.contains(flight)).collect();
@@ -33,7 +42,8 @@ pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<us
     let rest: Vec<&(usize, Regressions)> =
         judged.into_iter().filter(|(flight, _)| !stands.contains(&flights[*flight].name)).collect();
     // The tail holds against the torque of the rotor and the collective carries the weight: where these stand is what is flown.
-    let of_trim: Vec<Finding> = (0..2).filter_map(|stick| trimmed(stick, &rest, flights)).collect();
+    let of_trim: Vec<Finding> =
+        (0..2).flat_map(|stick| [trimmed(stick, &rest, flights), moved(stick, &rest, flights)]).flatten().collect();
     findings.extend(of_trim);
     findings
 }
@@ -105,6 +115,40 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
     let mut indices: Vec<usize> = fewer.iter().map(|trim| trim.flight).collect();
     indices.sort_unstable();
     Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
+}
+
+/// Flights in which the same answer needs the stick elsewhere from a time on. What shifts a centre of mass in flight does the same, so it is a warning.
+fn moved(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
+    let moves = median(judged.iter().map(|(_, regressions)| regressions[stick].deviation(FIRST + stick, CONSTANT)).collect())?;
+    let of = |(flight, regressions): &&(usize, Regressions)| Some((*flight, step(&regressions[stick], stick, MOVED * moves)?));
+    let such: Vec<(usize, (f64, usize))> = judged.iter().filter_map(of).collect();
+    let by = median(such.iter().map(|entry| entry.1.0).collect())?;
+    let (_, (_, first)) = such.first()?;
+    let name = STICKS[stick];
+    let message = format!(
+        "{name} stands {:.3} {} for the same answer from somewhere in the flight on ({:.0} s in the first of them): a trim that was moved and recorded, an          offset of {name}, or a centre of mass that shifted",
+        by.abs(),
+        if by > 0.0 { "higher" } else { "lower" },
+        *first as f64 * SHORT_BLOCK_S
+    );
+    let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
+    Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_moved_{name}"), &indices, &message, flights) })
+}
+
+/// By how much a stick stands elsewhere from a block on, and that block.
+fn step(regression: &BlockRegression<{ CONSTANT + 1 }>, stick: usize, least: f64) -> Option<(f64, usize)> {
+    let errors = |errors: Option<Vec<f64>>| errors.map(|errors| errors.iter().sum::<f64>());
+    let whole = errors(regression.errors())?;
+    let with = |from: usize| regression.stepped::<{ CONSTANT + 2 }>(CONSTANT, from);
+    let places = BESIDE..regression.blocks().saturating_sub(BESIDE) + 1;
+    let left = places.filter_map(|from| Some((errors(with(from).errors())?, from)));
+    let (left, from) = left.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let estimates = with(from).estimates()?;
+    let (gain, step) = (estimates[FIRST + stick], estimates[CONSTANT + 1]);
+    let half = 0.5 * (step.interval[1] - step.interval[0]);
+    let by = -step.value / gain.value;
+    let is_certain = gain.interval[0] * gain.interval[1] > 0.0 && step.value.abs() > CERTAIN * half;
+    (is_certain && left < LEFT * whole && by.abs() > least).then_some((by, from))
 }
 
 /// The smaller of two groups of trims far apart, and by how much it differs; `None` where there is one group.
