@@ -369,6 +369,10 @@ impl Queue<'_> {
 
 /// What is to be done, by method, with the time that it will take.
 fn announce(context: &Context, left: &[Run], costs: &[f64]) {
+    if left.is_empty() {
+        context.say("nothing left to do");
+        return;
+    }
     context.say(format!("{} runs to do, about {} on this machine", left.len(), duration(costs.iter().sum())));
     let mut methods: Vec<(&str, Vec<f64>)> = Vec::new();
     for (run, cost) in left.iter().zip(costs) {
