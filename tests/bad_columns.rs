@@ -69,7 +69,7 @@ fn a_late_position_is_a_warning_with_its_delay() -> Outcome {
             columns[column as usize] = delayed.collect();
         }
     };
-    assert_named("late_x", &["position (x, y, z) come late by about 300 ms"], late)?;
+    assert_named("late_x", &["position (x, y, z) comes late by about 300 ms"], late)?;
     assert!(!checked(flights(|index| index == 2, late)?).fault);
     Ok(())
 }

@@ -106,6 +106,11 @@ fn usual(all: &[&Cause], of: impl Fn(&Kind) -> f64) -> f64 {
 
 const CONTROLS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 
+/// A ratio with the digits that count.
+fn short(ratio: f64) -> String {
+    if ratio.abs() < 0.1 { format!("{ratio:.3e}") } else { format!("{ratio:.4}") }
+}
+
 /// What is wrong, as a sentence.
 fn told(all: &[&Cause], columns: &[Column]) -> String {
     let names = columns.iter().map(|column| column.name()).collect::<Vec<_>>().join(", ");
@@ -124,7 +129,9 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
         Kind::SignLost | Kind::Leaps | Kind::OffCentre(_) | Kind::Rows => 0.0,
     };
     let value = number(only);
-    let does = |one: &str, more: &str| if columns.len() > 1 { more.to_owned() } else { one.to_owned() };
+    // "the velocity (vx, vy, vz) comes", "the rates (wx, wy, wz) come", "vx, vy come".
+    let are_several = columns.len() > 1 && (columns.len() < 3 || stream.ends_with('s'));
+    let does = |one: &'static str, more: &'static str| if are_several { more } else { one };
     match all[0].kind {
         Kind::Late(_) => {
             let how = if value < 0.0 { "early" } else { "late" };
@@ -135,8 +142,10 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             does("comes", "come")
         ),
         Kind::Scaled(_) => format!(
-            "{names} {} about {value:.3} times as large as it should be: other units or a wrong scale{or}{since}",
-            does("is", "are")
+            "{names} {} about {} times as large as {} should be: other units or a wrong scale{or}{since}",
+            does("is", "are"),
+            short(value),
+            does("it", "they")
         ),
         Kind::Off(_) => format!("{names} {} an offset of about {value:.3} {unit}{or}{since}", does("has", "have")),
         Kind::Follows(control, _) => format!(
@@ -191,7 +200,7 @@ fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
         }
         Kind::Scaled(_) => {
             let times = usual(all, |kind| if let Kind::Scaled(times) = kind { *times } else { 1.0 });
-            Some(format!("[columns] {}, with the file's name", lines(&|name| format!("{name} = \"{name} / {times:.5}\""))))
+            Some(format!("[columns] {}, with the file's name", lines(&|name| format!("{name} = \"{name} / {}\"", short(times)))))
         }
         Kind::Off(_) => {
             let by = usual(all, |kind| if let Kind::Off(by) = kind { *by } else { 0.0 });
