@@ -106,6 +106,14 @@ fn usual(all: &[&Cause], of: impl Fn(&Kind) -> f64) -> f64 {
 
 const CONTROLS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 
+fn off_centre(all: &[&Cause]) -> String {
+    let [x, y, z] = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
+    format!(
+        "the linear accelerations are those of a sensor that is mounted off the centre of gravity by ({x:.2}, {y:.2}, {z:.2}) m, a lever arm: forward, \
+         to the right, down"
+    )
+}
+
 /// A ratio with the digits that count.
 fn short(ratio: f64) -> String {
     if ratio.abs() < 0.1 { format!("{ratio:.3e}") } else { format!("{ratio:.4}") }
@@ -174,13 +182,7 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             "{names} {} noise or vibration of about {value:.3} {unit} (rms) that nothing it belongs to has{or}",
             does("has", "have")
         ),
-        Kind::OffCentre(_) => {
-            let [x, y, z] = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
-            format!(
-                "the linear accelerations are those of a sensor that is mounted off the centre of gravity by ({x:.2}, {y:.2}, {z:.2}) m, a lever arm: forward, \
-                 to the right, down"
-            )
-        }
+        Kind::OffCentre(_) => off_centre(all),
         Kind::Rows => format!(
             "rows do not follow each other: most columns leap at once; a gap, rows repeated or in the wrong order, or parts joined so{places}"
         ),

@@ -183,7 +183,7 @@ impl<'a> Broken<'a> {
         self.channel.pieces[piece].start as f64 * self.channel.step_s
     }
 
-    /// `None` where another relation tells more.
+    /// Which of the two columns is to blame, by the other relation of the state; `None` where that one tells more.
     fn blamed(&self, channels: &[Channel], broken: &[Self]) -> Option<Blame> {
         let has = |stream: Stream| channels.iter().any(|one| one.stream == stream);
         let largest =
@@ -228,9 +228,9 @@ impl<'a> Broken<'a> {
 
     /// What changes from sample to sample beside what f says, with the sample after the step.
     fn step_errors(&self, piece: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let Channel { state, rate, step_s, .. } = self.channel;
-        let piece = self.channel.pieces[piece].clone();
-        (piece.start + 1..=piece.end).map(move |k| (k, state[k] - state[k - 1] - 0.5 * step_s * (rate[k] + rate[k - 1])))
+        let channel = self.channel;
+        let piece = channel.pieces[piece].clone();
+        (piece.start + 1..=piece.end).map(move |k| (k, channel.change(&(k - 1..k)) - difference(&channel.sum, &(k - 1..k))))
     }
 
     /// What mends it, and from when on it is needed.
