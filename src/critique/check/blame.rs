@@ -22,11 +22,16 @@ const SLOW_S: f64 = 0.04;
 /// A cause of the set is one of so many of its flights.
 const HALF: f64 = 0.5;
 
+/// The name of a kind, and the stream that it is wrong with.
+type Named = (&'static str, Option<&'static str>);
+/// A flight by its place, and a cause in it.
+type OfFlight<'a> = (usize, &'a Cause);
+
 /// Gathers the causes of flights; of a flight with sound relations there are none to look for. Noise is one in `outstanding` flights alone, since every sensor
 /// has some, and leaps elsewhere are a warning.
 pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTreeSet<usize>, flights: &[Flight]) -> Blamed {
     let sound = causes.iter().filter(|entry| entry.1.is_none()).count();
-    let mut alike: BTreeMap<(&'static str, Option<&'static str>), Vec<(usize, &Cause)>> = BTreeMap::new();
+    let mut alike: BTreeMap<Named, Vec<OfFlight<'_>>> = BTreeMap::new();
     for (flight, of_flight) in causes {
         let is_one = |cause: &&Cause| !matches!(cause.kind, Kind::Noise(_)) || outstanding.contains(flight);
         for cause in of_flight.iter().copied().flatten().filter(is_one) {
@@ -34,7 +39,7 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
             alike.entry((cause.kind.name(), stream)).or_default().push((*flight, cause));
         }
     }
-    let mut order: Vec<Vec<(usize, &Cause)>> = alike.into_values().collect();
+    let mut order: Vec<Vec<OfFlight<'_>>> = alike.into_values().collect();
     order.sort_by_key(|alike| std::cmp::Reverse(alike.len()));
     let mut blamed = Blamed { findings: Vec::new(), flights: BTreeSet::new() };
     for alike in order {
@@ -91,7 +96,7 @@ fn matters(all: &[&Cause], columns: &[Column]) -> bool {
 }
 
 /// Columns that at least half of the flights name, or else the one that most do.
-fn common(alike: &[(usize, &Cause)]) -> Vec<Column> {
+fn common(alike: &[OfFlight<'_>]) -> Vec<Column> {
     let mut counts: BTreeMap<Column, usize> = BTreeMap::new();
     alike.iter().flat_map(|entry| &entry.1.columns).for_each(|column| *counts.entry(*column).or_default() += 1);
     let most = counts.values().copied().max().unwrap_or(0);
@@ -173,10 +178,15 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             "{names} {} never on both sides of 0 and would fit with both signs: the minus signs were lost",
             does("is", "are")
         ),
-        Kind::Overflows(_) => {
-            format!("{names} leaps from one end to the other of ±{value:.2} {unit}: it overflows there and wraps round{places}")
-        }
-        Kind::Leaps => format!("{names} leaps, while all that says how fast it changes does not: errors in few places{places}"),
+        Kind::Overflows(_) => format!(
+            "{names} {} from one end to the other of ±{value:.2} {unit}: an overflow, after which counts wrap round{places}",
+            does("leaps", "leap")
+        ),
+        Kind::Leaps => format!(
+            "{names} {}, and what says how fast it changes does not: errors in few places, as of an estimator that corrects itself or a sensor that \
+             slips{places}",
+            does("leaps", "leap")
+        ),
         Kind::Rounded(_) => format!("{names} {} rounded to steps of {value:.3} {unit}", does("is", "are")),
         Kind::Noise(_) => format!(
             "{names} {} noise or vibration of about {value:.3} {unit} (rms) that nothing it belongs to has{or}",
