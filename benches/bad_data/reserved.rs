@@ -1,6 +1,6 @@
-//! Corruptions that were written down on 2026-11-26, after those of `fourth` had been looked at, unseen of the checks and before any check was tried on
-//! them. They are only reported: development never runs them, and what they show decides nothing. Each differs from those of all other lists in what
-//! goes wrong.
+//! Corruptions that were written down on 2026-11-26, after those of `fourth` had been looked at, unseen of the checks and before any check was tried
+//! on them. They are only reported: development never runs them, and what they show decides nothing. Each differs from those of all other lists in
+//! what goes wrong.
 
 use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Change, Corruption, Kind, LINEAR, Log, Part, RATES, VELOCITY};
 use phyture::flight::attitude::{
