@@ -82,7 +82,7 @@ const fn stream_of(column: Column) -> &'static str {
     }
 }
 
-/// Whether the physics would be wrong: where the aircraft is does not drive it, if it is the position that is wrong.
+/// Whether the physics would be wrong: where the aircraft is drives nothing but the effect of the ground, if it is the position that is wrong.
 fn matters(all: &[&Cause], columns: &[Column]) -> bool {
     let slow_s = usual(all, |kind| match *kind {
         Kind::Late(time_s) | Kind::Filtered(time_s) => time_s.abs(),

@@ -22,6 +22,7 @@ mod finding;
 mod flights;
 mod forces;
 mod gains;
+mod groups;
 mod increments;
 mod limits;
 mod lines;

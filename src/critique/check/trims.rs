@@ -3,9 +3,10 @@
 
 use super::finding::{Finding, Severity};
 use super::flights::{CONTROLS, in_flights};
+use super::groups::{Of, apart};
 use super::increments::SHORT_BLOCK_S;
 use super::regression::BlockRegression;
-use super::robust::{NORMAL, median};
+use super::robust::median;
 use super::sticks::{AXES, CONSTANT, FIRST, Regressions, STICKS, Sticks};
 use crate::flight::Flight;
 use std::collections::BTreeSet;
@@ -21,10 +22,8 @@ const STILL: f64 = 1e-3;
 /// A pilot who lets a stick go has let it go before: it stood at the same value for so long, s.
 const AT_REST_S: f64 = 0.3;
 
-/// A trim differs from that of the others from here on, in units of the stick's usual deviation …
+/// A trim differs from that of the others from here on, in units of the stick's usual deviation.
 const TRIMMED: f64 = 0.5;
-/// … and where it is so many times as far from them as they scatter.
-const APART: f64 = 6.0;
 
 /// A trim was moved where the same answer needs the stick elsewhere from a time on by this many usual deviations of it …
 const MOVED: f64 = 0.3;
@@ -84,14 +83,6 @@ fn longest_at(values: &[f64], value: f64) -> usize {
     values.chunk_by(|one, next| one == next).filter(|run| run[0] == value).map(<[f64]>::len).max().unwrap_or(0)
 }
 
-/// What a flight says of the place of a stick at which its axis rests.
-struct Trim {
-    flight: usize,
-    place: f64,
-    /// Half of its interval.
-    half: f64,
-}
-
 /// Flights in which the same answer needs the stick elsewhere than in the others. A centre of mass that lies elsewhere does the same, so it is a warning.
 fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
     let of = |(flight, regressions): &&(usize, Regressions)| {
@@ -100,11 +91,11 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
         // Where the gain is not sure, nothing is.
         let is_sure = gain.interval[0] * gain.interval[1] > 0.0;
         let half = 0.5 * (constant.interval[1] - constant.interval[0]) / gain.value.abs();
-        is_sure.then(|| Trim { flight: *flight, place: -constant.value / gain.value, half })
+        is_sure.then(|| Of { flight: *flight, value: -constant.value / gain.value, half })
     };
-    let trims: Vec<Trim> = judged.iter().filter_map(of).collect();
+    let trims: Vec<Of> = judged.iter().filter_map(of).collect();
     let moves = median(judged.iter().map(|(_, regressions)| regressions[stick].deviation(FIRST + stick, CONSTANT)).collect())?;
-    let (fewer, by) = apart(trims, TRIMMED * moves)?;
+    let (indices, by) = apart(trims, TRIMMED * moves)?;
     let name = STICKS[stick];
     let message = format!(
         "{name} stands {:.3} {} than in the other flights for the same answer: a trim or an offset of {name} there, or a centre of mass that lies \
@@ -112,8 +103,6 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
         by.abs(),
         if by > 0.0 { "higher" } else { "lower" }
     );
-    let mut indices: Vec<usize> = fewer.iter().map(|trim| trim.flight).collect();
-    indices.sort_unstable();
     Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
 }
 
@@ -151,42 +140,9 @@ fn step(regression: &BlockRegression<{ CONSTANT + 1 }>, stick: usize, least: f64
     (is_certain && left < LEFT * whole && by.abs() > least).then_some((by, from))
 }
 
-/// The smaller of two groups of trims far apart, and by how much it differs; `None` where there is one group.
-fn apart(mut trims: Vec<Trim>, least: f64) -> Option<(Vec<Trim>, f64)> {
-    trims.sort_unstable_by(|one, other| one.place.total_cmp(&other.place));
-    let gap = |at: usize| trims[at].place - trims[at - 1].place;
-    let split = (1..trims.len()).max_by(|one, other| gap(*one).total_cmp(&gap(*other)))?;
-    let high = trims.split_off(split);
-    let middle = |group: &[Trim]| median(group.iter().map(|trim| trim.place).collect());
-    let [below, above] = [middle(&trims)?, middle(&high)?];
-    let scatter = trims.iter().map(|trim| trim.place - below).chain(high.iter().map(|trim| trim.place - above));
-    let scatter = NORMAL * median(scatter.map(f64::abs).collect())?;
-    let by = above - below;
-    let gap = high.first()?.place - trims.last()?.place;
-    let (fewer, by) = if high.len() <= trims.len() { (high, by) } else { (trims, -by) };
-    let unsure = median(fewer.iter().map(|trim| trim.half).collect())?;
-    let is_apart = by.abs() > least + unsure && by.abs() > APART * scatter && gap > 0.4 * by.abs();
-    is_apart.then_some((fewer, by))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn trims(places: &[f64]) -> Vec<Trim> {
-        places.iter().enumerate().map(|(flight, &place)| Trim { flight, place, half: 0.01 }).collect()
-    }
-
-    #[test]
-    fn two_groups_of_trims_are_told_and_one_that_scatters_is_not() {
-        let (fewer, by) = apart(trims(&[0.01, 0.21, -0.01, 0.0, 0.02]), 0.05).expect("two groups");
-        assert_eq!(fewer.iter().map(|trim| trim.flight).collect::<Vec<_>>(), [1]);
-        assert!((by - 0.2).abs() < 0.02, "{by}");
-        let (fewer, by) = apart(trims(&[0.2, 0.0, 0.21, 0.01, 0.0]), 0.05).expect("two groups");
-        assert_eq!(fewer.iter().map(|trim| trim.flight).collect::<BTreeSet<_>>(), BTreeSet::from([0, 2]));
-        assert!(by > 0.15);
-        assert!(apart(trims(&[0.0, 0.1, -0.1, 0.2, -0.05]), 0.05).is_none());
-    }
 
     #[test]
     fn the_run_at_the_end_is_found_and_an_earlier_rest_at_its_value_too() {

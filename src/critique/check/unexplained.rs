@@ -118,7 +118,7 @@ pub(super) fn of_mechanics(each: &[OfFlight], except: &BTreeSet<usize>, flights:
         Fit::Answer { .. } => unreachable!("only mechanics was asked"),
     };
     let finding = in_flights(&name, &indices.iter().copied().collect::<Vec<_>>(), &message, flights);
-    // Where the aircraft is drives nothing; but derived accelerations agree with any velocity, be it right or wrong.
+    // Where the aircraft is drives nothing but the effect of the ground; and derived accelerations agree with any velocity, be it right or wrong.
     let knows_velocity = |entry: &OfFlight| entry.1.iter().any(|left| matches!(left.fit, Fit::Mechanics { name: "vx_dot", .. }));
     let is_position = worst.fit == POSITION && broken.len() == 1;
     let is_harmless = is_position && each.iter().filter(|entry| indices.contains(&entry.0)).all(knows_velocity);
