@@ -2,50 +2,12 @@
 //! the cause.
 #![cfg(feature = "sim")]
 
-use phyture::critique::check::{CheckReport, Severity, check};
+mod corrupted;
+
+use corrupted::{Columns, Outcome, assert_named, checked, flights};
+use phyture::critique::check::Severity;
+use phyture::flight::Column;
 use phyture::flight::attitude::cross;
-use phyture::flight::{Column, DataSet, Flight};
-use phyture::sim::{Level, Mechanisms, Simulation, simulate};
-
-type Outcome = Result<(), Box<dyn std::error::Error>>;
-type Columns = [Vec<f64>; Column::COUNT];
-
-/// Flights of ten minutes, some of them changed.
-fn flights(which: impl Fn(usize) -> bool, change: impl Fn(&mut Columns)) -> phyture::Result<Vec<Flight>> {
-    let simulation =
-        Simulation { seed: 11, minutes: 10.0, mechanisms: Mechanisms::none(), level: Level::TWO, ..Simulation::default() };
-    let changed = |(index, flight): (usize, &Flight)| {
-        let mut columns = Column::ALL.map(|column| flight.column(column).to_vec());
-        if which(index) {
-            change(&mut columns);
-        }
-        Flight::new(flight.name.clone(), flight.manoeuvre.clone(), 0.0, flight.step_s, columns, flight.targets)
-    };
-    simulate(&simulation)?.flights.iter().enumerate().map(changed).collect()
-}
-
-fn checked(flights: Vec<Flight>) -> CheckReport {
-    check(&DataSet { flights, ..DataSet::default() }, None)
-}
-
-/// What is said with every other flight changed, and with all.
-fn assert_named(name: &str, says: &[&str], change: impl Fn(&mut Columns)) -> Outcome {
-    for every in [2, 1] {
-        let flights = flights(|index| index % every == 0, &change)?;
-        let hit: Vec<String> = flights.iter().step_by(every).map(|flight| flight.name.clone()).collect();
-        let report = checked(flights);
-        let finding = report.findings.iter().find(|finding| finding.name == name && finding.verdict >= Severity::Warning);
-        let finding = finding.unwrap_or_else(|| panic!("no {name} with each {every} changed in\n{report}"));
-        for part in says {
-            assert!(finding.message.contains(part), "{part}: {}", finding.message);
-        }
-        if every == 2 {
-            assert!(finding.flights.iter().all(|flight| hit.contains(flight)), "{}", finding.message);
-            assert!(finding.flights.len() * 2 > hit.len(), "{}", finding.message);
-        }
-    }
-    Ok(())
-}
 
 fn of(columns: &Columns, three: [Column; 3], sample: usize) -> [f64; 3] {
     three.map(|column| columns[column as usize][sample])

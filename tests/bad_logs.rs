@@ -1,6 +1,9 @@
 //! Flights of the simulator with one thing wrong each: what `check` says, and the `dataset.toml` that it suggests, with which nothing is at fault.
 #![cfg(all(feature = "files", feature = "sim"))]
 
+mod corrupted;
+
+use corrupted::{Columns, Outcome, flights as some};
 use phyture::Error;
 use phyture::critique::check::{Severity, check};
 use phyture::flight::read::{ReadOptions, data_set};
@@ -9,25 +12,9 @@ use phyture::flight::{Column, DataSet, Flight, Targets};
 use phyture::sim::{Level, Mechanisms, Simulation, simulate};
 use std::path::Path;
 
-type Outcome = Result<(), Box<dyn std::error::Error>>;
-
 /// All flights changed.
-fn flights(change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Result<Vec<Flight>, Error> {
+fn flights(change: impl Fn(&mut Columns)) -> Result<Vec<Flight>, Error> {
     some(|_| true, change)
-}
-
-/// Some of the flights changed.
-fn some(which: impl Fn(usize) -> bool, change: impl Fn(&mut [Vec<f64>; Column::COUNT])) -> Result<Vec<Flight>, Error> {
-    let simulation =
-        Simulation { seed: 11, minutes: 10.0, mechanisms: Mechanisms::none(), level: Level::TWO, ..Simulation::default() };
-    let changed = |(index, flight): (usize, &Flight)| {
-        let mut columns = Column::ALL.map(|column| flight.column(column).to_vec());
-        if which(index) {
-            change(&mut columns);
-        }
-        Flight::new(flight.name.clone(), flight.manoeuvre.clone(), 0.0, flight.step_s, columns, flight.targets)
-    };
-    simulate(&simulation)?.flights.iter().enumerate().map(changed).collect()
 }
 
 fn suggested(folder: &Path) -> Result<(bool, Option<String>), Error> {

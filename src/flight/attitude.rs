@@ -35,6 +35,13 @@ pub fn euler_rates(roll: f64, pitch: f64, rates: [f64; 3]) -> [f64; 3] {
     [rates[0] + across * pitch.tan(), rates[1] * cr - rates[2] * sr, across / pitch.cos()]
 }
 
+/// Body rates of the rates of roll, pitch and yaw, rad/s: the way back of [`euler_rates`], at any pitch (Stevens, Lewis & Johnson, Aircraft Control and
+/// Simulation, 3rd ed., eq. 1.4-3).
+pub fn body_rates(roll: f64, pitch: f64, [roll_rate, pitch_rate, yaw_rate]: [f64; 3]) -> [f64; 3] {
+    let ((sr, cr), (sp, cp)) = (roll.sin_cos(), pitch.sin_cos());
+    [roll_rate - yaw_rate * sp, pitch_rate * cr + yaw_rate * sr * cp, yaw_rate * cr * cp - pitch_rate * sr]
+}
+
 /// R v.
 pub fn rotate(matrix: &Matrix3, vector: [f64; 3]) -> [f64; 3] {
     matrix.map(|row| dot(row, vector))
@@ -279,6 +286,14 @@ mod tests {
                 // Truncation of the step is of order dt ω² / cos² pitch, and ω² / cos² is below 2000 here.
                 prop_assert!(((after - before) / dt - rate).abs() <= dt * 2000.0);
             }
+        }
+
+        #[test]
+        fn body_rates_are_the_way_back_of_euler_rates(
+            roll in -3.0..3.0, pitch in -1.4..1.4, p in -3.0..3.0, q in -3.0..3.0, r in -3.0..3.0,
+        ) {
+            let back = body_rates(roll, pitch, euler_rates(roll, pitch, [p, q, r]));
+            prop_assert!(near(&back, &[p, q, r]), "{back:?}");
         }
 
         #[test]

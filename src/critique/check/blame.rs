@@ -4,6 +4,7 @@
 use super::causes::{Cause, Kind};
 use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, in_flights};
+use super::gains::OFFSETS;
 use super::robust::median;
 use crate::flight::{Column, Flight};
 use std::collections::{BTreeMap, BTreeSet};
@@ -33,7 +34,12 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
     let sound = causes.iter().filter(|entry| entry.1.is_none()).count();
     let mut alike: BTreeMap<Named, Vec<OfFlight<'_>>> = BTreeMap::new();
     for (flight, of_flight) in causes {
-        let is_one = |cause: &&Cause| !matches!(cause.kind, Kind::Noise(_)) || outstanding.contains(flight);
+        let is_one = |cause: &&Cause| match cause.kind {
+            Kind::Noise(_) => outstanding.contains(flight),
+            // Every derivative is smoothed a little.
+            Kind::Averaged(time_s) => as_lag_s(time_s) > SLOW_S,
+            _ => true,
+        };
         for cause in of_flight.iter().copied().flatten().filter(is_one) {
             let stream = cause.columns.first().map(|column| stream_of(*column));
             alike.entry((cause.kind.name(), stream)).or_default().push((*flight, cause));
@@ -82,13 +88,23 @@ const fn stream_of(column: Column) -> &'static str {
     }
 }
 
+/// The time constant of the filter of first order that takes as much off slow oscillations as a mean over this time does: τ² ω² / 2 = T² ω² / 24.
+fn as_lag_s(mean_s: f64) -> f64 {
+    mean_s / 12.0_f64.sqrt()
+}
+
 /// Whether the physics would be wrong: where the aircraft is drives nothing but the effect of the ground, if it is the position that is wrong.
 fn matters(all: &[&Cause], columns: &[Column]) -> bool {
     let slow_s = usual(all, |kind| match *kind {
         Kind::Late(time_s) | Kind::Filtered(time_s) => time_s.abs(),
+        Kind::Averaged(time_s) => as_lag_s(time_s),
         _ => f64::INFINITY,
     });
     if slow_s < SLOW_S {
+        return false;
+    }
+    let off = usual(all, |kind| if let Kind::Off(by) = *kind { by.abs() } else { f64::INFINITY });
+    if off < OFFSETS[1] && columns.iter().all(|column| stream_of(*column) == "rates") {
         return false;
     }
     let is_position = columns.iter().all(|column| stream_of(*column) == "position");
@@ -135,11 +151,16 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
     let places = first_s.map(|from_s| format!(", first at {from_s:.0} s")).unwrap_or_default();
     let number = |of: fn(&Kind) -> f64| usual(all, of);
     let only = |kind: &Kind| match *kind {
-        Kind::Late(value) | Kind::Filtered(value) | Kind::Scaled(value) | Kind::Off(value) => value,
+        Kind::Late(value)
+        | Kind::Filtered(value)
+        | Kind::Averaged(value)
+        | Kind::Scaled(value)
+        | Kind::Off(value)
+        | Kind::Drifts(value) => value,
         Kind::Follows(_, value) | Kind::Settles(value, _) | Kind::Overflows(value) | Kind::Noise(value) | Kind::Rounded(value) => {
             value
         }
-        Kind::SignLost | Kind::Leaps | Kind::OffCentre(_) | Kind::Rows => 0.0,
+        Kind::SignLost | Kind::Leaps | Kind::OffCentre(_) | Kind::Rows | Kind::Pace(_) => 0.0,
     };
     let value = number(only);
     // "the velocity (vx, vy, vz) comes", "the rates (wx, wy, wz) come", "vx, vy come".
@@ -154,6 +175,10 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             "{names} {} as behind a filter with a time constant of about {value:.2} s: smoothed, slow and late{or}{since}",
             does("comes", "come")
         ),
+        Kind::Averaged(_) => format!(
+            "{names} {} a mean over about {value:.2} s (averaged, smoothed in both directions of time): what is quick is gone{or}{since}",
+            does("is", "are")
+        ),
         Kind::Scaled(_) => format!(
             "{names} {} about {} times as large as {} should be: other units or a wrong scale{or}{since}",
             does("is", "are"),
@@ -161,6 +186,9 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             does("it", "they")
         ),
         Kind::Off(_) => format!("{names} {} an offset of about {value:.3} {unit}{or}{since}", does("has", "have")),
+        Kind::Drifts(_) => {
+            format!("{names} {}: an offset that grows by about {value:.4} {unit} each second{or}{since}", does("drifts", "drift"))
+        }
         Kind::Follows(control, _) => format!(
             "{names} {} with {}: {value:.3} {unit} for one of it that no motion explains, a disturbance by what the control drives, such as a \
              magnetic one{since}",
@@ -193,6 +221,13 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             does("has", "have")
         ),
         Kind::OffCentre(_) => off_centre(all),
+        Kind::Pace(_) => {
+            let [short, long] = [0, 1].map(|end| usual(all, |kind| if let Kind::Pace(ends) = kind { ends[end] } else { 1.0 }));
+            format!(
+                "the time stamps are not those of the rows: all that changes does so {short:.2} to {long:.2} times as fast as they say, by turns; steps of \
+                 uneven length, or rows that are missing"
+            )
+        }
         Kind::Rows => format!(
             "rows do not follow each other: most columns leap at once; a gap, rows repeated or in the wrong order, or parts joined so{places}"
         ),

@@ -1,24 +1,24 @@
 //! What would mend a broken relation of mechanics where no reading of whole streams does: one column that is late, filtered, scaled or off, that goes
-//! with a stick, settles from its start, lost its sign, overflows or is noisy, an accelerometer beside the centre of gravity, rows that do not follow each other.
+//! with a stick, settles from its start, lost its sign, overflows or is noisy, or rows that do not follow each other; what several columns share is in `jointly`.
 //! Each is tried on the channels of one flight, and the one that leaves least is the cause if it leaves little. Which flights stand out from the others is
 //! the business of `unexplained`; here each is taken by itself.
 
 use super::channels::{Channel, Stream, difference, summed};
 use super::increments::{Motion, Vector};
+use super::jointly;
 use super::robust::median;
 use super::streams::grain;
 use crate::flight::Column;
-use crate::flight::attitude::cross;
 use std::ops::Range;
 
 /// A relation is broken where this share of the root mean square of the changes is left.
 const LEAST_SHARE: f64 = 0.05;
 /// A cause is one where with it this part of the squared errors is left at most.
-const LITTLE: f64 = 0.2;
+pub(super) const LITTLE: f64 = 0.2;
 /// A channel of a stream is not broken by itself where it is so much less than another of the same stream: angles turn into each other.
 const BY_ITSELF: f64 = 0.1;
 /// What is wrong with a state is wrong in both of its relations: another one is broken as well from this part of the share on.
-const AS_WELL: f64 = 0.02;
+pub(super) const AS_WELL: f64 = 0.02;
 /// Pieces at least, for a fit.
 const FEWEST_PIECES: usize = 40;
 
@@ -26,6 +26,8 @@ const FEWEST_PIECES: usize = 40;
 const LATEST_S: f64 = 0.6;
 /// Time constants of a filter, s.
 const FILTERS_S: [f64; 9] = [0.03, 0.05, 0.08, 0.12, 0.2, 0.3, 0.45, 0.7, 1.0];
+/// Lengths of a moving mean, s.
+const MEANS_S: [f64; 7] = [0.1, 0.15, 0.2, 0.3, 0.45, 0.7, 1.0];
 /// Time constants of what settles, s.
 const SETTLING_S: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 /// What settles does so within this part of the flight: a slower decay is a drift.
@@ -35,7 +37,7 @@ const SETTLED: f64 = 0.25;
 const HELD: f64 = 0.8;
 /// … and rows do, where so many channels leap.
 const IN_PLACES: f64 = 0.1;
-const LEAPING: usize = 5;
+pub(super) const LEAPING: usize = 5;
 /// A leap is the work of one step where that makes this part of it.
 const IN_ONE_STEP: f64 = 0.5;
 /// Ends of a range agree with a leap to this part of it.
@@ -57,10 +59,14 @@ pub(super) enum Kind {
     Late(f64),
     /// It passed a filter of first order with this time constant, s.
     Filtered(f64),
+    /// It is a mean over this time about each sample, s.
+    Averaged(f64),
     /// It is so many times what it should be.
     Scaled(f64),
     /// It has this too much.
     Off(f64),
+    /// It has too much by a number that grows so much each second.
+    Drifts(f64),
     /// It goes with a control, in its unit for one of the control.
     Follows(usize, f64),
     /// It starts so far off, and settles with this time constant, s.
@@ -79,6 +85,8 @@ pub(super) enum Kind {
     OffCentre(Vector),
     /// Rows do not follow each other.
     Rows,
+    /// Steps of time are so many times as long as stamped, in the shortest and the longest of them.
+    Pace([f64; 2]),
 }
 
 impl Kind {
@@ -87,8 +95,10 @@ impl Kind {
         match self {
             Self::Late(_) => "late",
             Self::Filtered(_) => "filtered",
+            Self::Averaged(_) => "averaged",
             Self::Scaled(_) => "scaled",
             Self::Off(_) => "off",
+            Self::Drifts(_) => "drifting",
             Self::Follows(..) => "disturbed",
             Self::Settles(..) => "settling",
             Self::SignLost => "sign_lost",
@@ -98,6 +108,7 @@ impl Kind {
             Self::Rounded(_) => "rounded",
             Self::OffCentre(_) => "off_centre",
             Self::Rows => "rows",
+            Self::Pace(_) => "uneven_time",
         }
     }
 }
@@ -123,9 +134,18 @@ pub(super) fn of(motion: &Motion) -> Vec<Cause> {
         let from_s = broken.iter().filter_map(|one| Some(one.at_s(*one.leaps()?.first()?))).reduce(f64::min);
         return vec![Cause { kind: Kind::Rows, columns: Vec::new(), or: None, from_s }];
     }
-    let off_centre = off_centre(motion, &broken);
-    let is_told = |one: &&Broken<'_>| off_centre.is_none() || one.channel.stream != Stream::Velocity;
-    let mut causes: Vec<(Option<Blame>, Cause)> = off_centre.iter().cloned().map(|cause| (None, cause)).collect();
+    if let Some(cause) = jointly::uneven_time(&channels, broken.len()) {
+        return vec![cause];
+    }
+    let off_centre = jointly::off_centre(motion, &broken);
+    let off_zero = jointly::off_zero(motion, &channels, &broken);
+    let is_told = |one: &&Broken<'_>| match one.channel.stream {
+        Stream::Velocity => off_centre.is_none(),
+        Stream::Attitude => off_zero.is_none(),
+        Stream::Position | Stream::Rates => true,
+    };
+    let of_several = off_centre.iter().chain(&off_zero).cloned();
+    let mut causes: Vec<(Option<Blame>, Cause)> = of_several.map(|cause| (None, cause)).collect();
     for one in broken.iter().filter(is_told) {
         let Some(blame) = one.blamed(&channels, &broken) else { continue };
         let Some((kind, from_s)) = one.cause(blame.is_state, motion) else { continue };
@@ -156,12 +176,12 @@ struct Blame {
 }
 
 /// A channel that does not fit.
-struct Broken<'a> {
-    channel: &'a Channel,
-    errors: Vec<f64>,
+pub(super) struct Broken<'a> {
+    pub channel: &'a Channel,
+    pub errors: Vec<f64>,
     square: f64,
     /// Squared errors over the squares of the changes.
-    share: f64,
+    pub share: f64,
 }
 
 impl<'a> Broken<'a> {
@@ -323,7 +343,7 @@ impl Trial<'_> {
         if self.pieces().len() < FEWEST_PIECES {
             return None;
         }
-        let mut all = vec![self.late(), self.filtered(), self.scaled(), self.off(), self.settles()];
+        let mut all = vec![self.late(), self.filtered(), self.averaged(), self.scaled(), self.off(), self.settles()];
         all.extend((0..4).map(|control| self.follows(motion, control)));
         all.extend(self.sign_lost());
         let (left, kind) = all.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
@@ -379,6 +399,23 @@ impl Trial<'_> {
         FILTERS_S.map(of).into_iter().min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, Kind::Leaps))
     }
 
+    fn averaged(&self) -> (f64, Kind) {
+        let channel = self.broken.channel;
+        let of = |time_s: f64| {
+            let reach = (0.5 * time_s / channel.step_s).round() as usize;
+            let left = if self.is_state {
+                let sum = averaged(&channel.sum, reach);
+                self.left(|piece| difference(&sum, piece))
+            } else {
+                let state = averaged(&channel.state, reach);
+                let of_piece = |piece: &Range<usize>| (difference(&state, piece) - difference(&channel.sum, piece)).powi(2);
+                self.pieces().iter().map(of_piece).sum()
+            };
+            (left, Kind::Averaged(time_s))
+        };
+        MEANS_S.map(of).into_iter().min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, Kind::Leaps))
+    }
+
     fn scaled(&self) -> (f64, Kind) {
         let (left, beyond) = self.on(|piece| difference(&self.broken.channel.sum, piece));
         let times = 1.0 + beyond;
@@ -432,7 +469,7 @@ impl Trial<'_> {
 }
 
 /// A series behind a filter of first order that starts at rest.
-fn lagged(series: &[f64], time_s: f64, step_s: f64) -> Vec<f64> {
+pub(super) fn lagged(series: &[f64], time_s: f64, step_s: f64) -> Vec<f64> {
     let kept = (-step_s / time_s).exp();
     let mut state = series.first().copied().unwrap_or(0.0);
     let follow = |value: &f64| {
@@ -442,31 +479,17 @@ fn lagged(series: &[f64], time_s: f64, step_s: f64) -> Vec<f64> {
     series.iter().map(follow).collect()
 }
 
-/// Whether linear accelerations are those of a point beside the centre of gravity: a = a₀ + ω' × r + ω × (ω × r), with r fitted on all three axes.
-fn off_centre(motion: &Motion, broken: &[Broken<'_>]) -> Option<Cause> {
-    let such: Vec<&Broken<'_>> = broken.iter().filter(|one| one.channel.stream == Stream::Velocity).collect();
-    if such.len() < 2 || broken.iter().any(|one| one.channel.stream == Stream::Position) {
-        return None;
-    }
-    let (mut gram, mut moment, mut square) = (nalgebra::Matrix3::<f64>::zeros(), nalgebra::Vector3::<f64>::zeros(), 0.0);
-    for one in &such {
-        let axis = one.channel.column as usize - Column::Vx as usize;
-        for (piece, error) in one.channel.pieces.iter().zip(&one.errors) {
-            // The change says less than the derivative by what the arm adds to that.
-            let feature = nalgebra::Vector3::from(motion.integral(piece, |k| {
-                let instant = &motion.instants[k];
-                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|arm| {
-                    let (along, inwards) = (cross(instant.angular_target, arm), cross(instant.rates, cross(instant.rates, arm)));
-                    -(along[axis] + inwards[axis])
-                })
-            }));
-            gram += feature * feature.transpose();
-            moment += feature * *error;
-            square += error * error;
-        }
-    }
-    let arm = gram.cholesky()?.solve(&moment);
-    let left = square - moment.dot(&arm);
-    let columns = vec![Column::VxDot, Column::VyDot, Column::VzDot];
-    (left < LITTLE * square).then(|| Cause { kind: Kind::OffCentre(arm.into()), columns, or: None, from_s: None })
+/// The mean over so many samples on either side, fewer at the ends.
+fn averaged(series: &[f64], reach: usize) -> Vec<f64> {
+    let mut sum = 0.0;
+    let running = series.iter().map(|value| {
+        sum += value;
+        sum
+    });
+    let sums: Vec<f64> = std::iter::once(0.0).chain(running).collect();
+    let mean = |k: usize| {
+        let (first, end) = (k.saturating_sub(reach), (k + reach + 1).min(series.len()));
+        (sums[end] - sums[first]) / (end - first) as f64
+    };
+    (0..series.len()).map(mean).collect()
 }

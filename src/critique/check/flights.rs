@@ -48,3 +48,19 @@ pub(super) fn of_all<'f>(flights: impl IntoIterator<Item = &'f Flight>, column: 
         flight.column(column).iter().map(|value| (*value, flight.step_s)).chain(left)
     })
 }
+
+/// A fault of the set where more than [`MOST`] of the flights that tell are such, mended by `set`, and of these flights elsewhere.
+pub(super) fn of_set_or_flights(
+    name: &str,
+    indices: &[usize],
+    telling: usize,
+    message: &str,
+    set: Option<&str>,
+    flights: &[Flight],
+) -> Finding {
+    if indices.len() as f64 > MOST * telling as f64 {
+        finding(name, Severity::Fault, message.into(), set)
+    } else {
+        in_flights(name, indices, message, flights)
+    }
+}

@@ -19,7 +19,7 @@ const WARNING_MARGIN: f64 = 0.1;
 
 /// An offset from here on is no drift of a sensor: of velocities, m/s, and of rates, rad/s (6°/s, what a small gyroscope is allowed before it is
 /// calibrated). Half of it is worth a warning.
-const OFFSETS: [f64; 2] = [1.0, 0.1];
+pub(super) const OFFSETS: [f64; 2] = [1.0, 0.1];
 /// A heading that is turned by so much, rad, is no matter of declination.
 const TURNED: f64 = 0.17;
 /// Where the nose turns faster, rad/s, a heading that comes late looks turned.

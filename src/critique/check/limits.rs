@@ -1,8 +1,8 @@
 //! Sticks that a log cuts off: their values pile up at an end that is not the end of their travel, and while they stand there the axis goes on
 //! answering. A stick that stands at its real end moves its axis no further.
 
-use super::finding::{Finding, Severity, finding};
-use super::flights::{MOST, WIDER, in_flights};
+use super::finding::Finding;
+use super::flights::{WIDER, of_set_or_flights};
 use super::increments::{Motion, length_s};
 use super::regression::BlockRegression;
 use super::robust::median;
@@ -81,10 +81,5 @@ fn cut_off(stick: usize, each: &[(usize, Piled)], flights: &[Flight], except: &B
         100.0 * share
     );
     let indices: Vec<usize> = piled.iter().map(|entry| entry.0).collect();
-    let is_set = indices.len() as f64 > MOST * flights.len() as f64;
-    Some(if is_set {
-        finding(&format!("cut_off_{name}"), Severity::Fault, message, None)
-    } else {
-        in_flights(&format!("cut_off_{name}"), &indices, &message, flights)
-    })
+    Some(of_set_or_flights(&format!("cut_off_{name}"), &indices, flights.len(), &message, None, flights))
 }

@@ -8,6 +8,7 @@
 //! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
+mod alternation;
 mod blame;
 mod causes;
 mod cells;
@@ -15,6 +16,7 @@ mod channels;
 mod clocks;
 mod copies;
 mod dead_zone;
+mod demands;
 mod dropouts;
 mod evidence;
 mod excitation;
@@ -24,6 +26,7 @@ mod forces;
 mod gains;
 mod groups;
 mod increments;
+mod jointly;
 mod limits;
 mod lines;
 mod mixes;
@@ -33,11 +36,14 @@ mod regression;
 mod relations;
 mod report;
 mod robust;
+mod saturation;
+mod sequences;
 mod stamps;
 mod sticks;
 mod streams;
 #[cfg(feature = "files")]
 mod suggestion;
+mod throws;
 mod timing;
 mod trims;
 mod unexplained;
@@ -132,6 +138,10 @@ struct Gathered {
     sticks: Sticks,
     /// Sticks whose values pile up at an end, by flight.
     piled: Vec<(usize, limits::Piled)>,
+    /// The two sides of each stick, by flight.
+    sides: Vec<(usize, throws::Uneven)>,
+    /// Sticks that the rate follows, by flight.
+    followed: Vec<(usize, demands::Followed)>,
     /// What relations and answers leave unexplained, by flight.
     left: Vec<unexplained::OfFlight>,
 }
@@ -140,9 +150,10 @@ impl Gathered {
     fn new(data: &DataSet) -> Self {
         let quaternion = data.source.quaternion.map(other_order);
         let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
-        let Read { each, sticks, piled } = read(data, quaternion, step_s);
+        let Read { each, sticks, piled, sides, followed } = read(data, quaternion, step_s);
         let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
         let poor = streams::findings(&data.flights).into_iter().chain(spikes);
+        let poor = poor.chain(saturation::findings(&data.flights)).chain(alternation::findings(&data.flights));
         let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).chain(copies::findings(&data.flights)).collect();
         let faults = poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
@@ -173,7 +184,7 @@ impl Gathered {
         unjudged.extend(&of_strange);
         let stamps = stamps::findings(&judged, &unjudged, &data.flights);
         let odd = blamed.findings.into_iter().chain(odd.findings).chain(strange).chain(stamps).collect();
-        Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, left }
+        Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, sides, followed, left }
     }
 
     /// All that is said of conventions and of streams against each other, causes before symptoms.
@@ -190,10 +201,13 @@ impl Gathered {
         findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
             findings.extend(dead_zone::findings(&data.flights));
+            let followed: Vec<_> = self.followed.iter().filter(|(flight, _)| !self.unjudged.contains(flight)).copied().collect();
+            findings.extend(demands::findings(&followed, &data.flights));
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
             of_sticks.extend(mixes::findings(&self.sticks, &data.flights, &self.unjudged));
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
+            of_sticks.extend(throws::findings(&self.sticks, &self.sides, &data.flights, &self.unjudged));
             let faults = of_sticks.iter().filter(|finding| finding.verdict == Severity::Fault);
             let named: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
             let is_known = |flight: &usize| named.contains(&data.flights[*flight].name);
@@ -239,13 +253,15 @@ struct Read {
     each: Vec<Own>,
     sticks: Sticks,
     piled: Vec<(usize, limits::Piled)>,
+    sides: Vec<(usize, throws::Uneven)>,
+    followed: Vec<(usize, demands::Followed)>,
 }
 
 fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
     let one = |flight: usize| {
         let motion = increments::Motion::new(&data.flights[flight], &data.source);
         data.flights[flight].rest();
-        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion), limits::of(&motion))
+        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion), limits::of(&motion), demands::of(&motion))
     };
     let indices: Vec<usize> = (0..data.flights.len()).collect();
     #[cfg(feature = "rayon")]
@@ -255,11 +271,13 @@ fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
     };
     #[cfg(not(feature = "rayon"))]
     let found: Vec<_> = indices.into_iter().map(one).collect();
-    let mut read = Read { each: Vec::new(), sticks: Sticks::new(), piled: Vec::new() };
-    for (flight, (own, regressions, piled)) in found.into_iter().enumerate() {
+    let mut read = Read { each: Vec::new(), sticks: Sticks::new(), piled: Vec::new(), sides: Vec::new(), followed: Vec::new() };
+    for (flight, (own, sides, piled, followed)) in found.into_iter().enumerate() {
         read.each.push(own);
-        read.sticks.push(flight, regressions);
+        read.sticks.push(flight, &sides);
         read.piled.push((flight, piled));
+        read.sides.push((flight, throws::of(&sides)));
+        read.followed.push((flight, followed));
     }
     read
 }
@@ -302,6 +320,8 @@ fn symptom(finding: Finding) -> Finding {
         "frozen_",
         streams::HELD,
         "spikes_",
+        "saturated_",
+        "by_turns_",
         "rounding_",
         "noise_",
     ]

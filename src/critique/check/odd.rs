@@ -6,7 +6,7 @@ use super::clocks::CLOCK;
 use super::evidence::Evidence;
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
-use super::increments::{Motion, TOGETHER};
+use super::increments::{Motion, SHORT_BLOCK_S, TOGETHER};
 use super::mounts::{self, Turns};
 use super::robust::{NORMAL, median};
 use super::timing::{Acts, Timing};
@@ -53,7 +53,7 @@ impl Own {
     pub fn new(flight: usize, motion: &Motion, quaternion: Option<&'static str>, step_s: f64) -> Self {
         let mut short = Evidence::new(quaternion, step_s);
         short.add(flight, motion);
-        let mut findings = short.kinematics(EXPLAINED);
+        let mut findings = in_part(short.kinematics(EXPLAINED), &short);
         findings.extend(short.timing.offsets(CONVINCING_FALL));
         findings.push(short.timing.control_delay(None).0);
         findings.extend(short.timing.sticks());
@@ -67,6 +67,20 @@ impl Own {
         let causes = unexplained::is_worth_asking(&left).then(|| causes::of(motion));
         Self { flight, evidence, findings, left, acts: short.timing.acts(), turns: short.turns(), causes }
     }
+}
+
+/// The findings of a flight of which only a part is read otherwise say so; gains of the whole say nothing then.
+fn in_part(mut findings: Vec<Finding>, short: &Evidence) -> Vec<Finding> {
+    for relation in &short.relations {
+        let is_open = findings.iter().any(|finding| finding.name == relation.name && finding.verdict != Severity::Fault);
+        let Some((says, is_later, block)) = relation.reading_of_part().filter(|_| is_open) else { continue };
+        let place = format!("{:.0} s{}", SHORT_BLOCK_S * block as f64, if is_later { " on" } else { "" });
+        let message = format!("{} {place} {says}, and not in the rest of the flight", if is_later { "from" } else { "up to" });
+        findings.retain(|finding| finding.name == relation.name || !finding.name.starts_with(relation.name));
+        let own = findings.iter_mut().filter(|finding| finding.name == relation.name);
+        own.for_each(|finding| (finding.verdict, finding.message) = (Severity::Fault, message.clone()));
+    }
+    findings
 }
 
 /// Shifts between streams of all flights: where one is as long as the lags of an aircraft, these cannot be told from it, and it is a fault. Of the two

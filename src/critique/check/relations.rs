@@ -6,9 +6,10 @@
 
 use super::finding::{Finding, Severity, Subject};
 use super::increments::{Instant, Motion, Vector};
+use super::sequences::{XYZ, XZY, YXZ, YZX, ZXY};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
-use crate::flight::attitude::{Matrix3, cross, rotate, rotate_back, rotation_body_to_inertial};
+use crate::flight::attitude::{Matrix3, body_rates, cross, rotate, rotate_back, rotation_body_to_inertial};
 use std::ops::Range;
 
 /// Three vectors, for relations of one vector with the rest zero.
@@ -44,6 +45,8 @@ const MATERIAL_SHARE: f64 = 0.02;
 const HOLDS: f64 = 0.25 * MATERIAL_SHARE;
 /// A reading that leaves more than this of the changes unexplained is none.
 const LARGEST_SHARE: f64 = 0.25;
+/// A part of a flight that is read otherwise, and the rest of it, are of so many short blocks at least.
+const FEWEST_BLOCKS: usize = 3;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
@@ -69,16 +72,16 @@ const YAW_DEGREES: &str = "[columns] yaw = \"yaw * 0.017453292519943295\", with 
 const EXCHANGED: &str = "roll and pitch are exchanged";
 const ROLL_PITCH: &str = "[columns] roll = \"pitch\", pitch = \"roll\", with the file's names";
 
+const WITH_ANGULAR: &str = "linear and angular accelerations are in each other's columns (exchanged)";
+const ANGULAR_BACK: &str = "[columns] vx_dot = \"wx_dot\", vy_dot = \"wy_dot\", vz_dot = \"wz_dot\", wx_dot = \"vx_dot\", wy_dot = \"vy_dot\", wz_dot = \"vz_dot\", with the file's names";
+const AS_LEVEL: &str =
+    "gravity was taken off the accelerations as though the aircraft were level: what its tilt does is left in them";
+const TILTED: &str = "[columns] vx_dot = \"vx_dot - 9.80665 * sin(pitch)\", vy_dot = \"vy_dot + 9.80665 * sin(roll) * cos(pitch)\", vz_dot = \"vz_dot + 9.80665 * (cos(roll) * cos(pitch) - 1)\", with the file's names";
+
 const LEVEL: &str = "the velocity is written in level axes, which turn with the heading alone and neither roll nor pitch";
 const UNLEVEL: &str = "[columns] vx, vy, vz in body axes: turn them by pitch, then by roll";
 const OF_ANGLES: &str = "the rates are those of the angles roll, pitch and yaw (Euler rates), not about the axes of the body";
 const TO_BODY: &str = "[columns] wx = \"wx - wz * sin(pitch)\", wy = \"wy * cos(roll) + wz * sin(roll) * cos(pitch)\", wz = \"wz * cos(roll) * cos(pitch) - wy * sin(roll)\", with the file's names";
-
-/// Body rates of the rates of roll, pitch and yaw (Stevens, Lewis & Johnson, Aircraft Control and Simulation, 3rd ed., eq. 1.4-3).
-fn of_angles([roll, pitch, _]: Vector, [roll_rate, pitch_rate, yaw_rate]: Vector) -> Vector {
-    let ((sr, cr), (sp, cp)) = (roll.sin_cos(), pitch.sin_cos());
-    [roll_rate - yaw_rate * sp, pitch_rate * cr + yaw_rate * sr * cp, yaw_rate * cr * cp - pitch_rate * sr]
-}
 
 /// Two columns of a vector in each other's place.
 const fn first_two([x, y, z]: Vector) -> Vector {
@@ -161,6 +164,11 @@ impl Relation {
             read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
             read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
             read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(first_two(i.angles)), i.velocity))),
+            read(XYZ.says, XYZ.set, at, |i| stack(rotate(&XYZ.rotation(i.angles), i.velocity))),
+            read(XZY.says, XZY.set, at, |i| stack(rotate(&XZY.rotation(i.angles), i.velocity))),
+            read(YXZ.says, YXZ.set, at, |i| stack(rotate(&YXZ.rotation(i.angles), i.velocity))),
+            read(YZX.says, YZX.set, at, |i| stack(rotate(&YZX.rotation(i.angles), i.velocity))),
+            read(ZXY.says, ZXY.set, at, |i| stack(rotate(&ZXY.rotation(i.angles), i.velocity))),
             read(LEVEL, UNLEVEL, at, |i| stack(rotate(&turned(scaled(i.angles, [0.0, 0.0, 1.0])), i.velocity))),
         ], order.into_iter().collect()].concat())
     }
@@ -210,7 +218,12 @@ impl Relation {
             read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
             read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
             read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(first_two(i.angles))), |i| turning(&turned(first_two(i.angles)), i.rates)),
-            read(OF_ANGLES, TO_BODY, |i| axes(&i.rotation), |i| turning(&i.rotation, of_angles(i.angles, i.rates))),
+            read(XYZ.says, XYZ.set, |i| axes(&XYZ.rotation(i.angles)), |i| turning(&XYZ.rotation(i.angles), i.rates)),
+            read(XZY.says, XZY.set, |i| axes(&XZY.rotation(i.angles)), |i| turning(&XZY.rotation(i.angles), i.rates)),
+            read(YXZ.says, YXZ.set, |i| axes(&YXZ.rotation(i.angles)), |i| turning(&YXZ.rotation(i.angles), i.rates)),
+            read(YZX.says, YZX.set, |i| axes(&YZX.rotation(i.angles)), |i| turning(&YZX.rotation(i.angles), i.rates)),
+            read(ZXY.says, ZXY.set, |i| axes(&ZXY.rotation(i.angles)), |i| turning(&ZXY.rotation(i.angles), i.rates)),
+            read(OF_ANGLES, TO_BODY, |i| axes(&i.rotation), |i| turning(&i.rotation, body_rates(i.angles[0], i.angles[1], i.rates))),
         ], order.into_iter().collect()].concat())
     }
 
@@ -218,6 +231,7 @@ impl Relation {
     #[rustfmt::skip]
     pub fn linear_targets() -> Self {
         const V: fn(&Instant) -> Stack = |i| stack(i.velocity);
+        const UPWARDS: Vector = [0.0, 0.0, -GRAVITY_M_S2];
         // v̇ = a − ω × v for an inertial acceleration a in body axes.
         const fn add(a: Vector, b: Vector) -> Vector { [a[0] + b[0], a[1] + b[1], a[2] + b[2]] }
         fn without_turning(acceleration: Vector, i: &Instant) -> Stack { stack(add(acceleration, cross(i.velocity, i.rates))) }
@@ -226,6 +240,9 @@ impl Relation {
             read("", "", |i| stack(i.linear_target)),
             read("the targets are specific force, as an accelerometer measures it: gravity and Coriolis terms are missing", "targets = \"specific_force\"", |i| without_turning(add(i.linear_target, i.gravity), i)),
             read("gravity has been taken out of the targets", "[columns] vx_dot = \"vx_dot + g_x\", vy_dot = \"vy_dot + g_y\", vz_dot = \"vz_dot + g_z\"", |i| stack(add(i.linear_target, i.gravity))),
+            read(AS_LEVEL, TILTED, |i| stack(add(add(i.linear_target, i.gravity), UPWARDS))),
+            read("the targets are specific force from which gravity was taken off as though the aircraft were level", "targets = \"specific_force\" and [columns] vz_dot = \"vz_dot - 9.80665\", with the file's name", |i| without_turning(add(add(i.linear_target, i.gravity), UPWARDS), i)),
+            read(WITH_ANGULAR, ANGULAR_BACK, |i| stack(i.angular_target)),
             read("the targets are the inertial acceleration in body axes: the Coriolis term is missing", "targets = \"body_acceleration\"", |i| without_turning(i.linear_target, i)),
             read("the targets are the derivative of the inertial velocity in inertial axes", "targets = \"inertial\"", |i| without_turning(rotate_back(&i.rotation, i.linear_target), i)),
             read("the targets are specific force with the sign of a reaction (+9.8 upwards at rest)", "[columns] vx_dot = \"-vx_dot\" and so on, and targets = \"specific_force\"", |i| without_turning(add(i.linear_target.map(|value| -value), i.gravity), i)),
@@ -255,8 +272,9 @@ impl Relation {
             read("wx_dot and wy_dot are exchanged", "[columns] wx_dot = \"wy_dot\", wy_dot = \"wx_dot\", with the file's names", |i| stack(first_two(i.angular_target))),
             read("wy_dot and wz_dot are exchanged", "[columns] wy_dot = \"wz_dot\", wz_dot = \"wy_dot\", with the file's names", |i| stack(last_two(i.angular_target))),
             read("wx_dot and wz_dot are exchanged", "[columns] wx_dot = \"wz_dot\", wz_dot = \"wx_dot\", with the file's names", |i| stack(outer_two(i.angular_target))),
+            read(WITH_ANGULAR, ANGULAR_BACK, |i| stack(i.linear_target)),
             read("the angular targets have the other sign", "[columns] wx_dot = \"-wx_dot\", wy_dot = \"-wy_dot\", wz_dot = \"-wz_dot\"", |i| stack(i.angular_target.map(|value| -value))),
-            Hypothesis { says: OF_ANGLES, set: TO_BODY, state: |i| stack(of_angles(i.angles, i.rates)), rate: |i| stack(i.angular_target) },
+            Hypothesis { says: OF_ANGLES, set: TO_BODY, state: |i| stack(body_rates(i.angles[0], i.angles[1], i.rates)), rate: |i| stack(i.angular_target) },
         ])
     }
 
@@ -311,6 +329,33 @@ impl Relation {
         // One that explains little itself only leaves out what is wrong.
         let bar = LARGEST_SHARE.min(CONVINCING_SHARE * nominal).min(OF_COLUMNS * left + SLACK);
         (nominal > MATERIAL_SHARE && self.share(best) < bar && self.consistent(best)).then_some(best)
+    }
+
+    /// Another reading of a part of a single flight, where the nominal one holds in the rest of it: as a clause, and whether it is the later part, from this
+    /// block on, or the earlier one up to there.
+    pub fn reading_of_part(&self) -> Option<(&'static str, bool, usize)> {
+        let nominal = &self.misfit[0];
+        let blocks = nominal.len();
+        let share = |reading: usize, range: &Range<usize>| {
+            let (error, size) = total(&self.misfit[reading][range.clone()]);
+            error / size
+        };
+        let parts = (FEWEST_BLOCKS..(blocks + 1).saturating_sub(FEWEST_BLOCKS)).flat_map(|at| {
+            let (earlier, later) = (0..at, at..blocks);
+            [(later.clone(), earlier.clone(), true, at), (earlier, later, false, at)]
+        });
+        let holds = parts.filter(|(part, rest, ..)| share(0, rest) < MATERIAL_SHARE && share(0, part) > LARGEST_SHARE);
+        let read = holds.flat_map(|(part, _, is_later, at)| {
+            let of = |reading: usize| (total(&self.misfit[reading][part.clone()]).0, share(reading, &part), reading, is_later, at);
+            (1..self.hypotheses.len()).map(of).collect::<Vec<_>>()
+        });
+        // Of several places that one where the nominal reading is given up as late as it holds.
+        let left = |found: &(f64, f64, usize, bool, usize)| {
+            let rest = if found.3 { 0..found.4 } else { found.4..blocks };
+            found.0 + total(&nominal[rest]).0
+        };
+        let best = read.min_by(|one, other| left(one).total_cmp(&left(other)))?;
+        (best.1 < MATERIAL_SHARE).then_some((self.hypotheses[best.2].says, best.3, best.4))
     }
 
     /// Whether it applied to anything.

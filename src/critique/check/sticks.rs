@@ -10,6 +10,7 @@ use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::Motion;
 use super::regression::{BlockRegression, Estimate};
 use super::robust::median;
+use super::throws::Sides;
 use super::unexplained::{Fit, Left};
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
@@ -23,7 +24,7 @@ pub(super) const STICKS: [&str; 4] = ["u1", "u2", "u3", "u4"];
 /// Place of the first stick among the columns, and of the 1.
 pub(super) const FIRST: usize = 1;
 pub(super) const CONSTANT: usize = 5;
-const COLUMNS: usize = 6;
+pub(super) const COLUMNS: usize = 6;
 
 /// An axis answers to another stick if that one moves it so many times as much as its own.
 const EXCHANGED: f64 = 3.0;
@@ -58,10 +59,6 @@ struct Answers {
     moves: [f64; 4],
     /// By axis, the share of its changes that is explained.
     explained: [f64; 4],
-}
-
-fn empty() -> Regressions {
-    std::array::from_fn(|_| BlockRegression::new())
 }
 
 impl Answers {
@@ -116,20 +113,20 @@ impl Sticks {
         Self { flights: Vec::new() }
     }
 
-    /// What one flight says.
-    pub fn of(motion: &Motion) -> Regressions {
-        let mut regressions = empty();
+    /// What one flight says, with the magnitude of each axis's own stick beside it.
+    pub fn of(motion: &Motion) -> [Sides; 4] {
+        let mut regressions: [Sides; 4] = std::array::from_fn(|_| BlockRegression::new());
         for (piece, number) in motion.pieces(0) {
             let block = (0, number);
-            let integrals: [f64; 8] = motion.integral(&piece, |sample| {
+            let integrals: [f64; 12] = motion.integral(&piece, |sample| {
                 let [p, q, r, w] = [0, 1, 2, 3].map(|axis| state_of(motion, sample, axis));
                 let [one, two, three, four] = motion.instants[sample].controls;
-                [p, q, r, w, one, two, three, four]
+                [p, q, r, w, one, two, three, four, one.abs(), two.abs(), three.abs(), four.abs()]
             });
-            let [states, sticks] = [&integrals[..4], &integrals[4..]];
+            let [states, sticks, sizes] = [&integrals[..4], &integrals[4..8], &integrals[8..]];
             let length_s = super::increments::length_s(motion, &piece);
             for (axis, regression) in regressions.iter_mut().enumerate() {
-                let row = [states[axis], sticks[0], sticks[1], sticks[2], sticks[3], length_s];
+                let row = [states[axis], sticks[0], sticks[1], sticks[2], sticks[3], length_s, sizes[axis]];
                 regression.add(block, &row, change_of(motion, &piece, axis));
             }
         }
@@ -137,7 +134,8 @@ impl Sticks {
     }
 
     /// Adds what a flight says.
-    pub fn push(&mut self, flight: usize, regressions: Regressions) {
+    pub fn push(&mut self, flight: usize, sides: &[Sides; 4]) {
+        let regressions = std::array::from_fn(|axis| sides[axis].on(std::array::from_fn(|column| column)));
         self.flights.push((flight, regressions));
     }
 

@@ -225,7 +225,7 @@ impl<'a> Draft<'a> {
     fn column(&self, name: &str, text: &Value) -> Result<Value, String> {
         let text = text.as_str().ok_or_else(|| format!("`columns.{name}` is {text}"))?;
         let formula = Formula::parse(text).map_err(|error| error.to_string())?;
-        let [read] = formula.names()[..] else { return Err(format!("`{text}` is not made of one column")) };
+        let [read] = formula.names()[..] else { return self.of_several(text, &formula) };
         if !column_names().any(|known| known == read) {
             return Err(format!("`{read}` is no column of the log"));
         }
@@ -258,6 +258,19 @@ impl<'a> Draft<'a> {
             [one] => Value::String(one.clone()),
             several => Value::Array(several.iter().cloned().map(Value::String).collect()),
         })
+    }
+
+    /// A formula of several columns holds where the file has each of them as the program has it.
+    fn of_several(&self, text: &str, formula: &Formula) -> Result<Value, String> {
+        for read in formula.names() {
+            let is_as_in_file =
+                self.of_file(read).is_some_and(|(own, sign)| own == read && sign == 1.0) && self.schema.factor(read) == 1.0;
+            let late = Column::from_name(read).is_some_and(|column| self.schema.late.contains_key(&column));
+            if !is_as_in_file || late || self.schema.columns.contains_key(read) {
+                return Err(self.not_of_file(read));
+            }
+        }
+        Ok(Value::String(text.to_owned()))
     }
 
     /// Whether one column may be read from another's place: what else is done to the two has to be the same.
