@@ -11,6 +11,8 @@ mod edits;
 mod history;
 mod job;
 mod judge;
+mod recent;
+mod residual;
 mod save;
 pub mod server;
 mod surfaces;
@@ -23,6 +25,7 @@ pub use edits::{Edit, FormulaCheck, Owner};
 pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
+pub use residual::{InTimeText, RegionText, RegionsText};
 pub use save::Saved;
 pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
@@ -36,6 +39,7 @@ use crate::physics::{Model, calibrate};
 use history::{History, State};
 use job::Job;
 use judge::Judge;
+use recent::Recent;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -68,9 +72,9 @@ pub struct Studio {
     /// Held by whoever changes the model, so that changes come one after the other.
     changing: Mutex<()>,
     job: Mutex<Option<Job>>,
-    predictions: Mutex<trace::Predictions>,
-    dependences: Mutex<views::Dependences>,
-    tables: Mutex<surfaces::Tables>,
+    predictions: trace::Predictions,
+    dependences: views::Dependences,
+    residuals: residual::Residuals,
     file: Mutex<save::ModelFile>,
     /// Taken before the locks of history and search, where both are needed.
     drafts: Mutex<draft::Drafts>,
@@ -118,9 +122,9 @@ impl Studio {
             history: Mutex::new(History::new(first)),
             changing: Mutex::default(),
             job: Mutex::default(),
-            predictions: Mutex::default(),
-            dependences: Mutex::default(),
-            tables: Mutex::default(),
+            predictions: Recent::new(trace::PREDICTIONS),
+            dependences: Recent::new(views::KEPT),
+            residuals: residual::Residuals::default(),
             file,
             drafts,
             revision: AtomicU64::default(),

@@ -3,7 +3,9 @@
 use crate::support::{HIDDEN, blank, folder, studio};
 use phyture::flight::Channel;
 use phyture::physics::Model;
-use phyture::studio::{By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, Steps, Studio, SurfaceWanted, TraceWanted};
+use phyture::studio::{
+    By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, RegionText, Steps, Studio, SurfaceWanted, TraceWanted,
+};
 use phyture::{Error, Result};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -159,6 +161,34 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
     for refused in [studio.trace(&wanted(99, Channel::VxDot, 400)), studio.trace(&wanted(0, Channel::VxDot, 1))] {
         assert!(matches!(refused, Err(Error::Config { .. })));
     }
+    Ok(())
+}
+
+#[test]
+fn what_is_left_is_parted_by_rules_and_looked_at_in_time() -> Result<()> {
+    let studio = studio(None)?;
+    let before = studio.regions(PartWanted::Judged, Channel::WzDot)?;
+    let whole = before.whole.ok_or_else(|| Error::Undetermined("no region".into()))?;
+    assert!(!before.even && before.why.is_none());
+    let loudest = &before.regions[0];
+    assert!(loudest.rule.contains("vy"), "the fin answers to the side wind: {loudest:?}");
+    assert!(loudest.rmse > 1.25 * whole.rmse && loudest.share_of_error > loudest.share_of_time);
+    assert!(before.regions.windows(2).all(|pair| pair[0].rmse >= pair[1].rmse), "the loudest first");
+    let sum = |of: fn(&RegionText) -> f64| before.regions.iter().map(of).sum::<f64>();
+    assert!((sum(|one| one.share_of_error) - 1.0).abs() < 1e-9 && (sum(|one| one.share_of_time) - 1.0).abs() < 1e-9);
+    let in_time = studio.in_time(PartWanted::Judged, Channel::WzDot)?;
+    let lasting = in_time.autocorrelation.ok_or_else(|| Error::Undetermined("no autocorrelation".into()))?;
+    assert_eq!((lasting.channel, lasting.lag_s[0].to_bits()), ("wz_dot", 0.0_f64.to_bits()));
+    assert!((lasting.correlation[0] - 1.0).abs() < 1e-12 && lasting.lasts_s.is_some_and(|lasts_s| lasts_s > 0.3), "{lasting:?}");
+    let spectrum = in_time.spectrum.ok_or_else(|| Error::Undetermined("no spectrum".into()))?;
+    assert!(spectrum.channel == "wz_dot" && spectrum.segments > 10 && spectrum.density.len() == spectrum.frequency_hz.len());
+    let sticks: Vec<_> = in_time.sticks.iter().map(|one| (one.stick, one.channel)).collect();
+    assert_eq!(sticks, ["u1", "u2", "u3", "u4"].map(|stick| (stick, "wz_dot")));
+    // With what was missing the error falls, and what is left is another residual.
+    studio.edit(&Edit::Add { effect: HIDDEN.into() })?;
+    let after = studio.regions(PartWanted::Judged, Channel::WzDot)?;
+    assert!(after.whole.is_some_and(|after| after.rmse < 0.8 * whole.rmse));
+    assert_ne!(studio.in_time(PartWanted::Judged, Channel::WzDot)?.autocorrelation, Some(lasting));
     Ok(())
 }
 

@@ -9,4 +9,5 @@ mod mishaps;
 mod server;
 mod support;
 mod unsaved;
+mod views;
 mod webdriver;

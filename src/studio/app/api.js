@@ -34,6 +34,11 @@ import { read } from './place.js';
  * @typedef {{ surface: { channel: string, variables: [string, string], edges: [number[], number[]], share: number,
  *   cells: { column: number, row: number, mean: number, ci95: [number, number] | null, n: number, blocks: number, thin: boolean }[] } | null,
  *   units: [string, string], names: string[] }} Surface
+ * @typedef {{ rule: string, rmse: number, ci95: [number, number] | null, share_of_error: number, share_of_time: number, blocks: number }} Region
+ * @typedef {{ whole: Region | null, regions: Region[], even: boolean, why: string | null }} Regions
+ * @typedef {{ stick: string, lag_s: number[], correlation: number[], band95: (number | null)[], feedback_warning: boolean }} Following
+ * @typedef {{ autocorrelation: { lag_s: number[], correlation: number[], lasts_s: number | null } | null,
+ *   spectrum: { frequency_hz: number[], density: number[], segments: number } | null, sticks: Following[], why: string | null }} InTime
  * @typedef {{ share: number, ci95: [number, number] | null }} Share
  * @typedef {{ effect: string, meaning: string, channels: string[], held_out_mse_fall: Record<string, number>, p_value: number, stability: string,
  *   selection_frequency: number, indistinguishable: string[], coefficients: (Numeral & { expected?: [number, number], sign?: string })[],

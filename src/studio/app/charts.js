@@ -11,7 +11,7 @@ import { interval, measure, number, percent, ticks, tickText } from './format.js
  * @param {number} from
  * @param {number} to
  */
-function scale(low, high, from, to) {
+export function scale(low, high, from, to) {
   const size = high > low ? high - low : 1;
   return (/** @type {number} */ value) => from + ((value - low) / size) * (to - from);
 }

@@ -28,8 +28,9 @@ struct MapWanted {
     by: By,
 }
 
+/// One channel on a part of the data.
 #[derive(Deserialize)]
-struct DependenceWanted {
+struct ChannelWanted {
     #[serde(default)]
     part: PartWanted,
     channel: Channel,
@@ -76,8 +77,16 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         }
         "place" => json(&studio.place(&parsed::<PlaceWanted>(body)?)?),
         "dependence" => {
-            let DependenceWanted { part, channel } = parsed(body)?;
+            let ChannelWanted { part, channel } = parsed(body)?;
             json(&studio.dependence(part, channel)?)
+        }
+        "regions" => {
+            let ChannelWanted { part, channel } = parsed(body)?;
+            json(&studio.regions(part, channel)?)
+        }
+        "in_time" => {
+            let ChannelWanted { part, channel } = parsed(body)?;
+            json(&studio.in_time(part, channel)?)
         }
         "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
