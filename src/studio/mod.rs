@@ -13,6 +13,7 @@ mod job;
 mod judge;
 mod recent;
 mod residual;
+mod rollout;
 mod save;
 pub mod server;
 mod surfaces;
@@ -26,6 +27,7 @@ pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
 pub use residual::{InTimeText, RegionText, RegionsText};
+pub use rollout::{Found, PathText, RolloutText, RolloutWanted, RolloutsText};
 pub use save::Saved;
 pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
@@ -75,6 +77,7 @@ pub struct Studio {
     predictions: trace::Predictions,
     dependences: views::Dependences,
     residuals: residual::Residuals,
+    all_starts: rollout::AllStarts,
     file: Mutex<save::ModelFile>,
     /// Taken before the locks of history and search, where both are needed.
     drafts: Mutex<draft::Drafts>,
@@ -125,6 +128,7 @@ impl Studio {
             predictions: Recent::new(trace::PREDICTIONS),
             dependences: Recent::new(views::KEPT),
             residuals: residual::Residuals::default(),
+            all_starts: Recent::new(rollout::KEPT),
             file,
             drafts,
             revision: AtomicU64::default(),

@@ -113,6 +113,7 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
             "where",
             "document.querySelectorAll('#map tbody tr').length === 5 && document.querySelectorAll('#in-time .chart').length === 3",
         ),
+        ("rollout", "document.querySelector('#rollout-all[data-starts]')"),
         ("model", "document.querySelectorAll('#history li').length === 1"),
         ("learn", "document.querySelector('#findings')"),
     ] {

@@ -6,6 +6,7 @@ mod browser;
 mod http;
 mod library;
 mod mishaps;
+mod rollouts;
 mod server;
 mod support;
 mod unsaved;

@@ -43,3 +43,36 @@ fn where_it_fails_tells_regions_and_what_the_residual_is_in_time() -> Result<()>
     assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
     Ok(())
 }
+
+#[test]
+fn a_click_rolls_out_from_there_and_a_key_moves_on() -> Result<()> {
+    let Some((browser, running)) = opened("rollout")? else { return Ok(()) };
+    browser.wait("document.querySelectorAll('#rollout-one .chart').length === 16")?;
+    browser.wait("Number(document.querySelector('#rollout-all')?.dataset.starts) > 100")?;
+    let at = "document.querySelector('#rollout-one')?.dataset.at";
+    let error = "document.querySelector('#rollout-one [data-quantity=velocity]').dataset.error";
+    let (first, first_error) = (text(&browser, at)?, text(&browser, error)?);
+    // In the middle of the picture.
+    browser.click("#rollout-strip .u-over")?;
+    browser.wait(&format!("{at} !== '{first}'"))?;
+    let half: f64 = text(&browser, at)?.parse().unwrap_or(f64::NAN);
+    let whole =
+        browser.value("Number(document.querySelector('#flight').selectedOptions[0].textContent.match(/([0-9.]+) s/)[1])")?;
+    let whole = whole.as_f64().unwrap_or(f64::NAN);
+    assert!((half - 0.5 * whole).abs() < 0.05 * whole, "{half} of {whole}");
+    assert_ne!(text(&browser, error)?, first_error);
+    assert!(text(&browser, "location.hash")?.contains(&format!("at={half}")), "the address holds it");
+    browser.keys("#main", "\u{e014}")?;
+    browser.wait(&format!("Number({at}) > {half}"))?;
+    browser.write("#rollout-at", "3\u{e007}")?;
+    browser.wait(&format!("Math.abs(Number({at}) - 3) < 0.01"))?;
+    browser.run("const ahead = document.querySelector('#ahead'); ahead.value = '2'; ahead.dispatchEvent(new Event('change'))")?;
+    browser.wait("Math.abs(Number(document.querySelector('#rollout-one')?.dataset.end) - 2) < 0.01")?;
+    browser.wait("document.querySelector('#rollout-all[data-starts] .quantity')")?;
+    // From what is looked at in Compare.
+    browser.open(&format!("{}&view=compare&flight=2&from=7&to=12", running.url))?;
+    browser.click("#from-here")?;
+    browser.wait(&format!("location.hash.includes('view=rollout') && Math.abs(Number({at}) - 7) < 0.01"))?;
+    assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
+    Ok(())
+}

@@ -20,12 +20,12 @@ function dialog(title, ...content) {
 
 export function keysHelp() {
   const keys = [
-    ['1 2 3 4', 'Compare, Where it fails, Learn, Model'],
+    ['1 2 3 4 5', 'Compare, Where it fails, Roll out, Learn, Model'],
     ['u  or  Ctrl Z', 'undo'],
     ['r  or  Ctrl Shift Z', 'redo'],
     ['s', 'save'],
     ['[  ]', 'the flight before, the next'],
-    ['← →', 'earlier, later (Compare)'],
+    ['← →', 'earlier, later (Compare, Roll out)'],
     ['+ −', 'closer, further (Compare)'],
     ['0', 'the whole flight (Compare)'],
     ['drag', 'zoom to what is marked; double click: the whole flight'],

@@ -1,5 +1,5 @@
 // @ts-check
-// Lines over one axis as SVG, with few points: correlations over lags, a spectrum, errors over a horizon. Each picture has its numbers as a table below.
+// Lines over one axis as SVG, with few points: correlations over lags, a spectrum, errors over a horizon. The numbers of each stand below as a table.
 
 import { h, s, scroller } from './dom.js';
 import { measure, number, ticks, tickText } from './format.js';
@@ -20,6 +20,7 @@ import { scale } from './charts.js';
  * @property {[number, number]} [at_least] what the upright axis shows in any case
  * @property {{ at: number, text: string }} [mark] a line across at a value
  * @property {boolean} [small] a picture of a row of four
+ * @property {boolean} [bare] one of several pictures that share a legend and tables
  */
 
 /** Dashes that tell lines apart without colour. */
@@ -94,9 +95,9 @@ export function lines(picture) {
   return h(
     'figure',
     { class: 'lines', 'aria-label': picture.title },
-    picture.curves.length > 1 ? legend(picture.curves) : null,
+    picture.curves.length > 1 && !picture.bare ? legend(picture.curves) : null,
     svg,
-    numbers(picture, kept),
+    picture.bare ? null : tables(picture),
   );
 }
 
@@ -274,37 +275,33 @@ export function legend(curves) {
 const ROWS = 24;
 
 /**
- * The same as a table, every k-th place where there are many.
- * @param {Picture} picture
- * @param {number[]} kept
+ * The numbers of some pictures as tables, every k-th place where there are many; shut until they are wanted.
+ * @param {...Picture} pictures
  */
-function numbers(picture, kept) {
-  const { x, curves, across, up } = picture;
-  const every = Math.ceil(kept.length / ROWS);
-  const rows = kept.filter((_, order) => order % every === 0 || order === kept.length - 1);
+export function tables(...pictures) {
+  const title = pictures.length > 1 ? 'As tables' : 'As a table';
+  return h('details', {}, h('summary', {}, title), pictures.map((picture) => scroller(picture.title, table(picture))));
+}
+
+/** @param {Picture} picture */
+function table({ x, curves, across, up, title }) {
+  const every = Math.ceil(x.length / ROWS);
+  const rows = x.map((_, index) => index).filter((index) => index % every === 0 || index === x.length - 1);
   const head = [named(across), ...curves.map((curve) => (curves.length > 1 ? curve.name : named(up)))];
   return h(
-    'details',
-    {},
-    h('summary', {}, 'As a table'),
-    scroller(
-      picture.title,
-      h(
-        'table',
-        { class: 'numbers' },
-        h('caption', {}, curves.length > 1 ? named(up) : picture.title),
-        h('thead', {}, h('tr', {}, head.map((text) => h('th', { scope: 'col' }, text)))),
+    'table',
+    { class: 'numbers' },
+    h('caption', {}, curves.length > 1 ? `${title}, ${up.unit}` : title),
+    h('thead', {}, h('tr', {}, head.map((text) => h('th', { scope: 'col' }, text)))),
+    h(
+      'tbody',
+      {},
+      rows.map((index) =>
         h(
-          'tbody',
+          'tr',
           {},
-          rows.map((index) =>
-            h(
-              'tr',
-              {},
-              h('th', { scope: 'row' }, number(x[index])),
-              curves.map((curve) => h('td', {}, number(curve.y[index]))),
-            ),
-          ),
+          h('th', { scope: 'row' }, number(x[index])),
+          curves.map((curve) => h('td', {}, number(curve.y[index]))),
         ),
       ),
     ),

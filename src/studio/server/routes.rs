@@ -2,7 +2,7 @@
 
 use super::Refusal;
 use crate::flight::Channel;
-use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
+use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, RolloutWanted, Studio, SurfaceWanted, TraceWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -34,6 +34,12 @@ struct ChannelWanted {
     #[serde(default)]
     part: PartWanted,
     channel: Channel,
+}
+
+/// How far rollouts go.
+#[derive(Deserialize)]
+struct AheadWanted {
+    ahead_s: f64,
 }
 
 #[derive(Deserialize)]
@@ -88,6 +94,8 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
             let ChannelWanted { part, channel } = parsed(body)?;
             json(&studio.in_time(part, channel)?)
         }
+        "rollout" => json(&studio.rollout(&parsed::<RolloutWanted>(body)?)?),
+        "rollouts" => json(&studio.rollouts(parsed::<AheadWanted>(body)?.ahead_s)?),
         "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
