@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// Samples that are judged at most: more do not change what a person sees, and an answer has to come while they look.
-const MOST_SAMPLES: usize = 100_000;
+pub(super) const MOST_SAMPLES: usize = 100_000;
 
 /// Comparisons that are kept whole.
 const KEPT: usize = 4;

@@ -8,12 +8,14 @@
 mod describe;
 mod draft;
 mod edits;
+mod found;
 mod history;
 mod job;
 mod judge;
 mod recent;
 mod residual;
 mod rollout;
+mod runs;
 mod save;
 pub mod server;
 mod surfaces;
@@ -23,11 +25,13 @@ mod views;
 pub use describe::{ChannelText, EffectText, FlightText, ModelText, NumberText, Overview};
 pub use draft::LeftText;
 pub use edits::{Edit, FormulaCheck, Owner};
+pub use found::Found;
 pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
 pub use residual::{InTimeText, RegionText, RegionsText};
-pub use rollout::{Found, PathText, RolloutText, RolloutWanted, RolloutsText};
+pub use rollout::{PathText, RolloutText, RolloutWanted, RolloutsText};
+pub use runs::{Kind, RunErrors, RunText, RunsText};
 pub use save::Saved;
 pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
@@ -78,6 +82,7 @@ pub struct Studio {
     dependences: views::Dependences,
     residuals: residual::Residuals,
     all_starts: rollout::AllStarts,
+    runs: runs::Runs,
     file: Mutex<save::ModelFile>,
     /// Taken before the locks of history and search, where both are needed.
     drafts: Mutex<draft::Drafts>,
@@ -129,6 +134,7 @@ impl Studio {
             dependences: Recent::new(views::KEPT),
             residuals: residual::Residuals::default(),
             all_starts: Recent::new(rollout::KEPT),
+            runs: runs::Runs::default(),
             file,
             drafts,
             revision: AtomicU64::default(),

@@ -1,10 +1,11 @@
 //! Open-loop prediction of the present state: from one moment of a flight with all states on the way, and its errors over all starts on flights that
 //! no fit has seen. Both are those of `rollout`; here they are asked for by time and thinned for a screen.
 
+use super::found::Found;
 use super::recent::Recent;
 use super::{Studio, fault};
 use crate::critique::rollout::{PerQuantity, Quantity, Rollouts};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::flight::attitude::quaternion_to_euler;
 use crate::flight::{Flight, Window};
 use crate::physics::rollout::State;
@@ -77,19 +78,6 @@ pub struct RolloutsText {
     pub legend: String,
 }
 
-/// A result, or why this log has none and what to do.
-#[derive(Clone, Debug, Serialize)]
-#[serde(untagged)]
-pub enum Found<T> {
-    /// It is there.
-    Known(T),
-    /// It cannot be had of this log.
-    Missing {
-        /// Why, and what to do.
-        why: String,
-    },
-}
-
 /// Errors over all starts by state and steps.
 pub(super) type AllStarts = Recent<(u64, usize), Rollouts>;
 
@@ -100,7 +88,7 @@ impl Studio {
     /// Rolls the present state out from one moment of a flight, beside the yardsticks.
     ///
     /// # Errors
-    /// [`Error::Config`] for a flight that is not there, or times that cannot be; as [`crate::physics::Model::predict`].
+    /// [`crate::Error::Config`] for a flight that is not there, or times that cannot be; as [`crate::physics::Model::predict`].
     pub fn rollout(&self, wanted: &RolloutWanted) -> Result<Found<RolloutText>> {
         let flights = &self.set.flights;
         let flight = flights.get(wanted.flight).ok_or_else(|| {
@@ -123,7 +111,7 @@ impl Studio {
         let last = (sample.max(0.0) as usize).clamp(1, flight.len() - 1 - horizon);
         let models = [(NAME.to_owned(), self.now().model.clone())];
         let rolling = Rolling { models: &models, networks: &[], horizon, stride: 1 };
-        let found = of_log(rolling.from_one(&self.set, &self.split, Window { flight: wanted.flight, last }))?;
+        let found = Found::of_log(rolling.from_one(&self.set, &self.split, Window { flight: wanted.flight, last }))?;
         Ok(found.map(|from_one| text(&from_one, flight.time_s(last))))
     }
 
@@ -148,40 +136,12 @@ impl Studio {
             let models = [(NAME.to_owned(), now.model.clone())];
             Rolling { models: &models, networks: &[], horizon, stride }.run(&self.set, &self.split)
         });
-        Ok(of_log(made)?.map(|made| RolloutsText {
+        Ok(Found::of_log(made)?.map(|made| RolloutsText {
             basis: made.basis(),
             caution: made.caution(),
             legend: made.legend(),
             rollouts: Rollouts::clone(&made),
         }))
-    }
-}
-
-impl<T> Found<T> {
-    fn map<U>(self, of: impl FnOnce(T) -> U) -> Found<U> {
-        match self {
-            Self::Known(known) => Found::Known(of(known)),
-            Self::Missing { why } => Found::Missing { why },
-        }
-    }
-
-    /// What is there.
-    pub fn known(self) -> Option<T> {
-        match self {
-            Self::Known(known) => Some(known),
-            Self::Missing { .. } => None,
-        }
-    }
-}
-
-/// What this log lacks is told in the place of a result; it is no failure of the request.
-fn of_log<T>(made: Result<T>) -> Result<Found<T>> {
-    match made {
-        Ok(known) => Ok(Found::Known(known)),
-        Err(error @ (Error::Log { .. } | Error::Undetermined(_) | Error::Config { .. })) => {
-            Ok(Found::Missing { why: error.to_string() })
-        }
-        Err(error) => Err(error),
     }
 }
 

@@ -24,6 +24,10 @@ impl ModelFile {
         Self { path, text, model }
     }
 
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
     pub fn name(&self) -> Option<String> {
         self.path.as_ref().map(|path| path.display().to_string())
     }

@@ -7,6 +7,7 @@ mod http;
 mod library;
 mod mishaps;
 mod rollouts;
+mod runs;
 mod server;
 mod support;
 mod unsaved;

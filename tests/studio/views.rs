@@ -1,8 +1,9 @@
 //! Single views in a real browser, each opened, used and looked at: what is drawn, and that the console is free of faults. The way through all of
 //! them is in `browser`.
 
-use crate::support::{Running, studio};
+use crate::support::{HIDDEN, Running, folder, studio};
 use crate::webdriver::Browser;
+use phyture::studio::Edit;
 use phyture::{Error, Result};
 
 /// A browser on a studio of simulated flights; none where there is no Chromium.
@@ -73,6 +74,36 @@ fn a_click_rolls_out_from_there_and_a_key_moves_on() -> Result<()> {
     browser.open(&format!("{}&view=compare&flight=2&from=7&to=12", running.url))?;
     browser.click("#from-here")?;
     browser.wait(&format!("location.hash.includes('view=rollout') && Math.abs(Number({at}) - 7) < 0.01"))?;
+    assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
+    Ok(())
+}
+
+#[test]
+fn runs_stand_beside_each_other_and_a_file_that_does_not_read_says_why() -> Result<()> {
+    let Some(browser) = Browser::start(1280, 720)? else {
+        println!("skipped: no chromedriver with a Chromium (Debian: chromium, chromium-driver)");
+        return Ok(());
+    };
+    let place = folder()?;
+    let studio = studio(Some(&place.path().join("model.toml")))?;
+    studio.save(&place.path().join("first.toml").display().to_string(), false)?;
+    studio.edit(&Edit::Add { effect: HIDDEN.into() })?;
+    studio.save(&place.path().join("second.toml").display().to_string(), false)?;
+    let broken = place.path().join("broken.toml");
+    std::fs::write(&broken, "[model]\nname = 3\n").map_err(Error::io(&broken))?;
+    let running = Running::new(studio)?;
+    browser.open(&format!("{}&view=runs&channel=5", running.url))?;
+    browser.wait("document.querySelector('#runs')?.dataset.waits === '0'")?;
+    let yaw = |run: &str| format!("Number(document.querySelector('[data-run=\"{run}\"] [data-channel=wz_dot]').dataset.rmse)");
+    let (first, second, now) = (yaw("first.toml"), yaw("second.toml"), yaw(""));
+    browser.wait(&format!("{first} > 1.2 * {second} && {second} === {now}"))?;
+    browser.wait("document.querySelector('[data-run=\"second.toml\"] .tag').textContent === 'open'")?;
+    let says = text(&browser, "document.querySelector('[data-run=\"broken.toml\"]').textContent")?;
+    assert!(says.contains("expected") || says.contains("missing"), "{says}");
+    // In the order of the errors the least comes first, behind the present state.
+    browser.click("#runs [data-key=error]")?;
+    browser.wait("document.querySelector('#runs tbody tr:nth-child(2)').dataset.run === 'second.toml'")?;
+    browser.wait("location.hash.includes('sort=error') && document.querySelector('#runs').dataset.waits === '0'")?;
     assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
     Ok(())
 }

@@ -39,6 +39,9 @@ import { read } from './place.js';
  * @typedef {{ stick: string, lag_s: number[], correlation: number[], band95: (number | null)[], feedback_warning: boolean }} Following
  * @typedef {{ autocorrelation: { lag_s: number[], correlation: number[], lasts_s: number | null } | null,
  *   spectrum: { frequency_hz: number[], density: number[], segments: number } | null, sticks: Following[], why: string | null }} InTime
+ * @typedef {{ name: string, kind: 'model' | 'network', written_s: number, open: boolean, says: string, error: string | null }} Run
+ * @typedef {{ folder: string, rows: Run[], left_out: number, why: string | null }} Runs
+ * @typedef {{ rmse: PerChannel, ci95: Intervals, basis: string }} RunErrors
  * @typedef {{ why: string }} Missing what a log does not allow, and what to do
  * @typedef {'position' | 'velocity' | 'attitude' | 'rates'} Quantity
  * @typedef {{ at_s: number, ahead_s: number[], measured: Record<Quantity, number[][]>, note: string | null,

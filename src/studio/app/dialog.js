@@ -20,7 +20,7 @@ function dialog(title, ...content) {
 
 export function keysHelp() {
   const keys = [
-    ['1 2 3 4 5', 'Compare, Where it fails, Roll out, Learn, Model'],
+    ['1 … 6', 'Compare, Where it fails, Roll out, Learn, Model, Runs'],
     ['u  or  Ctrl Z', 'undo'],
     ['r  or  Ctrl Shift Z', 'redo'],
     ['s', 'save'],

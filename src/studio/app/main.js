@@ -11,6 +11,7 @@ import * as learn from './learn.js';
 import * as model from './model.js';
 import { go, read, slide, VIEWS } from './place.js';
 import * as rollout from './rollout.js';
+import * as runs from './runs.js';
 import * as where from './where.js';
 
 /**
@@ -31,8 +32,8 @@ import * as where from './where.js';
  */
 
 /** @type {Record<string, View>} */
-const views = { compare, where, rollout, learn, model };
-const NAMES = { compare: 'Compare', where: 'Where it fails', rollout: 'Roll out', learn: 'Learn', model: 'Model' };
+const views = { compare, where, rollout, learn, model, runs };
+const NAMES = { compare: 'Compare', where: 'Where it fails', rollout: 'Roll out', learn: 'Learn', model: 'Model', runs: 'Runs' };
 const THEME = 'phyture-theme';
 /** How often is asked whether what is shown is still so, ms. */
 const PULSE_MS = 1500;

@@ -4,7 +4,7 @@
 /**
  * @typedef {object} Place
  * @property {string} token secret of the running studio
- * @property {'compare' | 'where' | 'rollout' | 'learn' | 'model'} view
+ * @property {'compare' | 'where' | 'rollout' | 'learn' | 'model' | 'runs'} view
  * @property {number} flight index
  * @property {number} channel index
  * @property {number | null} from s
@@ -14,11 +14,12 @@
  * @property {number | null} against state that is laid beside
  * @property {'judged' | 'all'} part
  * @property {'manoeuvre' | 'regime'} by
+ * @property {'date' | 'error'} sort order of runs
  * @property {string} variable name; empty is the one on which the error depends most
  * @property {string} second name of a second variable; empty is none
  */
 
-export const VIEWS = /** @type {const} */ (['compare', 'where', 'rollout', 'learn', 'model']);
+export const VIEWS = /** @type {const} */ (['compare', 'where', 'rollout', 'learn', 'model', 'runs']);
 
 /** @returns {Place} */
 export function read() {
@@ -47,6 +48,7 @@ export function read() {
     against: real('against'),
     part: oneOf('part', /** @type {const} */ (['judged', 'all'])),
     by: oneOf('by', /** @type {const} */ (['manoeuvre', 'regime'])),
+    sort: oneOf('sort', /** @type {const} */ (['date', 'error'])),
     variable: given.get('variable') ?? '',
     second: given.get('second') ?? '',
   };

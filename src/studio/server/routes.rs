@@ -42,6 +42,12 @@ struct AheadWanted {
     ahead_s: f64,
 }
 
+/// A run by its name in the folder; the present state without.
+#[derive(Deserialize)]
+struct RunWanted {
+    name: Option<String>,
+}
+
 #[derive(Deserialize)]
 struct FormulaWanted {
     owner: Owner,
@@ -96,6 +102,8 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         }
         "rollout" => json(&studio.rollout(&parsed::<RolloutWanted>(body)?)?),
         "rollouts" => json(&studio.rollouts(parsed::<AheadWanted>(body)?.ahead_s)?),
+        "runs" => json(&studio.runs()),
+        "run_errors" => json(&studio.run_errors(parsed::<RunWanted>(body)?.name.as_deref())?),
         "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
