@@ -5,6 +5,7 @@
 //! taken back. Everything that is computed is computed elsewhere (`workflow`, `critique`, `physics`). [`server`] shows it to a browser on this
 //! machine; nothing else here knows of one.
 
+mod curves;
 mod describe;
 mod draft;
 mod edits;
@@ -22,6 +23,7 @@ mod surfaces;
 mod trace;
 mod views;
 
+pub use curves::{CurvePanel, CurveText};
 pub use describe::{ChannelText, EffectText, FlightText, ModelText, NumberText, Overview};
 pub use draft::LeftText;
 pub use edits::{Edit, FormulaCheck, Owner};
@@ -83,6 +85,7 @@ pub struct Studio {
     residuals: residual::Residuals,
     all_starts: rollout::AllStarts,
     runs: runs::Runs,
+    curves: curves::Known,
     file: Mutex<save::ModelFile>,
     /// Taken before the locks of history and search, where both are needed.
     drafts: Mutex<draft::Drafts>,
@@ -135,6 +138,7 @@ impl Studio {
             residuals: residual::Residuals::default(),
             all_starts: Recent::new(rollout::KEPT),
             runs: runs::Runs::default(),
+            curves: Recent::new(curves::KEPT),
             file,
             drafts,
             revision: AtomicU64::default(),

@@ -116,7 +116,7 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         ("rollout", "document.querySelector('#rollout-all[data-starts]')"),
         ("model", "document.querySelectorAll('#history li').length === 1"),
         ("runs", "document.querySelector('#runs')?.dataset.waits === '0'"),
-        ("learn", "document.querySelector('#findings')"),
+        ("learn", "document.querySelector('#findings [data-curve][data-drawn]')"),
     ] {
         browser.open(&format!("{}&view={view}", running.url))?;
         if view == "learn" {

@@ -1,12 +1,14 @@
 //! The studio without a server: the way of a person from the error to the effect and back.
 
 use crate::support::{HIDDEN, blank, folder, studio};
+use phyture::critique::locate::Bin;
 use phyture::flight::Channel;
 use phyture::physics::Model;
 use phyture::studio::{
     By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, RegionText, Steps, Studio, SurfaceWanted, TraceWanted,
 };
 use phyture::{Error, Result};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -29,6 +31,30 @@ fn wanted(flight: usize, channel: Channel, pixels: usize) -> TraceWanted {
     TraceWanted { flight, channel, from_s: None, to_s: None, pixels, against: None, moved: None }
 }
 
+/// The curve of what was found, and the page of the search, as they are after a search.
+fn curve_and_page(studio: &Studio, place: &Path) -> Result<()> {
+    let missing = |what: &str| Error::Undetermined(format!("no {what}"));
+    let curve = studio.curve(HIDDEN)?.known().ok_or_else(|| missing("curve"))?;
+    assert_eq!(curve.channel, Channel::WzDot.index());
+    let panel = curve.panels.first().ok_or_else(|| missing("panel"))?;
+    assert!(
+        panel.name == "vy" && panel.read && panel.before.len() == panel.change.len() && panel.before.len() == panel.after.len()
+    );
+    // The curve runs through the points: what is left behind it is small.
+    let size = |of: &[Bin]| of.iter().map(|bin| bin.n as f64 * bin.mean.powi(2)).sum::<f64>();
+    assert!(size(&panel.after) < 0.05 * size(&panel.before), "{panel:?}");
+    let apart: Vec<Bin> =
+        panel.before.iter().zip(&panel.change).map(|(before, change)| Bin { mean: before.mean - change.mean, ..*before }).collect();
+    assert!((size(&apart) / size(&panel.after) - 1.0).abs() < 1e-6, "what is left is the residual less the change");
+    assert!(matches!(studio.curve("ground_effect"), Err(Error::Config { .. })), "only what was found");
+    let path = place.join("diagnosis.html").display().to_string();
+    studio.save_diagnosis(&path, false)?;
+    let html = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    assert!(html.contains(HIDDEN) && html.contains("What was tried and not named"), "the page of `diagnose`");
+    assert!(matches!(studio.save_diagnosis(&path, false), Err(Error::Exists { .. })), "not unasked");
+    Ok(())
+}
+
 #[test]
 fn a_hidden_effect_is_found_added_and_the_error_falls_and_comes_back() -> Result<()> {
     let place = folder()?;
@@ -41,6 +67,7 @@ fn a_hidden_effect_is_found_added_and_the_error_falls_and_comes_back() -> Result
     let job = studio.job();
     assert_eq!((job.progress, job.error.as_deref()), (Progress::Done, None));
     assert!(job.diagnosis.is_some_and(|diagnosis| diagnosis.accepted.contains(&HIDDEN.to_owned())));
+    curve_and_page(&studio, place.path())?;
     let added = studio.edit(&Edit::Add { effect: HIDDEN.into() })?;
     assert!(yaw(&added) < 0.8 * yaw(&first), "{} to {}", yaw(&first), yaw(&added));
     assert!(matches!(studio.edit(&Edit::Add { effect: HIDDEN.into() }), Err(Error::Config { .. })), "it is in already");
@@ -196,6 +223,7 @@ fn what_is_left_is_parted_by_rules_and_looked_at_in_time() -> Result<()> {
 fn a_search_stops_when_it_is_asked_to_and_another_may_begin() -> Result<()> {
     let studio = studio(None)?;
     assert_eq!(studio.job().progress, Progress::Idle);
+    assert!(matches!(studio.curve(HIDDEN), Err(Error::Config { .. })) && studio.save_diagnosis("page.html", false).is_err());
     studio.diagnose()?;
     assert!(matches!(studio.diagnose(), Err(Error::Config { .. })), "one at a time");
     let begun = Instant::now();

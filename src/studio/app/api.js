@@ -42,6 +42,7 @@ import { read } from './place.js';
  * @typedef {{ name: string, kind: 'model' | 'network', written_s: number, open: boolean, says: string, error: string | null }} Run
  * @typedef {{ folder: string, rows: Run[], left_out: number, why: string | null }} Runs
  * @typedef {{ rmse: PerChannel, ci95: Intervals, basis: string }} RunErrors
+ * @typedef {{ channel: number, panels: { name: string, unit: string, read: boolean, before: Bin[], after: Bin[], change: Bin[] }[] }} Curve
  * @typedef {{ why: string }} Missing what a log does not allow, and what to do
  * @typedef {'position' | 'velocity' | 'attitude' | 'rates'} Quantity
  * @typedef {{ at_s: number, ahead_s: number[], measured: Record<Quantity, number[][]>, note: string | null,

@@ -59,9 +59,21 @@ export function saveDialog(app) {
   dialog('Save', model, page);
 }
 
+/** @param {import('./main.js').App} app */
+export function diagnosisDialog(app) {
+  const page = row(
+    app,
+    'save_diagnosis',
+    'Page of the diagnosis',
+    'diagnosis.html',
+    'What was found, what was tried and not named, and pictures of where the model fails, as one file to give away.',
+  );
+  dialog('Save the page', page);
+}
+
 /**
  * @param {import('./main.js').App} app
- * @param {'save' | 'save_page'} request
+ * @param {'save' | 'save_page' | 'save_diagnosis'} request
  * @param {string} label
  * @param {string} path
  * @param {string} says

@@ -23,6 +23,7 @@ const FILES: &[(&str, &str, &str)] = &[
     file!("banner.js", SCRIPT),
     file!("charts.js", SCRIPT),
     file!("compare.js", SCRIPT),
+    file!("curve.js", SCRIPT),
     file!("dialog.js", SCRIPT),
     file!("dom.js", SCRIPT),
     file!("editor.js", SCRIPT),

@@ -48,6 +48,12 @@ struct RunWanted {
     name: Option<String>,
 }
 
+/// An effect that a search has found.
+#[derive(Deserialize)]
+struct CurveWanted {
+    effect: String,
+}
+
 #[derive(Deserialize)]
 struct FormulaWanted {
     owner: Owner,
@@ -104,6 +110,7 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         "rollouts" => json(&studio.rollouts(parsed::<AheadWanted>(body)?.ahead_s)?),
         "runs" => json(&studio.runs()),
         "run_errors" => json(&studio.run_errors(parsed::<RunWanted>(body)?.name.as_deref())?),
+        "curve" => json(&studio.curve(&parsed::<CurveWanted>(body)?.effect)?),
         "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
@@ -117,6 +124,10 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         "save_page" => {
             let FileWanted { path, overwrite } = parsed(body)?;
             json(&studio.save_page(&path, overwrite)?)
+        }
+        "save_diagnosis" => {
+            let FileWanted { path, overwrite } = parsed(body)?;
+            json(&studio.save_diagnosis(&path, overwrite)?)
         }
         _ => Err(Refusal::new(404, "path", format!("there is no request `{name}`"))),
     }
