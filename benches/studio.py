@@ -34,7 +34,9 @@ def main(program, flights):
         count = len(overview["flights"])
         views = [ask("trace", flight=k % count, channel=k % 6, pixels=1100)[0] for k in range(2 * count)]
         views += [ask("map", by=by, part=part)[0] for by in ("manoeuvre", "regime") for part in ("judged", "all")]
-        views += [ask(name, channel=k)[0] for name in ("dependence", "surface") for k in range(6)] + [ask("model")[0]]
+        views += [ask(name, channel=k)[0] for name in ("dependence", "surface", "regions", "in_time") for k in range(6)] + [ask("model")[0]]
+        views += [ask("rollout", flight=k, at_s=20, ahead_s=1)[0] for k in range(count)] + [ask("rollouts", ahead_s=s)[0] for s in (0.5, 1, 2, 5)]
+        views += [ask("runs")[0] for _ in range(2)]
         fits = [ask("edit", do="calibrate")[0] for _ in range(5)]
         memory = [line.split()[1] for line in Path(f"/proc/{studio.pid}/status").read_text().splitlines() if "VmHWM" in line]
         print(f"flights {overview['duration_s']:.0f} s; from the start to the address {ready:.2f} s; first view {first:.3f} s")

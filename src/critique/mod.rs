@@ -1,5 +1,6 @@
 //! The critique: where a model fails against the measurements, and by how much.
 
+pub mod change;
 pub mod channels;
 pub mod check;
 pub mod compare;

@@ -3,6 +3,7 @@
 
 use super::held;
 use super::history::State;
+use super::recent::Recent;
 use crate::critique::{ChannelValues, Intervals, Row};
 use crate::error::Result;
 use crate::flight::split::{Part, Split};
@@ -16,7 +17,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 /// Samples that are judged at most: more do not change what a person sees, and an answer has to come while they look.
-const MOST_SAMPLES: usize = 100_000;
+pub(super) const MOST_SAMPLES: usize = 100_000;
 
 /// Comparisons that are kept whole.
 const KEPT: usize = 4;
@@ -55,7 +56,7 @@ pub(super) struct OfPath {
 pub(super) struct Judge {
     strides: BTreeMap<PartWanted, usize>,
     all: Split,
-    whole: Mutex<Vec<(Key, Arc<Judged>)>>,
+    whole: Recent<Key, Judged>,
     errors: Mutex<BTreeMap<(u64, bool), Known>>,
 }
 
@@ -69,7 +70,7 @@ impl Judge {
         let all = Split { training: split.training.clone(), validation: Vec::new(), test, tested: Part::All };
         let stride = |spans: &[Span]| windows(spans, HISTORY, 1).len().div_ceil(MOST_SAMPLES).max(1);
         let strides = [(PartWanted::Judged, stride(&split.test)), (PartWanted::All, stride(&all.test))].into();
-        Self { strides, all, whole: Mutex::default(), errors: Mutex::default() }
+        Self { strides, all, whole: Recent::new(KEPT), errors: Mutex::default() }
     }
 
     /// A state on a part of the flights, beside the yardstick of finite differences.
@@ -80,19 +81,11 @@ impl Judge {
     /// The same on what `beside`, too, can be judged on.
     fn beside(&self, set: &DataSet, split: &Split, state: &State, part: PartWanted, beside: Option<&State>) -> Result<Arc<Judged>> {
         let key = (state.id, part, beside.is_some());
-        if let Some((_, known)) = held(&self.whole).iter().find(|(known, _)| *known == key) {
-            return Ok(Arc::clone(known));
-        }
-        let models: Vec<(String, Model)> =
-            std::iter::once(state).chain(beside).map(|state| (NAME.to_owned(), state.model.clone())).collect();
-        let judged = Arc::new(self.contest(set, split, &models, part)?);
-        let mut whole = held(&self.whole);
-        whole.retain(|(known, _)| *known != key);
-        if whole.len() >= KEPT {
-            whole.remove(0);
-        }
-        whole.push((key, Arc::clone(&judged)));
-        Ok(judged)
+        self.whole.get(key, || {
+            let models: Vec<(String, Model)> =
+                std::iter::once(state).chain(beside).map(|state| (NAME.to_owned(), state.model.clone())).collect();
+            self.contest(set, split, &models, part)
+        })
     }
 
     /// The samples of a part.

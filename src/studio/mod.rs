@@ -5,24 +5,35 @@
 //! taken back. Everything that is computed is computed elsewhere (`workflow`, `critique`, `physics`). [`server`] shows it to a browser on this
 //! machine; nothing else here knows of one.
 
+mod curves;
 mod describe;
 mod draft;
 mod edits;
+mod found;
 mod history;
 mod job;
 mod judge;
+mod recent;
+mod residual;
+mod rollout;
+mod runs;
 mod save;
 pub mod server;
 mod surfaces;
 mod trace;
 mod views;
 
+pub use curves::{CurvePanel, CurveText};
 pub use describe::{ChannelText, EffectText, FlightText, ModelText, NumberText, Overview};
 pub use draft::LeftText;
 pub use edits::{Edit, FormulaCheck, Owner};
+pub use found::Found;
 pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
+pub use residual::{InTimeText, RegionText, RegionsText};
+pub use rollout::{PathText, RolloutText, RolloutWanted, RolloutsText};
+pub use runs::{Kind, RunErrors, RunText, RunsText};
 pub use save::Saved;
 pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
@@ -36,6 +47,7 @@ use crate::physics::{Model, calibrate};
 use history::{History, State};
 use job::Job;
 use judge::Judge;
+use recent::Recent;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -68,9 +80,12 @@ pub struct Studio {
     /// Held by whoever changes the model, so that changes come one after the other.
     changing: Mutex<()>,
     job: Mutex<Option<Job>>,
-    predictions: Mutex<trace::Predictions>,
-    dependences: Mutex<views::Dependences>,
-    tables: Mutex<surfaces::Tables>,
+    predictions: trace::Predictions,
+    dependences: views::Dependences,
+    residuals: residual::Residuals,
+    all_starts: rollout::AllStarts,
+    runs: runs::Runs,
+    curves: curves::Known,
     file: Mutex<save::ModelFile>,
     /// Taken before the locks of history and search, where both are needed.
     drafts: Mutex<draft::Drafts>,
@@ -118,9 +133,12 @@ impl Studio {
             history: Mutex::new(History::new(first)),
             changing: Mutex::default(),
             job: Mutex::default(),
-            predictions: Mutex::default(),
-            dependences: Mutex::default(),
-            tables: Mutex::default(),
+            predictions: Recent::new(trace::PREDICTIONS),
+            dependences: Recent::new(views::KEPT),
+            residuals: residual::Residuals::default(),
+            all_starts: Recent::new(rollout::KEPT),
+            runs: runs::Runs::default(),
+            curves: Recent::new(curves::KEPT),
             file,
             drafts,
             revision: AtomicU64::default(),

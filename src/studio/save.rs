@@ -24,6 +24,10 @@ impl ModelFile {
         Self { path, text, model }
     }
 
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
     pub fn name(&self) -> Option<String> {
         self.path.as_ref().map(|path| path.display().to_string())
     }
@@ -122,7 +126,7 @@ impl Studio {
 }
 
 /// A path that ends as it should.
-fn ending_in(path: &str, ending: &str) -> Result<PathBuf> {
+pub(super) fn ending_in(path: &str, ending: &str) -> Result<PathBuf> {
     let path = PathBuf::from(path.trim());
     if path.file_stem().is_none() || path.extension().is_none_or(|found| found != ending) {
         return Err(fault("path", format!("`{}`", path.display()), format!("a file name that ends in .{ending}")));

@@ -1,15 +1,11 @@
 //! The residual of one channel over two variables at once: where one of them alone hides what happens.
 
+use super::Studio;
 use super::judge::PartWanted;
-use super::{Studio, held};
-use crate::blocks::BLOCK_S;
-use crate::critique::diagnose::{Met, met};
 use crate::critique::residual_views::{Surface, informative_pair, surface};
-use crate::critique::unknown::{ROWS_MAX, ResidualTable};
 use crate::error::Result;
-use crate::flight::{Accelerations, Channel, Column};
+use crate::flight::Channel;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// What is to be shown.
 #[derive(Clone, Debug, Deserialize)]
@@ -35,12 +31,6 @@ pub struct SurfaceText {
     pub names: Vec<String>,
 }
 
-/// Tables of residuals by state and part.
-pub(super) type Tables = Vec<((u64, PartWanted), Arc<ResidualTable>)>;
-
-/// States whose tables are kept.
-const KEPT: usize = 3;
-
 impl Studio {
     /// The residual of a channel over two variables, as means over tenths of a second or longer.
     ///
@@ -61,30 +51,5 @@ impl Studio {
         };
         let units = [unit(&x), unit(&y)];
         Ok(SurfaceText { surface: surface(&table, wanted.channel, [&x, &y])?, units, names })
-    }
-
-    /// The residuals of the present state, flights met as `compare` meets them.
-    fn table(&self, part: PartWanted) -> Result<Arc<ResidualTable>> {
-        let now = self.now();
-        let key = (now.id, part);
-        if let Some((_, known)) = held(&self.tables).iter().find(|known| known.0 == key) {
-            return Ok(Arc::clone(known));
-        }
-        let flights = &self.set.flights;
-        let Met { models, judged, .. } = met(flights, &[&now.model], self.judge.spans(&self.split, part))?;
-        let residual = |flight: usize| -> Result<Accelerations> {
-            let mut residual = models[0].predict(&flights[flight])?;
-            for (values, target) in residual.iter_mut().zip(Column::TARGETS) {
-                values.iter_mut().zip(flights[flight].column(target)).for_each(|(value, measured)| *value = measured - *value);
-            }
-            Ok(residual)
-        };
-        let table = Arc::new(ResidualTable::new(flights, &judged, &residual, BLOCK_S, ROWS_MAX)?);
-        let mut kept = held(&self.tables);
-        if kept.len() >= KEPT {
-            kept.remove(0);
-        }
-        kept.push((key, Arc::clone(&table)));
-        Ok(table)
     }
 }

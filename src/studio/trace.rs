@@ -2,6 +2,7 @@
 //! peaks stay.
 
 use super::history::State;
+use super::recent::Recent;
 use super::{Studio, fault};
 use crate::error::Result;
 use crate::flight::{Accelerations, Channel, Column, Flight};
@@ -123,25 +124,15 @@ impl Studio {
 
     /// What a state predicts of a flight.
     fn predicted(&self, state: &State, index: usize, flight: &Flight) -> Result<Arc<Accelerations>> {
-        let key = (state.id, index);
-        if let Some(known) = super::held(&self.predictions).iter().find(|known| known.0 == key) {
-            return Ok(Arc::clone(&known.1));
-        }
-        let predicted = Arc::new(state.model.predict(flight)?);
-        let mut kept = super::held(&self.predictions);
-        if kept.len() >= PREDICTIONS {
-            kept.remove(0);
-        }
-        kept.push((key, Arc::clone(&predicted)));
-        Ok(predicted)
+        self.predictions.get((state.id, index), || state.model.predict(flight))
     }
 }
 
 /// Predictions of flights that are kept: a person zooms in one flight, and compares two states.
-const PREDICTIONS: usize = 8;
+pub(super) const PREDICTIONS: usize = 8;
 
 /// Predictions by state and flight.
-pub(super) type Predictions = Vec<((u64, usize), Arc<Accelerations>)>;
+pub(super) type Predictions = Recent<(u64, usize), Accelerations>;
 
 /// A model with one number moved.
 pub(super) fn moved_model(model: &Model, moved: &Move) -> Result<Model> {

@@ -1,7 +1,8 @@
 //! Where the error lies: by manoeuvre or regime and channel, the ten seconds to look at in each, and the residual over recorded variables.
 
+use super::Studio;
 use super::judge::{PartWanted, row};
-use super::{Studio, held};
+use super::recent::Recent;
 use crate::critique::compare::{ModelError, PartError};
 use crate::critique::locate::{Bin, Dependence, Variable, dependences, stretches_in};
 use crate::critique::predictions::deviation;
@@ -199,31 +200,24 @@ impl Studio {
     }
 }
 
-/// Residuals over variables, by state and part.
-pub(super) type Dependences = Vec<((u64, PartWanted), Arc<Vec<OverVariable>>)>;
+/// The residuals over every variable, by state and part; kept, as a person looks at one channel after the other.
+pub(super) type Dependences = Recent<(u64, PartWanted), Vec<OverVariable>>;
 
 /// The residuals of the six channels over a variable.
-type OverVariable = (Variable, PerChannel<Dependence>);
+pub(super) type OverVariable = (Variable, PerChannel<Dependence>);
 
 /// States whose residuals over variables are kept.
-const KEPT: usize = 6;
+pub(super) const KEPT: usize = 6;
 
 impl Studio {
-    /// The residuals over every variable; kept, as a person looks at one channel after the other.
+    /// The residuals over every variable.
     fn dependences(&self, judged: &Judged, key: (u64, PartWanted)) -> Result<Arc<Vec<OverVariable>>> {
-        if let Some((_, known)) = held(&self.dependences).iter().find(|known| known.0 == key) {
-            return Ok(Arc::clone(known));
-        }
-        let share = Variable::ALL.len().div_ceil(rayon::current_num_threads());
-        let of = |variables: &[Variable]| dependences(&self.set.flights, &judged.windows, row(judged), variables);
-        let found: Vec<Vec<OverVariable>> = Variable::ALL.par_chunks(share).map(of).collect::<Result<_>>()?;
-        let found = Arc::new(found.into_iter().flatten().collect::<Vec<_>>());
-        let mut kept = held(&self.dependences);
-        if kept.len() >= KEPT {
-            kept.remove(0);
-        }
-        kept.push((key, Arc::clone(&found)));
-        Ok(found)
+        self.dependences.get(key, || {
+            let share = Variable::ALL.len().div_ceil(rayon::current_num_threads());
+            let of = |variables: &[Variable]| dependences(&self.set.flights, &judged.windows, row(judged), variables);
+            let found: Vec<Vec<OverVariable>> = Variable::ALL.par_chunks(share).map(of).collect::<Result<_>>()?;
+            Ok(found.into_iter().flatten().collect())
+        })
     }
 }
 

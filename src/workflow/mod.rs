@@ -25,7 +25,7 @@ pub use flights::{SUSPECTS, without};
 pub use prediction::{PredictionSummary, PredictionTable, Predictions, Predictor, read_network};
 #[cfg(feature = "report")]
 pub use provenance::provenance;
-pub use rollout::Rolling;
+pub use rollout::{FromOne, Path, Rolling};
 pub use search::{Looped, NetworkSearch, SearchTask, append_to_ledger, convention_fault, network_search};
 #[cfg(feature = "files")]
 pub use training::{Epoch, Run, TrainedNetwork, digest, train, training_digest};

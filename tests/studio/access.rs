@@ -109,9 +109,14 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
     let mut found = Vec::new();
     for (view, ready) in [
         ("compare", "Number(document.querySelector('#compare-plots')?.dataset.points) > 100"),
-        ("where", "document.querySelectorAll('#map tbody tr').length === 5"),
+        (
+            "where",
+            "document.querySelectorAll('#map tbody tr').length === 5 && document.querySelectorAll('#in-time .chart').length === 3",
+        ),
+        ("rollout", "document.querySelector('#rollout-all[data-starts]')"),
         ("model", "document.querySelectorAll('#history li').length === 1"),
-        ("learn", "document.querySelector('#findings')"),
+        ("runs", "document.querySelector('#runs')?.dataset.waits === '0'"),
+        ("learn", "document.querySelector('#findings [data-curve][data-drawn]')"),
     ] {
         browser.open(&format!("{}&view={view}", running.url))?;
         if view == "learn" {

@@ -39,11 +39,17 @@ fn look(browser: &Browser, url: &str) -> Result<()> {
     settled(browser)
 }
 
-/// Finds what is hidden and adds it.
-fn learn(browser: &Browser) -> Result<()> {
+/// Finds what is hidden, looks at its curve, saves the page, and adds it.
+fn learn(browser: &Browser, page: &str) -> Result<()> {
     browser.click("[data-view=learn]")?;
     browser.click("#diagnose")?;
     browser.wait("document.querySelector('#findings')")?;
+    browser.wait(&format!("document.querySelector('[data-curve={HIDDEN}][data-drawn] [data-variable=vy] .curve')"))?;
+    browser.click("#save-diagnosis")?;
+    browser.write("#save_diagnosis-path", page)?;
+    browser.click("#save_diagnosis-do")?;
+    browser.wait("document.querySelector('#save_diagnosis-told').textContent.startsWith('Written')")?;
+    browser.click("dialog .plain")?;
     browser.click(&format!("[data-add={HIDDEN}]"))?;
     browser.wait(&format!("document.querySelector('[data-add={HIDDEN}]').disabled"))?;
     browser.click("[data-view=model]")?;
@@ -102,7 +108,9 @@ fn the_way_from_the_error_to_the_effect_in_a_browser() -> Result<()> {
     browser.click("[data-view=model]")?;
     browser.wait("document.querySelector('#waterfall')")?;
     let first = number(&browser, YAW)?;
-    learn(&browser)?;
+    let page = place.path().join("diagnosis.html");
+    learn(&browser, &page.display().to_string())?;
+    assert!(page.is_file());
     let added = number(&browser, YAW)?;
     assert!(added < 0.8 * first, "the waterfall falls: {first} to {added}");
     slide(&browser)?;

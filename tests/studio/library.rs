@@ -1,10 +1,14 @@
 //! The studio without a server: the way of a person from the error to the effect and back.
 
 use crate::support::{HIDDEN, blank, folder, studio};
+use phyture::critique::locate::Bin;
 use phyture::flight::Channel;
 use phyture::physics::Model;
-use phyture::studio::{By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, Steps, Studio, SurfaceWanted, TraceWanted};
+use phyture::studio::{
+    By, Edit, Move, Owner, PartWanted, PlaceWanted, Progress, RegionText, Steps, Studio, SurfaceWanted, TraceWanted,
+};
 use phyture::{Error, Result};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -27,6 +31,30 @@ fn wanted(flight: usize, channel: Channel, pixels: usize) -> TraceWanted {
     TraceWanted { flight, channel, from_s: None, to_s: None, pixels, against: None, moved: None }
 }
 
+/// The curve of what was found, and the page of the search, as they are after a search.
+fn curve_and_page(studio: &Studio, place: &Path) -> Result<()> {
+    let missing = |what: &str| Error::Undetermined(format!("no {what}"));
+    let curve = studio.curve(HIDDEN)?.known().ok_or_else(|| missing("curve"))?;
+    assert_eq!(curve.channel, Channel::WzDot.index());
+    let panel = curve.panels.first().ok_or_else(|| missing("panel"))?;
+    assert!(
+        panel.name == "vy" && panel.read && panel.before.len() == panel.change.len() && panel.before.len() == panel.after.len()
+    );
+    // The curve runs through the points: what is left behind it is small.
+    let size = |of: &[Bin]| of.iter().map(|bin| bin.n as f64 * bin.mean.powi(2)).sum::<f64>();
+    assert!(size(&panel.after) < 0.05 * size(&panel.before), "{panel:?}");
+    let apart: Vec<Bin> =
+        panel.before.iter().zip(&panel.change).map(|(before, change)| Bin { mean: before.mean - change.mean, ..*before }).collect();
+    assert!((size(&apart) / size(&panel.after) - 1.0).abs() < 1e-6, "what is left is the residual less the change");
+    assert!(matches!(studio.curve("ground_effect"), Err(Error::Config { .. })), "only what was found");
+    let path = place.join("diagnosis.html").display().to_string();
+    studio.save_diagnosis(&path, false)?;
+    let html = std::fs::read_to_string(&path).map_err(Error::io(&path))?;
+    assert!(html.contains(HIDDEN) && html.contains("What was tried and not named"), "the page of `diagnose`");
+    assert!(matches!(studio.save_diagnosis(&path, false), Err(Error::Exists { .. })), "not unasked");
+    Ok(())
+}
+
 #[test]
 fn a_hidden_effect_is_found_added_and_the_error_falls_and_comes_back() -> Result<()> {
     let place = folder()?;
@@ -39,6 +67,7 @@ fn a_hidden_effect_is_found_added_and_the_error_falls_and_comes_back() -> Result
     let job = studio.job();
     assert_eq!((job.progress, job.error.as_deref()), (Progress::Done, None));
     assert!(job.diagnosis.is_some_and(|diagnosis| diagnosis.accepted.contains(&HIDDEN.to_owned())));
+    curve_and_page(&studio, place.path())?;
     let added = studio.edit(&Edit::Add { effect: HIDDEN.into() })?;
     assert!(yaw(&added) < 0.8 * yaw(&first), "{} to {}", yaw(&first), yaw(&added));
     assert!(matches!(studio.edit(&Edit::Add { effect: HIDDEN.into() }), Err(Error::Config { .. })), "it is in already");
@@ -163,9 +192,38 @@ fn views_lead_to_where_the_error_is() -> Result<()> {
 }
 
 #[test]
+fn what_is_left_is_parted_by_rules_and_looked_at_in_time() -> Result<()> {
+    let studio = studio(None)?;
+    let before = studio.regions(PartWanted::Judged, Channel::WzDot)?;
+    let whole = before.whole.ok_or_else(|| Error::Undetermined("no region".into()))?;
+    assert!(!before.even && before.why.is_none());
+    let loudest = &before.regions[0];
+    assert!(loudest.rule.contains("vy"), "the fin answers to the side wind: {loudest:?}");
+    assert!(loudest.rmse > 1.25 * whole.rmse && loudest.share_of_error > loudest.share_of_time);
+    assert!(before.regions.windows(2).all(|pair| pair[0].rmse >= pair[1].rmse), "the loudest first");
+    let sum = |of: fn(&RegionText) -> f64| before.regions.iter().map(of).sum::<f64>();
+    assert!((sum(|one| one.share_of_error) - 1.0).abs() < 1e-9 && (sum(|one| one.share_of_time) - 1.0).abs() < 1e-9);
+    let in_time = studio.in_time(PartWanted::Judged, Channel::WzDot)?;
+    let lasting = in_time.autocorrelation.ok_or_else(|| Error::Undetermined("no autocorrelation".into()))?;
+    assert_eq!((lasting.channel, lasting.lag_s[0].to_bits()), ("wz_dot", 0.0_f64.to_bits()));
+    assert!((lasting.correlation[0] - 1.0).abs() < 1e-12 && lasting.lasts_s.is_some_and(|lasts_s| lasts_s > 0.3), "{lasting:?}");
+    let spectrum = in_time.spectrum.ok_or_else(|| Error::Undetermined("no spectrum".into()))?;
+    assert!(spectrum.channel == "wz_dot" && spectrum.segments > 10 && spectrum.density.len() == spectrum.frequency_hz.len());
+    let sticks: Vec<_> = in_time.sticks.iter().map(|one| (one.stick, one.channel)).collect();
+    assert_eq!(sticks, ["u1", "u2", "u3", "u4"].map(|stick| (stick, "wz_dot")));
+    // With what was missing the error falls, and what is left is another residual.
+    studio.edit(&Edit::Add { effect: HIDDEN.into() })?;
+    let after = studio.regions(PartWanted::Judged, Channel::WzDot)?;
+    assert!(after.whole.is_some_and(|after| after.rmse < 0.8 * whole.rmse));
+    assert_ne!(studio.in_time(PartWanted::Judged, Channel::WzDot)?.autocorrelation, Some(lasting));
+    Ok(())
+}
+
+#[test]
 fn a_search_stops_when_it_is_asked_to_and_another_may_begin() -> Result<()> {
     let studio = studio(None)?;
     assert_eq!(studio.job().progress, Progress::Idle);
+    assert!(matches!(studio.curve(HIDDEN), Err(Error::Config { .. })) && studio.save_diagnosis("page.html", false).is_err());
     studio.diagnose()?;
     assert!(matches!(studio.diagnose(), Err(Error::Config { .. })), "one at a time");
     let begun = Instant::now();

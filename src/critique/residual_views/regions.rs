@@ -5,6 +5,7 @@
 
 use super::{blocks, channel, plain_features};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
+use crate::critique::digits::significant;
 use crate::critique::unknown::ResidualTable;
 use crate::error::Result;
 use crate::flight::Channel;
@@ -19,6 +20,8 @@ const LEAST_ROWS: f64 = 0.01;
 /// Standard errors by which the mean squares on the two sides of a split differ at least. More than two, because the split is the
 /// best of some hundreds.
 const APART: f64 = 3.0;
+/// RMSE of the loudest region over that of all flights from which regions are shown.
+const UNEVEN: f64 = 1.25;
 
 /// How a region is parted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,6 +59,34 @@ impl Region {
     /// The regions that are not parted further, in order.
     pub fn leaves(&self) -> Vec<&Self> {
         if self.parts.is_empty() { vec![self] } else { self.parts.iter().flat_map(Self::leaves).collect() }
+    }
+
+    /// Whether the error is nearly the same everywhere: no region has a quarter more than all flights.
+    pub fn is_even(&self) -> bool {
+        let loudest = self.leaves().iter().map(|leaf| leaf.rmse).fold(0.0, f64::max);
+        self.split.is_none() || loudest < UNEVEN * self.rmse
+    }
+
+    /// The leaves, each with the rules that lead to it as a person reads them, the loudest first.
+    pub fn by_rule(&self) -> Vec<(String, &Self)> {
+        let mut found = Vec::new();
+        self.gather(&[], &mut found);
+        found.sort_by(|(_, left), (_, right)| right.rmse.total_cmp(&left.rmse));
+        found
+    }
+
+    fn gather<'a>(&'a self, rules: &[String], found: &mut Vec<(String, &'a Self)>) {
+        let Some(split) = &self.split else {
+            found.push((rules.join(", "), self));
+            return;
+        };
+        for (part, sign) in self.parts.iter().zip(["≤", ">"]) {
+            let start = format!("{} {sign}", split.variable);
+            // A later rule on the same side of the same variable says more.
+            let mut own: Vec<String> = rules.iter().filter(|rule| !rule.starts_with(&start)).cloned().collect();
+            own.push(format!("{start} {}", significant(split.threshold, 2)));
+            part.gather(&own, found);
+        }
     }
 }
 
@@ -188,6 +219,27 @@ mod tests {
         assert!(tree.parts[0].share_of_error > 0.7 && tree.parts[0].rmse > 3.0 * tree.parts[1].rmse);
         assert!(tree.parts[0].ci95.is_some_and(|[low, high]| low < 4.0 && 4.0 < high), "{:?}", tree.parts[0]);
         Ok(())
+    }
+
+    #[test]
+    fn a_leaf_is_called_by_the_narrowest_rules_that_lead_to_it() {
+        let leaf = |rmse: f64| Region {
+            n: 10,
+            blocks: 5,
+            rmse,
+            ci95: None,
+            share_of_error: 0.5,
+            share_of_rows: 0.5,
+            split: None,
+            parts: Vec::new(),
+        };
+        let at = |threshold: f64| Some(Split { variable: "vx".into(), unit: "m/s".into(), threshold });
+        let inner = Region { split: at(1.25), parts: vec![leaf(0.5), leaf(3.0)], ..leaf(2.0) };
+        let tree = Region { split: at(4.0), parts: vec![inner, leaf(1.0)], ..leaf(1.5) };
+        let named: Vec<String> = tree.by_rule().into_iter().map(|(rules, leaf)| format!("{rules}: {}", leaf.rmse)).collect();
+        assert_eq!(named, ["vx ≤ 4.0, vx > 1.2: 3", "vx > 4.0: 1", "vx ≤ 1.2: 0.5"]);
+        assert!(!tree.is_even() && leaf(1.0).is_even());
+        assert!(Region { rmse: 2.9, ..tree }.is_even(), "3.0 is hardly more than 2.9");
     }
 
     #[test]

@@ -75,6 +75,11 @@ impl<T> PerQuantity<T> {
         }
     }
 
+    /// With a function of each value.
+    pub fn map<U>(self, mut of: impl FnMut(T) -> U) -> PerQuantity<U> {
+        PerQuantity { position: of(self.position), velocity: of(self.velocity), attitude: of(self.attitude), rates: of(self.rates) }
+    }
+
     /// The value of one quantity.
     pub const fn of(&self, quantity: Quantity) -> &T {
         match quantity {
@@ -179,6 +184,11 @@ impl<'a> Judge<'a> {
         Self { flights, starts, horizon, blocks: Blocks::new(flights, starts), measured }
     }
 
+    /// The measured state of a flight that has a start.
+    pub fn measured(&self, flight: usize, sample: usize) -> State {
+        self.measured[flight][sample]
+    }
+
     /// The errors of some lanes, block by block.
     pub fn sums(&self, rolled: &Rolled) -> Vec<Sums> {
         let mut sums = Vec::new();
@@ -214,11 +224,9 @@ impl<'a> Judge<'a> {
     fn add(&self, sums: &mut Sums, flight: usize, start: usize, predicted: &dyn Fn(usize) -> State) {
         let measured = &self.measured[flight];
         sums.starts += 1;
-        // Without a position in the log a rollout starts anywhere.
-        let (from, begun) = (measured[start].position, predicted(0).position);
+        let begun = predicted(0);
         for step in 1..=self.horizon {
-            let mut there = predicted(step);
-            there.position = std::array::from_fn(|axis| there.position[axis] + (from[axis] - begun[axis]));
+            let there = at_place_of(&measured[start], &begun, predicted(step));
             let sizes = sizes(&measured[start], &measured[start + step], &there);
             for (quantity, [error, of_measured, of_predicted]) in sizes.into_iter().enumerate() {
                 sums.sizes[quantity][step - 1] += error;
@@ -319,6 +327,13 @@ impl<'a> Judge<'a> {
             rows,
         }
     }
+}
+
+/// A predicted state as if its rollout, which began at `begun`, had begun at the measured place `from`: without a position in the log a rollout
+/// starts anywhere.
+pub fn at_place_of(from: &State, begun: &State, mut there: State) -> State {
+    there.position = std::array::from_fn(|axis| there.position[axis] + (from.position[axis] - begun.position[axis]));
+    there
 }
 
 /// Sizes of error, measured and predicted value by quantity; position and attitude count from `start`.

@@ -37,6 +37,7 @@ pub type Numbers<'a> = &'a (dyn Fn(usize, usize) -> f64 + Sync);
 pub type Each<'a, T> = &'a (dyn Fn(&Rolled) -> T + Sync);
 
 /// A model to be integrated forward along some flights.
+#[derive(Clone)]
 pub struct Rollout<'a> {
     flights: &'a [Flight],
     horizon: usize,

@@ -5,28 +5,22 @@ use super::super::figures::{self, BinnedPanel, with_unit};
 use super::super::names::{named, said};
 use super::super::page::Part;
 use super::views::{NO_TABLE, Seen, text};
-use crate::critique::Row;
+use crate::critique::change::{Dependences, change, telling};
 use crate::critique::locate::{Dependence, Variable, dependences};
 use crate::critique::residual_views::{informative_pair, surface};
 use crate::error::Result;
-use crate::flight::{Channel, Column, PerChannel, Window};
+use crate::flight::{Channel, Window};
 use crate::physics::Effect;
 
 /// Share of a residual that the darkest shade stands for at least: below it all is noise.
 const LEAST_DARKEST: f64 = 0.1;
-/// Share of a residual below which a variable is not shown, unless an added effect reads it.
-const SHARE_SHOWN: f64 = 0.01;
-
-/// Residuals of the six channels against variables.
-type Found = Vec<(Variable, PerChannel<Dependence>)>;
-
 impl Seen<'_> {
     /// Against each variable.
     pub fn binned(&self) -> Result<Vec<Part>> {
         let report = self.report;
         let (windows, _) = self.windows(report.searched);
         let of_side = |side| dependences(report.flights, &windows, &self.row(side, &windows), &Variable::ALL);
-        let found: Vec<Found> = self.sides.iter().map(of_side).collect::<Result<_>>()?;
+        let found: Vec<Dependences> = self.sides.iter().map(of_side).collect::<Result<_>>()?;
         let Some(before) = found.first().filter(|found| !found.is_empty()) else {
             return Ok(vec![text("No recorded variable varies in these flights.")]);
         };
@@ -51,12 +45,12 @@ impl Seen<'_> {
         parts.push(shares_map(&caption, now, after.map(|_| before.as_slice()), Some(full)));
         let mut quiet = Vec::new();
         for channel in Channel::ALL {
-            let shown = self.shown(channel, before);
+            let shown = telling(before, channel, &self.added(channel).collect::<Vec<_>>(), VARIABLES);
             if shown.is_empty() {
                 quiet.push(said(channel.name()));
                 continue;
             }
-            let of = |found: &'_ Found, variable: Variable| {
+            let of = |found: &'_ Dependences, variable: Variable| {
                 found.iter().find(|(other, _)| *other == variable).map(|(_, of)| of[channel].clone())
             };
             let names: Vec<String> = shown.iter().map(|variable| named(variable.name())).collect();
@@ -85,30 +79,11 @@ impl Seen<'_> {
         Ok(parts)
     }
 
-    /// The variables of a channel that are drawn: those that added effects read, and those that the residual goes with most.
-    fn shown(&self, channel: Channel, before: &Found) -> Vec<Variable> {
-        let mut order: Vec<(f64, Variable)> = before.iter().map(|(variable, of)| (of[channel].share, *variable)).collect();
-        order.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let read = |variable: Variable| self.added(channel).any(|effect| reads(effect, channel, variable));
-        let telling = order.iter().filter(|(share, variable)| *share >= SHARE_SHOWN || read(*variable));
-        telling.take(VARIABLES).map(|(_, variable)| *variable).collect()
-    }
-
     /// How the prediction changes from the model before to the model after, binned as a residual is.
-    fn change(&self, windows: &[Window]) -> Result<Option<Found>> {
+    fn change(&self, windows: &[Window]) -> Result<Option<Dependences>> {
         let [before, after] = self.sides.as_slice() else { return Ok(None) };
-        let flights = self.report.flights;
-        // As if the change were all that the model misses: its residual is the change.
-        let predicted = |window: &Window| {
-            PerChannel::from_fn(|channel| {
-                let at = |side: &super::views::Side| {
-                    side.predicted[window.flight][channel].get(window.last).copied().unwrap_or(f64::NAN)
-                };
-                flights[window.flight].column(channel.column())[window.last] - (at(after) - at(before))
-            })
-        };
-        let row = Row { name: "change".into(), predicted: windows.iter().map(predicted).collect() };
-        dependences(flights, windows, &row, &Variable::ALL).map(Some)
+        let rows = [&self.row(before, windows), &self.row(after, windows)];
+        change(self.report.flights, windows, rows, &Variable::ALL).map(Some)
     }
 
     /// Added effects that act in a channel.
@@ -147,16 +122,4 @@ impl Seen<'_> {
                     some per cent of any noise.";
         Ok(vec![Part::Figure(figures::surfaces(&title, caption, channel.unit(), [&x, &y], &panels)), text(note)])
     }
-}
-
-/// Whether an effect acts on a channel without memory and reads the variable there.
-fn reads(effect: &Effect, channel: Channel, variable: Variable) -> bool {
-    let formulas = || {
-        let terms = effect.terms.iter().filter(|term| term.channel == channel).map(|term| &term.regressor);
-        terms.chain(effect.swaps.iter().map(|swap| &swap.with))
-    };
-    let stands_for = |name: &str| {
-        name.strip_prefix("air_").unwrap_or(name) == variable.name() || (variable == Variable::Height && name == Column::Z.name())
-    };
-    formulas().all(|formula| !formula.remembers()) && formulas().any(|formula| formula.names().into_iter().any(stands_for))
 }

@@ -22,8 +22,6 @@ use crate::flight::{Accelerations, Channel, Column, PerChannel, Span, Window, sp
 const SAMPLES: usize = 150_000;
 /// Length of a block, s, as in all intervals of a report.
 const BLOCK_S: f64 = 10.0;
-/// RMSE of the loudest region over that of all flights from which regions are shown.
-const UNEVEN: f64 = 1.25;
 
 /// One model on all flights.
 pub(super) struct Side {
@@ -147,14 +145,12 @@ impl Seen<'_> {
         let (mut even, mut panels) = (Vec::new(), Vec::new());
         for channel in Channel::ALL {
             let tree = regions(table, channel)?;
-            let loudest = tree.leaves().iter().map(|leaf| leaf.rmse).fold(0.0, f64::max);
-            if tree.split.is_none() || loudest < UNEVEN * tree.rmse {
+            if tree.is_even() {
                 even.push(said(channel.name()));
                 continue;
             }
             let mut bars = vec![bar_of("all flights".into(), &tree)];
-            leaves(&tree, &[], &mut bars);
-            bars[1..].sort_by(|a, b| b.value.total_cmp(&a.value));
+            bars.extend(tree.by_rule().into_iter().map(|(rules, leaf)| bar_of(rules, leaf)));
             panels.push(FallPanel { title: named(channel.name()), unit: channel.unit().to_owned(), bars, floor: None });
         }
         let mut parts = Vec::new();
@@ -245,21 +241,6 @@ fn bar_of(name: String, region: &Region) -> Fall {
     let whole = region.split.is_some();
     let kind = if whole { Kind::Whole } else { Kind::Region };
     Fall { name, kind, value: region.rmse, ci95: region.ci95, remark: if whole { String::new() } else { remark } }
-}
-
-/// The parts of a region that are not parted further, each called by the rules that lead to it.
-fn leaves(region: &Region, rules: &[String], bars: &mut Vec<Fall>) {
-    let Some(split) = &region.split else {
-        bars.push(bar_of(rules.join(", "), region));
-        return;
-    };
-    for (part, sign) in region.parts.iter().zip(["≤", ">"]) {
-        let start = format!("{} {sign}", split.variable);
-        // A later rule on the same side of the same variable says more.
-        let mut own: Vec<String> = rules.iter().filter(|rule| !rule.starts_with(&start)).cloned().collect();
-        own.push(format!("{start} {}", significant(split.threshold, 2)));
-        leaves(part, &own, bars);
-    }
 }
 
 /// Sticks against residuals, and the warning of feedback in words.

@@ -34,6 +34,22 @@ import { read } from './place.js';
  * @typedef {{ surface: { channel: string, variables: [string, string], edges: [number[], number[]], share: number,
  *   cells: { column: number, row: number, mean: number, ci95: [number, number] | null, n: number, blocks: number, thin: boolean }[] } | null,
  *   units: [string, string], names: string[] }} Surface
+ * @typedef {{ rule: string, rmse: number, ci95: [number, number] | null, share_of_error: number, share_of_time: number, blocks: number }} Region
+ * @typedef {{ whole: Region | null, regions: Region[], even: boolean, why: string | null }} Regions
+ * @typedef {{ stick: string, lag_s: number[], correlation: number[], band95: (number | null)[], feedback_warning: boolean }} Following
+ * @typedef {{ autocorrelation: { lag_s: number[], correlation: number[], lasts_s: number | null } | null,
+ *   spectrum: { frequency_hz: number[], density: number[], segments: number } | null, sticks: Following[], why: string | null }} InTime
+ * @typedef {{ name: string, kind: 'model' | 'network', written_s: number, open: boolean, says: string, error: string | null }} Run
+ * @typedef {{ folder: string, rows: Run[], left_out: number, why: string | null }} Runs
+ * @typedef {{ rmse: PerChannel, ci95: Intervals, basis: string }} RunErrors
+ * @typedef {{ channel: number, panels: { name: string, unit: string, read: boolean, before: Bin[], after: Bin[], change: Bin[] }[] }} Curve
+ * @typedef {{ why: string }} Missing what a log does not allow, and what to do
+ * @typedef {'position' | 'velocity' | 'attitude' | 'rates'} Quantity
+ * @typedef {{ at_s: number, ahead_s: number[], measured: Record<Quantity, number[][]>, note: string | null,
+ *   paths: { name: string, states: Record<Quantity, number[][]>, error: Record<Quantity, number[]>, stopped_s: number | null }[] }} Rollout
+ * @typedef {{ basis: string, caution: string | null, legend: string, rollouts: { horizon: number, step_s: number, position_from_velocity: boolean,
+ *   relative_to: string, rows: { name: string, n: number, diverged: number, error: Record<Quantity, number[]>,
+ *   difference_percent: Record<Quantity, number | null>, difference_percent_ci95: Record<Quantity, [number, number] | null> }[] } }} Rollouts
  * @typedef {{ share: number, ci95: [number, number] | null }} Share
  * @typedef {{ effect: string, meaning: string, channels: string[], held_out_mse_fall: Record<string, number>, p_value: number, stability: string,
  *   selection_frequency: number, indistinguishable: string[], coefficients: (Numeral & { expected?: [number, number], sign?: string })[],

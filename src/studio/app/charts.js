@@ -11,7 +11,7 @@ import { interval, measure, number, percent, ticks, tickText } from './format.js
  * @param {number} from
  * @param {number} to
  */
-function scale(low, high, from, to) {
+export function scale(low, high, from, to) {
   const size = high > low ? high - low : 1;
   return (/** @type {number} */ value) => from + ((value - low) / size) * (to - from);
 }
@@ -21,11 +21,14 @@ function scale(low, high, from, to) {
  * @param {import('./api.js').Bin[]} bins
  * @param {{ name: string, unit: string }} variable
  * @param {import('./api.js').Channel} channel
+ * @param {{ after: import('./api.js').Bin[], change: import('./api.js').Bin[] }} [found] what is left with what was found, and the change of the
+ *   prediction
  */
-export function binned(bins, variable, channel) {
+export function binned(bins, variable, channel, found) {
   const [width, height, left, bottom, top] = [520, 290, 60, 44, 12];
   // Bins that few blocks carry have intervals that would leave nothing of the rest.
   const ends = bins.flatMap((bin) => (bin.ci95 && bin.blocks >= 5 ? bin.ci95 : [bin.mean]));
+  ends.push(...(found?.change ?? []).map((bin) => bin.mean));
   const [low, high] = [Math.min(0, ...ends), Math.max(0, ...ends)];
   const room = 0.08 * (high - low || 1);
   const [first, last] = [bins[0].at, bins[bins.length - 1].at];
@@ -80,8 +83,16 @@ export function binned(bins, variable, channel) {
     across,
     up,
     s('line', { class: 'zero', x1: left, x2: width - 4, y1: y(0), y2: y(0) }),
-    s('polyline', { class: 'mean', points: bins.map((bin) => `${x(bin.at)},${y(bin.mean)}`).join(' ') }),
+    found ? null : s('polyline', { class: 'mean', points: bins.map((bin) => `${x(bin.at)},${y(bin.mean)}`).join(' ') }),
     bins.map(dot),
+    found?.after.map((bin) =>
+      s(
+        'rect',
+        { class: 'left-over', x: x(bin.at) - 3.5, y: within(bin.mean) - 3.5, width: 7, height: 7 },
+        s('title', {}, `left with what was found: ${measure(bin.mean, channel.unit)} [${interval(bin.ci95)}]`),
+      ),
+    ),
+    found ? s('polyline', { class: 'curve c2', 'stroke-width': 2, 'stroke-dasharray': '8 4', points: found.change.map((bin) => `${x(bin.at)},${within(bin.mean)}`).join(' ') }) : null,
     s(
       'text',
       { class: 'name', x: (left + width) / 2, y: height - 6, 'text-anchor': 'middle' },

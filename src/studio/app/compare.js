@@ -4,7 +4,7 @@
 import { ask } from './api.js';
 import { choice, h } from './dom.js';
 import { number, percent, time } from './format.js';
-import { read, slide } from './place.js';
+import { go, read, slide } from './place.js';
 import { stack, timeWidth } from './plots.js';
 
 /** @type {import('./plots.js').Stack | null} */
@@ -46,8 +46,7 @@ export async function show(app, into) {
     channel,
     name(now),
     other ? name(other) : null,
-    (from, to) => slide({ from, to }),
-    () => slide({ from: null, to: null }),
+    { zoom: (from, to) => slide({ from, to }), whole: () => slide({ from: null, to: null }) },
   );
   plots.draw(trace);
   const [first, last] = trace.whole_s;
@@ -132,6 +131,7 @@ function controls(app, flight, other) {
     h('span', { class: 'gap' }),
     button('worst', 'Worst 10 s', 'of this channel on flights that no fit sees', () => jump(false)),
     button('typical', 'Typical 10 s', 'the median error of this channel', () => jump(true)),
+    button('from-here', 'Roll out', 'from the beginning of what is shown', () => go({ view: 'rollout', at: drawn.from })),
     button('whole', 'Whole flight', 'key 0', () => slide({ from: null, to: null })),
     shown.derived ? h('small', { class: 'quiet' }, 'accelerations derived from velocity and rates') : null,
   );

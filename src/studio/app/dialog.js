@@ -20,12 +20,12 @@ function dialog(title, ...content) {
 
 export function keysHelp() {
   const keys = [
-    ['1 2 3 4', 'Compare, Where it fails, Learn, Model'],
+    ['1 … 6', 'Compare, Where it fails, Roll out, Learn, Model, Runs'],
     ['u  or  Ctrl Z', 'undo'],
     ['r  or  Ctrl Shift Z', 'redo'],
     ['s', 'save'],
     ['[  ]', 'the flight before, the next'],
-    ['← →', 'earlier, later (Compare)'],
+    ['← →', 'earlier, later (Compare, Roll out)'],
     ['+ −', 'closer, further (Compare)'],
     ['0', 'the whole flight (Compare)'],
     ['drag', 'zoom to what is marked; double click: the whole flight'],
@@ -59,9 +59,21 @@ export function saveDialog(app) {
   dialog('Save', model, page);
 }
 
+/** @param {import('./main.js').App} app */
+export function diagnosisDialog(app) {
+  const page = row(
+    app,
+    'save_diagnosis',
+    'Page of the diagnosis',
+    'diagnosis.html',
+    'What was found, what was tried and not named, and pictures of where the model fails, as one file to give away.',
+  );
+  dialog('Save the page', page);
+}
+
 /**
  * @param {import('./main.js').App} app
- * @param {'save' | 'save_page'} request
+ * @param {'save' | 'save_page' | 'save_diagnosis'} request
  * @param {string} label
  * @param {string} path
  * @param {string} says

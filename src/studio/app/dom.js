@@ -114,3 +114,12 @@ export function toggle(label, options, value, chosen) {
     );
   return h('div', { class: 'toggle', role: 'group', 'aria-label': label }, options.map(button));
 }
+
+/**
+ * What is wider than its place and is moved sideways there, by keys as well.
+ * @param {string} label
+ * @param {...Child} content
+ */
+export function scroller(label, ...content) {
+  return h('div', { class: 'scroll', tabindex: '0', role: 'group', 'aria-label': label }, ...content);
+}

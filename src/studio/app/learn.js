@@ -3,6 +3,8 @@
 
 import { ask } from './api.js';
 import { range } from './charts.js';
+import * as curve from './curve.js';
+import { diagnosisDialog } from './dialog.js';
 import { h, prose } from './dom.js';
 import { interval, measure, number, percent, shorter } from './format.js';
 import { go, read } from './place.js';
@@ -25,6 +27,7 @@ export async function show(app, into) {
   into.replaceChildren(control(app, job, into), job.diagnosis ? findings(app, job, has) : invitation(job));
   const runs = job.progress === 'running' || job.progress === 'stopping';
   if (runs) watch(app, into);
+  else curve.draw(app, into).catch(app.failed);
 }
 
 export function hide() {
@@ -110,6 +113,9 @@ function control(app, job, into) {
     progress(job),
     h('span', { class: 'gap' }),
     other,
+    job.diagnosis
+      ? h('button', { type: 'button', id: 'save-diagnosis', onclick: () => diagnosisDialog(app) }, 'Save the page …')
+      : null,
   );
 }
 
@@ -281,6 +287,7 @@ function effect(app, found, step, isIn) {
         worth ? 'of the error on unseen flights would come back without it' : 'of the error on held-out blocks removed',
       ),
     ),
+    h('div', { 'data-curve': step.effect }),
     h('table', { class: 'numbers' }, h('tbody', {}, coefficients, parameters)),
     h('pre', {}, shorter(step.formula)),
     step.indistinguishable.length

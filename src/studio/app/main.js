@@ -10,6 +10,8 @@ import { number, percent, time } from './format.js';
 import * as learn from './learn.js';
 import * as model from './model.js';
 import { go, read, slide, VIEWS } from './place.js';
+import * as rollout from './rollout.js';
+import * as runs from './runs.js';
 import * as where from './where.js';
 
 /**
@@ -30,8 +32,8 @@ import * as where from './where.js';
  */
 
 /** @type {Record<string, View>} */
-const views = { compare, where, learn, model };
-const NAMES = { compare: 'Compare', where: 'Where it fails', learn: 'Learn', model: 'Model' };
+const views = { compare, where, rollout, learn, model, runs };
+const NAMES = { compare: 'Compare', where: 'Where it fails', rollout: 'Roll out', learn: 'Learn', model: 'Model', runs: 'Runs' };
 const THEME = 'phyture-theme';
 /** How often is asked whether what is shown is still so, ms. */
 const PULSE_MS = 1500;
@@ -258,8 +260,8 @@ function key(event) {
     s: () => saveDialog(app),
     '?': keysHelp,
     z: () => control && step(event.shiftKey ? 'redo' : 'undo'),
-    '[': () => slide({ flight: Math.max(0, flight - 1), from: null, to: null }),
-    ']': () => slide({ flight: Math.min(app.overview.flights.length - 1, flight + 1), from: null, to: null }),
+    '[': () => slide({ flight: Math.max(0, flight - 1), from: null, to: null, at: null }),
+    ']': () => slide({ flight: Math.min(app.overview.flights.length - 1, flight + 1), from: null, to: null, at: null }),
   };
   const act = tab ? () => go({ view: tab }) : /** @type {Record<string, () => void>} */ (acts)[letter];
   if (act) {
@@ -267,6 +269,8 @@ function key(event) {
     act();
   } else if (read().view === 'compare') {
     compare.key(event);
+  } else if (read().view === 'rollout') {
+    rollout.key(event);
   }
 }
 

@@ -247,9 +247,11 @@ function previewer(app, pictures, channel) {
         channel,
         'now',
         'before',
-        (from, to) => slide({ from, to }),
-        () => slide({ from: null, to: null }),
-        'residual',
+        {
+          zoom: (from, to) => slide({ from, to }),
+          whole: () => slide({ from: null, to: null }),
+          which: 'residual',
+        },
       );
       await fetchTrace(null);
     },

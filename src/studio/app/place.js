@@ -4,19 +4,22 @@
 /**
  * @typedef {object} Place
  * @property {string} token secret of the running studio
- * @property {'compare' | 'where' | 'learn' | 'model'} view
+ * @property {'compare' | 'where' | 'rollout' | 'learn' | 'model' | 'runs'} view
  * @property {number} flight index
  * @property {number} channel index
  * @property {number | null} from s
  * @property {number | null} to s
+ * @property {number | null} at moment from which is rolled out, s
+ * @property {number} ahead how far is rolled out, s
  * @property {number | null} against state that is laid beside
  * @property {'judged' | 'all'} part
  * @property {'manoeuvre' | 'regime'} by
+ * @property {'date' | 'error'} sort order of runs
  * @property {string} variable name; empty is the one on which the error depends most
  * @property {string} second name of a second variable; empty is none
  */
 
-export const VIEWS = /** @type {const} */ (['compare', 'where', 'learn', 'model']);
+export const VIEWS = /** @type {const} */ (['compare', 'where', 'rollout', 'learn', 'model', 'runs']);
 
 /** @returns {Place} */
 export function read() {
@@ -40,9 +43,12 @@ export function read() {
     channel: Math.min(5, whole('channel')),
     from: real('from'),
     to: real('to'),
+    at: real('at'),
+    ahead: Math.min(60, Math.max(0.05, real('ahead') ?? 1)),
     against: real('against'),
     part: oneOf('part', /** @type {const} */ (['judged', 'all'])),
     by: oneOf('by', /** @type {const} */ (['manoeuvre', 'regime'])),
+    sort: oneOf('sort', /** @type {const} */ (['date', 'error'])),
     variable: given.get('variable') ?? '',
     second: given.get('second') ?? '',
   };

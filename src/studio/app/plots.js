@@ -40,15 +40,24 @@ export function timeWidth(width) {
  */
 
 /**
+ * What a person may do in a picture.
+ * @typedef {object} Acts
+ * @property {(from: number, to: number) => void} zoom
+ * @property {() => void} whole
+ * @property {'all' | 'residual'} [which] of the pictures
+ * @property {(at: number) => void} [pick] a moment is clicked
+ * @property {[number, number]} [mark] a stretch that is marked
+ */
+
+/**
  * @param {string} title
  * @param {number} height
  * @param {Line[]} lines
  * @param {string} unit
  * @param {boolean} last whether it carries the time axis
- * @param {(from: number, to: number) => void} zoom
- * @param {() => void} whole
+ * @param {Acts} acts
  */
-function plot(title, height, lines, unit, last, zoom, whole) {
+function plot(title, height, lines, unit, last, { zoom, whole, pick, mark }) {
   const { ink, quiet, grid } = colours();
   const axis = {
     stroke: quiet,
@@ -111,12 +120,43 @@ function plot(title, height, lines, unit, last, zoom, whole) {
             self.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
           },
         ],
+        drawClear: mark ? [(/** @type {any} */ self) => shade(self, mark)] : [],
       },
     },
     [[], ...lines.map(() => [])],
     holder,
   );
+  if (pick) picks(made.over, (left) => pick(made.posToVal(left, 'x')));
   return { holder, made };
+}
+
+/**
+ * Marks a stretch behind the lines.
+ * @param {any} self
+ * @param {[number, number]} mark
+ */
+function shade(self, [from, to]) {
+  const { left, top, width, height } = self.bbox;
+  const inside = (/** @type {number} */ at) => Math.min(left + width, Math.max(left, self.valToPos(at, 'x', true)));
+  const [start, end] = [inside(from), inside(to)];
+  self.ctx.save();
+  self.ctx.fillStyle = colours().lines[1];
+  self.ctx.globalAlpha = 0.25;
+  self.ctx.fillRect(start, top, Math.max(3 * devicePixelRatio, end - start), height);
+  self.ctx.restore();
+}
+
+/**
+ * A click that is no drag.
+ * @param {HTMLElement} over
+ * @param {(left: number) => void} pick
+ */
+function picks(over, pick) {
+  let pressed = 0;
+  over.addEventListener('mousedown', (event) => (pressed = event.clientX));
+  over.addEventListener('click', (event) => {
+    if (Math.abs(event.clientX - pressed) < 4) pick(event.clientX - over.getBoundingClientRect().left);
+  });
 }
 
 /**
@@ -125,15 +165,13 @@ function plot(title, height, lines, unit, last, zoom, whole) {
  * @param {import('./api.js').Channel} channel
  * @param {string} now what the present state is called
  * @param {string | null} against what the other state is called
- * @param {(from: number, to: number) => void} zoom
- * @param {() => void} whole
- * @param {'all' | 'residual'} [which]
+ * @param {Acts} acts
  * @returns {Stack}
  */
-export function stack(into, channel, now, against, zoom, whole, which = 'all') {
+export function stack(into, channel, now, against, acts) {
   const { ink, lines } = colours();
   const other = against === null ? [] : [{ label: against, stroke: lines[1], dash: DASHES[1] }];
-  const all = which === 'all';
+  const all = (acts.which ?? 'all') === 'all';
   // All three on one screen: what is left of the window below head and controls, less a legend each.
   const left = Math.max(360, Math.min(820, window.innerHeight - 330));
   const [tall, middle, low] = [0.46, 0.26, 0.28].map((share) => Math.round(share * left));
@@ -145,8 +183,7 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
           [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other],
           channel.unit,
           false,
-          zoom,
-          whole,
+          acts,
         ),
       ]
     : [];
@@ -159,8 +196,7 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
     ],
     channel.unit,
     !all,
-    zoom,
-    whole,
+    acts,
   );
   const sticks = all
     ? [
@@ -170,8 +206,7 @@ export function stack(into, channel, now, against, zoom, whole, which = 'all') {
           STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })),
           '1',
           true,
-          zoom,
-          whole,
+          acts,
         ),
       ]
     : [];

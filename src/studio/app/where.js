@@ -1,11 +1,12 @@
 // @ts-check
-// Where it fails: the error by manoeuvre or regime and channel, and the residual over recorded variables.
+// Where it fails: the error by manoeuvre or regime and channel, the residual over recorded variables, and below them what `remains.js` draws.
 
 import { ask } from './api.js';
 import { binned, surface } from './charts.js';
 import { choice, h, toggle } from './dom.js';
 import { interval, measure, number, percent } from './format.js';
 import { go, read, slide } from './place.js';
+import * as remains from './remains.js';
 
 /**
  * @param {import('./main.js').App} app
@@ -13,7 +14,12 @@ import { go, read, slide } from './place.js';
  */
 export async function show(app, into) {
   const { part, by, channel, second, variable } = read();
-  const [map, dependence] = await Promise.all([ask('map', { part, by }), ask('dependence', { part, channel })]);
+  const [map, dependence, regions, inTime] = await Promise.all([
+    ask('map', { part, by }),
+    ask('dependence', { part, channel }),
+    ask('regions', { part, channel }),
+    ask('in_time', { part, channel }),
+  ]);
   const first =
     dependence.variables.find((/** @type {{ name: string }} */ one) => one.name === variable) ??
     dependence.variables[0];
@@ -40,7 +46,13 @@ export async function show(app, into) {
       h('span', { class: 'gap' }),
       h('small', { class: 'quiet' }, 'click a cell: its worst ten seconds'),
     ),
-    h('div', { class: 'columns' }, table(app, map), variables(app, dependence, over)),
+    h(
+      'div',
+      { class: 'columns' },
+      h('div', { class: 'below' }, table(app, map), remains.regions(app.overview.channels[channel], regions)),
+      variables(app, dependence, over),
+    ),
+    remains.inTime(app.overview.channels[channel], inTime),
   );
 }
 

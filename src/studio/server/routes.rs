@@ -2,7 +2,7 @@
 
 use super::Refusal;
 use crate::flight::Channel;
-use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, Studio, SurfaceWanted, TraceWanted};
+use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, RolloutWanted, Studio, SurfaceWanted, TraceWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -28,11 +28,30 @@ struct MapWanted {
     by: By,
 }
 
+/// One channel on a part of the data.
 #[derive(Deserialize)]
-struct DependenceWanted {
+struct ChannelWanted {
     #[serde(default)]
     part: PartWanted,
     channel: Channel,
+}
+
+/// How far rollouts go.
+#[derive(Deserialize)]
+struct AheadWanted {
+    ahead_s: f64,
+}
+
+/// A run by its name in the folder; the present state without.
+#[derive(Deserialize)]
+struct RunWanted {
+    name: Option<String>,
+}
+
+/// An effect that a search has found.
+#[derive(Deserialize)]
+struct CurveWanted {
+    effect: String,
 }
 
 #[derive(Deserialize)]
@@ -76,9 +95,22 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         }
         "place" => json(&studio.place(&parsed::<PlaceWanted>(body)?)?),
         "dependence" => {
-            let DependenceWanted { part, channel } = parsed(body)?;
+            let ChannelWanted { part, channel } = parsed(body)?;
             json(&studio.dependence(part, channel)?)
         }
+        "regions" => {
+            let ChannelWanted { part, channel } = parsed(body)?;
+            json(&studio.regions(part, channel)?)
+        }
+        "in_time" => {
+            let ChannelWanted { part, channel } = parsed(body)?;
+            json(&studio.in_time(part, channel)?)
+        }
+        "rollout" => json(&studio.rollout(&parsed::<RolloutWanted>(body)?)?),
+        "rollouts" => json(&studio.rollouts(parsed::<AheadWanted>(body)?.ahead_s)?),
+        "runs" => json(&studio.runs()),
+        "run_errors" => json(&studio.run_errors(parsed::<RunWanted>(body)?.name.as_deref())?),
+        "curve" => json(&studio.curve(&parsed::<CurveWanted>(body)?.effect)?),
         "surface" => json(&studio.surface(&parsed::<SurfaceWanted>(body)?)?),
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
@@ -92,6 +124,10 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         "save_page" => {
             let FileWanted { path, overwrite } = parsed(body)?;
             json(&studio.save_page(&path, overwrite)?)
+        }
+        "save_diagnosis" => {
+            let FileWanted { path, overwrite } = parsed(body)?;
+            json(&studio.save_diagnosis(&path, overwrite)?)
         }
         _ => Err(Refusal::new(404, "path", format!("there is no request `{name}`"))),
     }
