@@ -5,7 +5,7 @@
 mod corrupted;
 
 use corrupted::{Columns, Outcome, assert_named, checked, flights};
-use phyture::critique::check::Severity;
+use phyture::critique::check::{Finding, Severity};
 use phyture::flight::attitude::{gravity_body, rotation_body_to_inertial};
 use phyture::flight::{Column, GRAVITY_M_S2};
 
@@ -121,8 +121,8 @@ fn an_attitude_in_degrees_from_a_time_on_and_a_range_that_was_switched_are_named
             }
         },
     )?);
-    let found = degrees.findings.iter().find(|finding| finding.message.contains("the angles are in degrees"));
-    let found = found.filter(|finding| finding.message.contains("s on")).ok_or_else(|| degrees.to_string())?;
+    let says = |finding: &&Finding| ["from 16 s on", "the angles are in degrees"].iter().all(|part| finding.message.contains(part));
+    let found = degrees.findings.iter().find(says).ok_or_else(|| degrees.to_string())?;
     assert!(found.verdict == Severity::Fault && found.flights.len() == 1, "{}", found.message);
     let switched = checked(flights(
         |index| index % 3 == 0,
