@@ -8,7 +8,7 @@ use crate::flight::split::Split;
 use crate::flight::{DataSet, Flight, Span, Window};
 use crate::hybrid::{Hybrid, HybridRollout};
 use crate::physics::Model;
-use crate::physics::rollout::{Each, Rolled, Rollout, State, has_position, starts};
+use crate::physics::rollout::{Each, Rolled, Rollout, State, check_horizon, has_position, starts};
 
 /// Who is rolled out, and from where. Work is shared with the other threads of the pool it runs in.
 pub struct Rolling<'a> {
@@ -62,6 +62,8 @@ impl Rolling<'_> {
     /// [`Error::Undetermined`] where no start fits; as [`Rollout::new`] and [`HybridRollout::new`]; [`Error::Config`] without any model.
     pub fn run(&self, set: &DataSet, split: &Split) -> Result<Rollouts> {
         let (flights, horizon) = (&set.flights, self.horizon);
+        // Said before what the division of the flights leaves.
+        check_horizon(flights, horizon)?;
         let Met { models: met, judged: spans, own_from_first_half } = met(flights, &self.all()?, &split.test)?;
         let history = self.networks.iter().map(|(_, hybrid)| hybrid.description().config.history()).max().unwrap_or(1);
         let starts = starts(&spans, history, horizon, self.stride);

@@ -237,7 +237,8 @@ fn check_state(flight: &Flight) -> Result<()> {
     })
 }
 
-fn check_horizon(flights: &[Flight], horizon: usize) -> Result<()> {
+/// Refuses a horizon that no flight has, and flights of different steps.
+pub(crate) fn check_horizon(flights: &[Flight], horizon: usize) -> Result<()> {
     let fault = |place: String, field: &str, found: String, expected: String| {
         Err(Error::Config { place, field: field.into(), found, expected })
     };
