@@ -9,7 +9,6 @@ use phyture::critique::check::{Severity, check};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::write::data_set_csv;
 use phyture::flight::{Column, DataSet, Flight, Targets};
-use phyture::sim::{Level, Mechanisms, Simulation, simulate};
 use std::path::Path;
 
 /// All flights changed.

@@ -99,7 +99,7 @@ fn a_gyro_that_drifts_and_a_logger_that_slows_down_are_named_in_the_flights_that
     let slow = checked(flights(
         |index| index % 4 == 0,
         |columns| {
-            let kept = |k: &usize| k % 500 < 300 || k % 2 == 0;
+            let kept = |k: &usize| k % 500 < 300 || k.is_multiple_of(2);
             for values in columns.iter_mut() {
                 *values = (0..values.len()).filter(kept).map(|k| values[k]).collect();
             }

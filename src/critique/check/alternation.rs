@@ -19,7 +19,7 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     // The heading jumps by a turn.
     let is_smooth = |column: &Column| *column != Column::Yaw && (recorded || !Column::TARGETS.contains(column));
     let present = |column: &Column| is_smooth(column) && flights.iter().all(|flight| !flight.absent.contains(column));
-    let mut alike: Vec<(bool, Vec<usize>, Vec<(Column, f64)>)> = Vec::new();
+    let mut alike: Vec<Alike> = Vec::new();
     for column in Column::ALL.into_iter().filter(present) {
         let each = flights.iter().enumerate().filter_map(|(index, flight)| {
             let turn = turn(flight.column(column), flight.step_s);
@@ -35,19 +35,26 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
             let such: Vec<(usize, f64)> = such.iter().filter_map(of).collect();
             let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
             let Some(size) = median(such.iter().map(|entry| entry.1).collect()) else { continue };
-            match alike.iter_mut().find(|(kind, other, _)| *kind == older && *other == indices) {
-                Some((.., columns)) => columns.push((column, size)),
-                None => alike.push((older, indices, vec![(column, size)])),
+            match alike.iter_mut().find(|one| one.older == older && one.indices == indices) {
+                Some(one) => one.columns.push((column, size)),
+                None => alike.push(Alike { older, indices, columns: vec![(column, size)] }),
             }
         }
     }
-    alike.iter().map(|(older, indices, columns)| told(flights, *older, indices, columns)).collect()
+    alike.iter().map(|one| told(flights, one)).collect()
 }
 
-fn told(flights: &[Flight], older: bool, indices: &[usize], columns: &[(Column, f64)]) -> Finding {
+/// Columns that alternate in the same flights in the same way: by an age, s, or by a constant, in the unit of each.
+struct Alike {
+    older: bool,
+    indices: Vec<usize>,
+    columns: Vec<(Column, f64)>,
+}
+
+fn told(flights: &[Flight], Alike { older, indices, columns }: &Alike) -> Finding {
     let names = columns.iter().map(|entry| entry.0.name()).collect::<Vec<_>>().join(", ");
     let (first, size) = columns[0];
-    let how = if older {
+    let how = if *older {
         format!("every other sample is about {:.0} ms older than those beside it", 1e3 * size)
     } else {
         format!("every other sample differs from those beside it by {size:.3} {}", first.unit())

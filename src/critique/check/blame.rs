@@ -135,6 +135,14 @@ fn off_centre(all: &[&Cause]) -> String {
     )
 }
 
+fn uneven_time(all: &[&Cause]) -> String {
+    let [short, long] = [0, 1].map(|end| usual(all, |kind| if let Kind::Pace(ends) = kind { ends[end] } else { 1.0 }));
+    format!(
+        "the time stamps are not those of the rows: all that changes does so {short:.2} to {long:.2} times as fast as they say, by turns; steps of uneven \
+         length, or rows that are missing"
+    )
+}
+
 /// A ratio with the digits that count.
 fn short(ratio: f64) -> String {
     if ratio.abs() < 0.1 { format!("{ratio:.3e}") } else { format!("{ratio:.4}") }
@@ -150,19 +158,7 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
     let since = first_s.map(|from_s| format!(", from {from_s:.0} s on in the first of them")).unwrap_or_default();
     let places = first_s.map(|from_s| format!(", first at {from_s:.0} s")).unwrap_or_default();
     let number = |of: fn(&Kind) -> f64| usual(all, of);
-    let only = |kind: &Kind| match *kind {
-        Kind::Late(value)
-        | Kind::Filtered(value)
-        | Kind::Averaged(value)
-        | Kind::Scaled(value)
-        | Kind::Off(value)
-        | Kind::Drifts(value) => value,
-        Kind::Follows(_, value) | Kind::Settles(value, _) | Kind::Overflows(value) | Kind::Noise(value) | Kind::Rounded(value) => {
-            value
-        }
-        Kind::SignLost | Kind::Leaps | Kind::OffCentre(_) | Kind::Rows | Kind::Pace(_) => 0.0,
-    };
-    let value = number(only);
+    let value = number(Kind::size);
     // "the velocity (vx, vy, vz) comes", "the rates (wx, wy, wz) come", "vx, vy come".
     let are_several = columns.len() > 1 && (columns.len() < 3 || stream.ends_with('s'));
     let does = |one: &'static str, more: &'static str| if are_several { more } else { one };
@@ -221,13 +217,7 @@ fn told(all: &[&Cause], columns: &[Column]) -> String {
             does("has", "have")
         ),
         Kind::OffCentre(_) => off_centre(all),
-        Kind::Pace(_) => {
-            let [short, long] = [0, 1].map(|end| usual(all, |kind| if let Kind::Pace(ends) = kind { ends[end] } else { 1.0 }));
-            format!(
-                "the time stamps are not those of the rows: all that changes does so {short:.2} to {long:.2} times as fast as they say, by turns; steps of \
-                 uneven length, or rows that are missing"
-            )
-        }
+        Kind::Pace(_) => uneven_time(all),
         Kind::Rows => format!(
             "rows do not follow each other: most columns leap at once; a gap, rows repeated or in the wrong order, or parts joined so{places}"
         ),

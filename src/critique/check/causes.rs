@@ -90,6 +90,24 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    /// By how much, where that is one number.
+    pub const fn size(&self) -> f64 {
+        match *self {
+            Self::Late(value)
+            | Self::Filtered(value)
+            | Self::Averaged(value)
+            | Self::Scaled(value)
+            | Self::Off(value)
+            | Self::Drifts(value)
+            | Self::Follows(_, value)
+            | Self::Settles(value, _)
+            | Self::Overflows(value)
+            | Self::Noise(value)
+            | Self::Rounded(value) => value,
+            Self::SignLost | Self::Leaps | Self::OffCentre(_) | Self::Rows | Self::Pace(_) => 0.0,
+        }
+    }
+
     /// Begin of the finding's name.
     pub const fn name(&self) -> &'static str {
         match self {

@@ -25,7 +25,7 @@ const LOOKED_AT: [Column; 8] =
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let recorded = flights.iter().all(|flight| flight.targets == Targets::Recorded);
     let looked_at = LOOKED_AT.into_iter().chain(Column::TARGETS.into_iter().filter(|_| recorded));
-    let mut alike: Vec<(Vec<usize>, Vec<(Column, f64, f64)>)> = Vec::new();
+    let mut alike: Vec<Alike> = Vec::new();
     for column in looked_at.filter(|column| flights.iter().all(|flight| !flight.absent.contains(column))) {
         let each = flights.iter().enumerate().filter_map(|(index, flight)| {
             let cut = cut(flight.column(column));
@@ -36,18 +36,24 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         let number = |of: fn(&Cut) -> f64| median(such.iter().map(|entry| of(&entry.1)).collect());
         let Some((end, share)) = number(|cut| cut.end).zip(number(|cut| cut.share)) else { continue };
         let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
-        match alike.iter_mut().find(|(other, _)| *other == indices) {
-            Some((_, columns)) => columns.push((column, end, share)),
-            None => alike.push((indices, vec![(column, end, share)])),
+        match alike.iter_mut().find(|one| one.indices == indices) {
+            Some(one) => one.columns.push((column, Cut { end, share })),
+            None => alike.push(Alike { indices, columns: vec![(column, Cut { end, share })] }),
         }
     }
-    alike.iter().map(|(indices, columns)| told(flights, indices, columns)).collect()
+    alike.iter().map(|one| told(flights, one)).collect()
 }
 
-fn told(flights: &[Flight], indices: &[usize], columns: &[(Column, f64, f64)]) -> Finding {
+/// Columns that are cut off in the same flights.
+struct Alike {
+    indices: Vec<usize>,
+    columns: Vec<(Column, Cut)>,
+}
+
+fn told(flights: &[Flight], Alike { indices, columns }: &Alike) -> Finding {
     let each: Vec<String> = columns
         .iter()
-        .map(|(column, end, share)| {
+        .map(|(column, Cut { end, share })| {
             format!("{} at {end:.3} {} for {:.1} % of the time", column.name(), column.unit(), 100.0 * share)
         })
         .collect();
