@@ -3,8 +3,9 @@
 //! A wrong sign or frame looks like a missing effect, and a large one; so this comes first and blocks what follows. Kinematic
 //! relations need no aerodynamics (`relations`, `gains`); the places of gravity and of the Coriolis term in the accelerations need
 //! little (`forces`); which stick moves which axis is asked of each flight (`sticks`). Each flight is judged by itself and against the others
-//! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), dropped samples (`dropouts`) and cells that cannot be
-//! (`cells`) are counted.
+//! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), and so are ends of ranges (`saturation`) and two sources by turns
+//! (`alternation`); dropped samples (`dropouts`) and cells that cannot be (`cells`) are counted. What would mend what no reading does is looked for in single
+//! columns (`causes`) and in several together (`jointly`).
 //! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;

@@ -73,7 +73,7 @@ impl Own {
 fn in_part(mut findings: Vec<Finding>, short: &Evidence) -> Vec<Finding> {
     for relation in &short.relations {
         let is_open = findings.iter().any(|finding| finding.name == relation.name && finding.verdict != Severity::Fault);
-        let Some((says, is_later, block)) = relation.reading_of_part().filter(|_| is_open) else { continue };
+        let Some((says, is_later, block)) = is_open.then(|| relation.reading_of_part()).flatten() else { continue };
         let place = format!("{:.0} s{}", SHORT_BLOCK_S * block as f64, if is_later { " on" } else { "" });
         let message = format!("{} {place} {says}, and not in the rest of the flight", if is_later { "from" } else { "up to" });
         findings.retain(|finding| finding.name == relation.name || !finding.name.starts_with(relation.name));

@@ -334,10 +334,18 @@ impl Relation {
     /// Another reading of a part of a single flight, where the nominal one holds in the rest of it: as a clause, and whether it is the later part, from this
     /// block on, or the earlier one up to there.
     pub fn reading_of_part(&self) -> Option<(&'static str, bool, usize)> {
-        let nominal = &self.misfit[0];
-        let blocks = nominal.len();
+        if self.share(0).is_nan() || self.share(0) < MATERIAL_SHARE {
+            return None;
+        }
+        let blocks = self.misfit[0].len();
+        // Sums up to each block, so that a long flight costs no more than its length.
+        let sums: Vec<Vec<(f64, f64)>> = self.misfit.iter().map(|blocks| running(blocks)).collect();
+        let sum = |reading: usize, range: &Range<usize>| {
+            let [before, up_to] = [range.start, range.end].map(|at| sums[reading][at]);
+            (up_to.0 - before.0, up_to.1 - before.1)
+        };
         let share = |reading: usize, range: &Range<usize>| {
-            let (error, size) = total(&self.misfit[reading][range.clone()]);
+            let (error, size) = sum(reading, range);
             error / size
         };
         let parts = (FEWEST_BLOCKS..(blocks + 1).saturating_sub(FEWEST_BLOCKS)).flat_map(|at| {
@@ -346,13 +354,13 @@ impl Relation {
         });
         let holds = parts.filter(|(part, rest, ..)| share(0, rest) < MATERIAL_SHARE && share(0, part) > LARGEST_SHARE);
         let read = holds.flat_map(|(part, _, is_later, at)| {
-            let of = |reading: usize| (total(&self.misfit[reading][part.clone()]).0, share(reading, &part), reading, is_later, at);
+            let of = |reading: usize| (sum(reading, &part).0, share(reading, &part), reading, is_later, at);
             (1..self.hypotheses.len()).map(of).collect::<Vec<_>>()
         });
         // Of several places that one where the nominal reading is given up as late as it holds.
         let left = |found: &(f64, f64, usize, bool, usize)| {
             let rest = if found.3 { 0..found.4 } else { found.4..blocks };
-            found.0 + total(&nominal[rest]).0
+            found.0 + sum(0, &rest).0
         };
         let best = read.min_by(|one, other| left(one).total_cmp(&left(other)))?;
         (best.1 < MATERIAL_SHARE).then_some((self.hypotheses[best.2].says, best.3, best.4))
@@ -427,6 +435,16 @@ impl Relation {
         });
         BlockMean::new(ratios).and_then(|mean| mean.interval()).is_some_and(|[_, high]| high < 0.0)
     }
+}
+
+/// Errors and sizes of all blocks before each, and of all.
+fn running(blocks: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut sum = (0.0, 0.0);
+    let up_to = blocks.iter().map(|block| {
+        sum = (sum.0 + block.0, sum.1 + block.1);
+        sum
+    });
+    std::iter::once((0.0, 0.0)).chain(up_to).collect()
 }
 
 /// Errors and sizes of several blocks.
