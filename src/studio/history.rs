@@ -148,6 +148,8 @@ pub struct Pulse {
     pub file_changed: bool,
     /// How far a search is.
     pub search: Progress,
+    /// How far a training is.
+    pub training: Progress,
 }
 
 impl Studio {
@@ -194,7 +196,8 @@ impl Studio {
     /// Whether a page still shows what is.
     pub fn pulse(&self) -> Pulse {
         let file_changed = held(&self.file).is_changed();
-        Pulse { revision: self.revision.load(Ordering::Relaxed), file_changed, search: self.progress() }
+        let (search, training) = (self.progress(), self.training_progress());
+        Pulse { revision: self.revision.load(Ordering::Relaxed), file_changed, search, training }
     }
 
     /// One step back; nothing at the first.

@@ -69,6 +69,12 @@ pub(super) struct Known {
 /// What a search found, and the model with it.
 type Heard = (Arc<Diagnosis>, Arc<Model>);
 
+/// Work on a thread of its own: a fault in it is told like any other failure, and the studio goes on.
+pub(super) fn unbroken<T>(what: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let broken = || Err(Error::Undetermined(format!("the {what} broke off; its message is on the terminal of the studio")));
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| broken())
+}
+
 impl Studio {
     /// Begins a search for what the present state lacks.
     ///
@@ -85,11 +91,7 @@ impl Studio {
             let (studio, own) = (Arc::clone(self), (watch.clone(), Arc::clone(&state)));
             let begun = Instant::now();
             let run = move || {
-                // A fault in the search is told like any other failure; the studio goes on.
-                let searched = catch_unwind(AssertUnwindSafe(|| studio.search(&own.1.model, own.0)));
-                let broken =
-                    || Err(Error::Undetermined("the search broke off; its message is on the terminal of the studio".into()));
-                let outcome = searched.unwrap_or_else(|_| broken());
+                let outcome = unbroken("search", || studio.search(&own.1.model, own.0));
                 let outcome = outcome.map(|outcome| (Arc::new(outcome.diagnosis), Arc::new(outcome.model)));
                 if let Some(job) = held(&studio.job).as_mut() {
                     job.ended = Some((begun.elapsed().as_secs_f64(), outcome));

@@ -21,6 +21,7 @@ mod save;
 pub mod server;
 mod surfaces;
 mod trace;
+mod training;
 mod views;
 
 pub use curves::{CurvePanel, CurveText};
@@ -31,12 +32,13 @@ pub use found::Found;
 pub use history::{Pulse, StepText, Steps};
 pub use job::{JobText, Progress};
 pub use judge::PartWanted;
-pub use residual::{InTimeText, RegionText, RegionsText};
+pub use residual::{InTimeText, RegionText, RegionsText, Spot};
 pub use rollout::{PathText, RolloutText, RolloutWanted, RolloutsText};
 pub use runs::{Kind, RunErrors, RunText, RunsText};
 pub use save::Saved;
 pub use surfaces::{SurfaceText, SurfaceWanted};
 pub use trace::{Move, Trace, TraceWanted};
+pub use training::{Earlier, ExplainedText, TrainingPlan, TrainingText, TrainingWanted, UnfinishedText};
 pub use views::{By, DependenceText, ErrorMap, MapCell, MapRow, Place, PlaceWanted, VariableText};
 
 use crate::critique::check::{CheckReport, check};
@@ -80,6 +82,8 @@ pub struct Studio {
     /// Held by whoever changes the model, so that changes come one after the other.
     changing: Mutex<()>,
     job: Mutex<Option<Job>>,
+    training: Mutex<Option<training::TrainingJob>>,
+    explained: training::Explained,
     predictions: trace::Predictions,
     dependences: views::Dependences,
     residuals: residual::Residuals,
@@ -133,6 +137,8 @@ impl Studio {
             history: Mutex::new(History::new(first)),
             changing: Mutex::default(),
             job: Mutex::default(),
+            training: Mutex::default(),
+            explained: Recent::new(training::KEPT),
             predictions: Recent::new(trace::PREDICTIONS),
             dependences: Recent::new(views::KEPT),
             residuals: residual::Residuals::default(),

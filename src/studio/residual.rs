@@ -7,7 +7,7 @@ use super::recent::Recent;
 use crate::blocks::BLOCK_S;
 use crate::critique::diagnose::{Met, met};
 use crate::critique::residual_views::{
-    Autocorrelation, Region, Spectrum, StickCorrelation, autocorrelation, regions, spectrum, stick_correlations,
+    Autocorrelation, Region, Spectrum, StickCorrelation, Where, autocorrelation, regions, spectrum, stick_correlations,
 };
 use crate::critique::unknown::{ROWS_MAX, ResidualTable};
 use crate::error::{Error, Result};
@@ -28,6 +28,17 @@ pub struct RegionsText {
     pub why: Option<String>,
 }
 
+/// Some seconds of a flight.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spot {
+    /// Index of the flight.
+    pub flight: usize,
+    /// From, s.
+    pub from_s: f64,
+    /// To, s.
+    pub to_s: f64,
+}
+
 /// A region of flight.
 #[derive(Clone, Debug, Serialize)]
 pub struct RegionText {
@@ -43,6 +54,8 @@ pub struct RegionText {
     pub share_of_time: f64,
     /// Blocks of ten seconds.
     pub blocks: usize,
+    /// The ten seconds that hold most of it.
+    pub worst: Option<Spot>,
 }
 
 /// The residual of one channel in time.
@@ -101,10 +114,20 @@ impl Studio {
             share_of_error: region.share_of_error,
             share_of_time: region.share_of_rows,
             blocks: region.blocks,
+            worst: region.worst.map(|worst| self.around(&worst)),
         };
         let whole = Some(text(("all flights".into(), &tree)));
         let regions = if tree.split.is_some() { tree.by_rule().into_iter().map(text).collect() } else { Vec::new() };
         Ok(RegionsText { whole, regions, even: tree.is_even(), why: None })
+    }
+
+    /// The ten seconds around a block.
+    fn around(&self, worst: &Where) -> Spot {
+        let flight = &self.set.flights[worst.flight];
+        let [first, last] = worst.between_s;
+        let from_s = (0.5 * (first + last - BLOCK_S)).clamp(0.0, (flight.duration_s() - BLOCK_S).max(0.0));
+        let to_s = (from_s + BLOCK_S).min(flight.duration_s());
+        Spot { flight: worst.flight, from_s: flight.start_s + from_s, to_s: flight.start_s + to_s }
     }
 
     /// How long the residual of a channel lasts, its spectrum, and whether the sticks follow it.

@@ -3,6 +3,7 @@
 
 use super::found::Found;
 use super::recent::Recent;
+use super::runs::{Content, Version};
 use super::{Studio, fault};
 use crate::critique::rollout::{PerQuantity, Quantity, Rollouts};
 use crate::error::Result;
@@ -12,6 +13,7 @@ use crate::physics::rollout::State;
 use crate::workflow::{FromOne, Rolling};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// How far ahead may be looked, s.
 const LONGEST_S: f64 = 60.0;
@@ -22,11 +24,14 @@ const POINTS: usize = 200;
 /// Steps that are predicted over all starts at most: an answer has to come while a person looks.
 const MOST_STEPS: usize = 150_000;
 
+/// The same where a network takes part.
+const MOST_NETWORK_STEPS: usize = 10_000;
+
 /// What the present state is called in rollouts.
 const NAME: &str = "model";
 
 /// Where a rollout begins, and how far it goes.
-#[derive(Clone, Copy, Debug, Deserialize)]
+#[derive(Clone, Debug, Deserialize)]
 pub struct RolloutWanted {
     /// Index of the flight.
     pub flight: usize,
@@ -35,6 +40,9 @@ pub struct RolloutWanted {
     pub at_s: Option<f64>,
     /// How far ahead, s.
     pub ahead_s: f64,
+    /// Name of a network in the folder of the model that is rolled out beside the present state.
+    #[serde(default)]
+    pub network: Option<String>,
 }
 
 /// A rollout from one moment.
@@ -46,7 +54,7 @@ pub struct RolloutText {
     pub ahead_s: Vec<f64>,
     /// What was measured.
     pub measured: PerQuantity<[Vec<f32>; 3]>,
-    /// What is predicted: both yardsticks, then the model.
+    /// What is predicted: both yardsticks, then the model, then the network.
     pub paths: Vec<PathText>,
     /// What stands for the position, where the log has none.
     pub note: Option<&'static str>,
@@ -78,8 +86,8 @@ pub struct RolloutsText {
     pub legend: String,
 }
 
-/// Errors over all starts by state and steps.
-pub(super) type AllStarts = Recent<(u64, usize), Rollouts>;
+/// Errors over all starts by state, network and steps.
+pub(super) type AllStarts = Recent<(u64, Option<Version>, usize), Rollouts>;
 
 /// States and horizons whose errors over all starts are kept.
 pub(super) const KEPT: usize = 8;
@@ -106,11 +114,17 @@ impl Studio {
             );
             return Ok(Found::Missing { why });
         }
+        let (_, content) = self.rolled(wanted.network.as_deref())?;
+        let first = content.networks.iter().map(|(_, hybrid)| hybrid.description().config.history() - 1).max().unwrap_or(1);
+        if flight.len() < first + horizon + 1 {
+            let why = format!("`{}` is too short for the history of the network and {} s ahead", flight.name, wanted.ahead_s);
+            return Ok(Found::Missing { why });
+        }
         let sample = wanted.at_s.map_or(0.0, |at_s| ((at_s - flight.start_s) / flight.step_s).round());
-        // The first sample has none before it, from which rates of change are known.
-        let last = (sample.max(0.0) as usize).clamp(1, flight.len() - 1 - horizon);
+        // The first sample has none before it, from which rates of change are known; a network needs its history.
+        let last = (sample.max(0.0) as usize).clamp(first.max(1), flight.len() - 1 - horizon);
         let models = [(NAME.to_owned(), self.now().model.clone())];
-        let rolling = Rolling { models: &models, networks: &[], horizon, stride: 1 };
+        let rolling = Rolling { models: &models, networks: &content.networks, horizon, stride: 1 };
         let found = Found::of_log(rolling.from_one(&self.set, &self.split, Window { flight: wanted.flight, last }))?;
         Ok(found.map(|from_one| text(&from_one, flight.time_s(last))))
     }
@@ -119,7 +133,7 @@ impl Studio {
     ///
     /// # Errors
     /// As [`Studio::rollout`].
-    pub fn rollouts(&self, ahead_s: f64) -> Result<Found<RolloutsText>> {
+    pub fn rollouts(&self, ahead_s: f64, network: Option<&str>) -> Result<Found<RolloutsText>> {
         let Some(first) = self.set.flights.first() else { return Err(fault("flights", "none", "at least one")) };
         let (horizon, now) = (steps(first, ahead_s)?, self.now());
         let longest = self.split.test.iter().map(|span| span.end - span.start).max().unwrap_or(0);
@@ -130,11 +144,13 @@ impl Studio {
             );
             return Ok(Found::Missing { why });
         }
-        let made = self.all_starts.get((now.id, horizon), || {
+        let (version, content) = self.rolled(network)?;
+        let most = if content.networks.is_empty() { MOST_STEPS } else { MOST_NETWORK_STEPS };
+        let made = self.all_starts.get((now.id, version, horizon), || {
             let samples: usize = self.split.test.iter().map(|span| span.end - span.start).sum();
-            let stride = (samples * horizon).div_ceil(MOST_STEPS).max(1);
+            let stride = (samples * horizon).div_ceil(most).max(1);
             let models = [(NAME.to_owned(), now.model.clone())];
-            Rolling { models: &models, networks: &[], horizon, stride }.run(&self.set, &self.split)
+            Rolling { models: &models, networks: &content.networks, horizon, stride }.run(&self.set, &self.split)
         });
         Ok(Found::of_log(made)?.map(|made| RolloutsText {
             basis: made.basis(),
@@ -142,6 +158,15 @@ impl Studio {
             legend: made.legend(),
             rollouts: Rollouts::clone(&made),
         }))
+    }
+}
+
+impl Studio {
+    /// The network that is rolled out, and which version of its file it is; neither without a name.
+    fn rolled(&self, network: Option<&str>) -> Result<(Option<Version>, Arc<Content>)> {
+        let Some(name) = network else { return Ok((None, Arc::default())) };
+        let (version, content) = self.network(name)?;
+        Ok((Some(version), content))
     }
 }
 

@@ -5,7 +5,7 @@ use super::found::Found;
 use super::judge::MOST_SAMPLES;
 use super::recent::Recent;
 use super::{Studio, fault, held};
-use crate::critique::{ChannelValues, Intervals};
+use crate::critique::{ChannelValues, Comparison, Intervals};
 use crate::error::{Error, Result};
 use crate::flight::windows::windows;
 use crate::hybrid::Hybrid;
@@ -94,13 +94,13 @@ struct Entry {
 }
 
 /// A file as it was: another date or size is another file.
-type Version = (PathBuf, SystemTime, u64);
+pub(super) type Version = (PathBuf, SystemTime, u64);
 
 /// What a file holds, as a comparison takes it: one model, or one network.
 #[derive(Default)]
 pub(super) struct Content {
-    models: Vec<(String, Model)>,
-    networks: Vec<(String, Hybrid)>,
+    pub models: Vec<(String, Model)>,
+    pub networks: Vec<(String, Hybrid)>,
 }
 
 /// Who is judged: a file, or a state.
@@ -153,10 +153,7 @@ impl Studio {
         // A folder that cannot be read has nothing to be named, and the present state is judged without it.
         let (entries, _) = entries(&self.folder().0).unwrap_or_default();
         let contents: Vec<Arc<Content>> = entries.iter().filter_map(|entry| self.content(entry).ok()).collect();
-        let history =
-            contents.iter().map(|content| rows_needed(&content.networks, None)).max().unwrap_or(1).max(rows_needed(&[], None));
-        let most = if contents.iter().any(|content| !content.networks.is_empty()) { MOST_WINDOWS } else { MOST_SAMPLES };
-        let stride = windows(&self.split.test, history, 1).len().div_ceil(most).max(1);
+        let (history, stride) = self.windows_of(&contents);
         let judged = |content: &Content| self.judged(content, history, stride);
         let Some(name) = name else {
             let now = self.now();
@@ -164,17 +161,37 @@ impl Studio {
             let made = self.runs.errors.get((Whose::State(now.id), history, stride), || judged(&content));
             return told(made);
         };
-        let missing =
-            || fault("name", format!("`{name}`"), "a model or network in the folder of the model; the list may have changed");
-        let entry = entries.iter().find(|entry| entry.name == name).ok_or_else(missing)?;
+        let entry = named(&entries, name)?;
         told(
             self.content(entry)
                 .and_then(|content| self.runs.errors.get((Whose::File(entry.version()), history, stride), || judged(&content))),
         )
     }
 
+    /// A network of the folder by its name, and which version of its file it is.
+    ///
+    /// # Errors
+    /// [`Error::Config`] for a name that is no network of the folder; as [`read_network`].
+    pub(super) fn network(&self, name: &str) -> Result<(Version, Arc<Content>)> {
+        let (entries, _) = entries(&self.folder().0)?;
+        let entry = named(&entries, name)?;
+        let content = self.content(entry)?;
+        if content.networks.is_empty() {
+            return Err(fault("name", format!("`{name}`, a model"), "a network"));
+        }
+        Ok((entry.version(), content))
+    }
+
+    /// Rows that a window must have before it for all of these, and the samples between windows.
+    pub(super) fn windows_of(&self, contents: &[Arc<Content>]) -> (usize, usize) {
+        let needed = contents.iter().map(|content| rows_needed(&content.networks, None)).max().unwrap_or(1);
+        let history = needed.max(rows_needed(&[], None));
+        let most = if contents.iter().any(|content| !content.networks.is_empty()) { MOST_WINDOWS } else { MOST_SAMPLES };
+        (history, windows(&self.split.test, history, 1).len().div_ceil(most).max(1))
+    }
+
     /// The folder that is looked into, and the file of the model.
-    fn folder(&self) -> (PathBuf, Option<PathBuf>) {
+    pub(super) fn folder(&self) -> (PathBuf, Option<PathBuf>) {
         let file = held(&self.file).path().map(Path::to_path_buf);
         let beside = file
             .as_deref()
@@ -192,20 +209,23 @@ impl Studio {
         let models = content.models.iter().map(|(_, model)| model);
         let of_networks = content.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
         models.chain(of_networks).try_for_each(|model| model.check_flights(&self.set.flights))?;
-        let contest = Contest {
-            models: &content.models,
-            networks: &content.networks,
-            ridge: None,
-            history,
-            stride,
-            uncertainty: false,
-            seed: self.seed,
-            threads: Threads(0),
-        };
-        let comparison = contest.run(&self.set, &self.split)?.comparison;
+        let comparison = self.contest(&content.models, &content.networks, history, stride)?;
         let nothing = || Error::Undetermined("nothing was judged".into());
         let last = comparison.models.last().ok_or_else(nothing)?;
         Ok(RunErrors { rmse: last.rmse, ci95: last.rmse_ci95, basis: comparison.basis() })
+    }
+
+    /// Models and networks on what no fit sees.
+    pub(super) fn contest(
+        &self,
+        models: &[(String, Model)],
+        networks: &[(String, Hybrid)],
+        history: usize,
+        stride: usize,
+    ) -> Result<Comparison> {
+        let contest =
+            Contest { models, networks, ridge: None, history, stride, uncertainty: false, seed: self.seed, threads: Threads(0) };
+        Ok(contest.run(&self.set, &self.split)?.comparison)
     }
 }
 
@@ -227,7 +247,7 @@ impl Entry {
 
 impl Content {
     /// What is in it, in words.
-    fn says(&self) -> String {
+    pub fn says(&self) -> String {
         let of_model = |model: &Model| {
             let known = Model::paper("", 1.0, [1.0; 3], 1.0);
             let added = |name: &str| known.effect(name).is_none();
@@ -247,6 +267,12 @@ impl Content {
         let models = self.models.iter().map(|(_, model)| of_model(model));
         models.chain(self.networks.iter().map(|(_, hybrid)| of_network(hybrid))).collect()
     }
+}
+
+/// An entry by its name.
+fn named<'a>(entries: &'a [Entry], name: &str) -> Result<&'a Entry> {
+    let missing = || fault("name", format!("`{name}`"), "a model or network in the folder of the model; the list may have changed");
+    entries.iter().find(|entry| entry.name == name).ok_or_else(missing)
 }
 
 /// Whatever is wrong with one file is told in its row.

@@ -15,6 +15,6 @@ mod training;
 
 pub use config::TrainConfig;
 pub use job::Job;
-pub use run::{Outcome, Report, RunFolder};
+pub use run::{Checkpointed, Outcome, Report, RunFolder};
 pub use trainer::{Best, EpochLoss, State, StepReport, Trainer};
 pub use training::{Begun, Ended, Event, Losses, Trained, Training};

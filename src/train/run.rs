@@ -10,7 +10,7 @@
 
 use super::config::TrainConfig;
 use super::container;
-use super::trainer::{State, StepReport, Trainer};
+use super::trainer::{EpochLoss, State, StepReport, Trainer};
 use crate::disk::{Lock, write_atomically};
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,43 @@ struct Checkpoint {
     /// Digest of the prepared training data.
     data: u64,
     state: State,
+}
+
+const CHECKPOINT: &str = "checkpoint.phyture";
+const NETWORK: &str = "network.safetensors";
+const METRICS: &str = "metrics.jsonl";
+
+/// What the last checkpoint says of its run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checkpointed {
+    /// Its configuration.
+    pub config: TrainConfig,
+    /// Digest of its training data.
+    pub data: u64,
+    /// Steps done.
+    pub step: u64,
+    /// Losses of the epochs that have ended.
+    pub curve: Vec<EpochLoss>,
+    /// Whether the network is written.
+    pub is_finished: bool,
+}
+
+impl Checkpointed {
+    /// Looks into a run's folder without holding it; none where no run was begun or the checkpoint is gone.
+    ///
+    /// # Errors
+    /// [`Error::File`] if the checkpoint is damaged.
+    pub fn read(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(CHECKPOINT);
+        if !path.is_file() {
+            return Ok(None);
+        }
+        let Checkpoint { config, data, state } = container::read(&path)?;
+        let config = serde_json::from_str(&config)
+            .map_err(|error| Error::File { path, message: format!("has a configuration that does not read: {error}") })?;
+        let is_finished = folder.join(NETWORK).is_file();
+        Ok(Some(Self { config, data, step: state.step, curve: state.curve, is_finished }))
+    }
 }
 
 /// A run folder, held against other programs.
@@ -51,8 +88,8 @@ pub struct Report {
     pub step: StepReport,
     /// Steps of the whole run.
     pub steps: u64,
-    /// Loss on the validation windows, after the last step of an epoch.
-    pub validation_loss: Option<f64>,
+    /// Losses of the epoch, after its last step.
+    pub epoch_ended: Option<EpochLoss>,
 }
 
 impl RunFolder {
@@ -83,16 +120,16 @@ impl RunFolder {
 
     /// The trained hybrid.
     pub fn network(&self) -> PathBuf {
-        self.folder.join("network.safetensors")
+        self.folder.join(NETWORK)
     }
 
     /// The checkpoint.
     pub fn checkpoint(&self) -> PathBuf {
-        self.folder.join("checkpoint.phyture")
+        self.folder.join(CHECKPOINT)
     }
 
     fn metrics(&self) -> PathBuf {
-        self.folder.join("metrics.jsonl")
+        self.folder.join(METRICS)
     }
 
     /// The state of an interrupted run of this very configuration on these very data.
@@ -142,9 +179,9 @@ impl RunFolder {
                 }
             };
             let ends_epoch = step.step.is_multiple_of(trainer.steps_an_epoch() as u64);
-            let validation_loss = if ends_epoch { trainer.end_epoch()? } else { None };
-            metrics.line(&step, validation_loss, begun.elapsed().as_secs_f64())?;
-            let stop = !go_on(&Report { step, steps: trainer.steps(), validation_loss });
+            let epoch_ended = ends_epoch.then(|| trainer.end_epoch()).transpose()?;
+            metrics.line(&step, epoch_ended.and_then(|losses| losses.validation), begun.elapsed().as_secs_f64())?;
+            let stop = !go_on(&Report { step, steps: trainer.steps(), epoch_ended });
             if stop || saved.elapsed().as_secs_f64() >= config.checkpoint_s {
                 metrics.flush()?;
                 save(trainer.state())?;

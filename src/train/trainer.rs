@@ -166,24 +166,24 @@ impl<'a> Trainer<'a> {
         &self.state
     }
 
-    /// Ends an epoch after its last step: notes its losses, and its weights where they are the best so far and to be kept. Gives the loss on the
-    /// validation windows; `None` if there are none.
+    /// Ends an epoch after its last step: notes its losses, and its weights where they are the best so far and to be kept. Gives the losses.
     ///
     /// # Errors
     /// As [`Trainer::training_loss`].
-    pub fn end_epoch(&mut self) -> Result<Option<f64>> {
+    pub fn end_epoch(&mut self) -> Result<EpochLoss> {
         let validation = self.validation_loss()?;
         let keep = self.config.keep_best;
         let steps = self.steps_an_epoch() as f64;
         let state = &mut self.state;
         let epoch = state.curve.len();
-        state.curve.push(EpochLoss { training: state.loss_sum / steps, validation });
+        let losses = EpochLoss { training: state.loss_sum / steps, validation };
+        state.curve.push(losses);
         state.loss_sum = 0.0;
         let is_best = |loss: &f64| keep && state.best.as_ref().is_none_or(|best| *loss < best.loss);
         if let Some(loss) = validation.filter(is_best) {
             state.best = Some(Best { epoch, loss, parameters: state.parameters.clone() });
         }
-        Ok(validation)
+        Ok(losses)
     }
 
     /// Goes back to the weights of the best epoch at the end of a run, where they were kept.

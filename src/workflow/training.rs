@@ -18,11 +18,12 @@ pub fn digest(identity: &str) -> u64 {
     u64::from_le_bytes(*digest.first_chunk().expect("it has 32 bytes"))
 }
 
-/// What tells these training data from others: the files, the model, the division.
+/// What tells these training data from others: the files, the model but for its provenance, the division.
 ///
 /// # Errors
 /// As [`Model::to_toml`].
 pub fn training_digest(set: &DataSet, model: &Model, split: &Split) -> Result<u64> {
+    let model = Model { provenance: Default::default(), ..model.clone() };
     Ok(digest(&format!("{}\n{}\n{split:?}", set.source.sha256, model.to_toml()?)))
 }
 
@@ -44,7 +45,7 @@ impl Epoch {
         }
         self.sum += report.step.loss;
         self.steps += 1;
-        self.validation = report.validation_loss.or(self.validation);
+        self.validation = report.epoch_ended.and_then(|losses| losses.validation).or(self.validation);
     }
 
     /// Mean loss over its steps so far.

@@ -3,6 +3,7 @@
 //! axe-core comes through npm when the test runs, and `pdftotext` is of poppler-utils; where one is not found, the test says so and leaves that out.
 
 use crate::support::{Running, folder, studio};
+use crate::views::train;
 use crate::webdriver::Browser;
 use phyture::{Error, Result};
 use serde_json::{Value, json};
@@ -104,7 +105,7 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         println!("skipped axe-core: npm could not fetch {AXE}");
     }
     let place = folder()?;
-    let running = Running::new(studio(None)?)?;
+    let running = Running::new(studio(Some(&place.path().join("model.toml")))?)?;
     let settled = "!document.body.classList.contains('busy')";
     let mut found = Vec::new();
     for (view, ready) in [
@@ -117,10 +118,14 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         ("model", "document.querySelectorAll('#history li').length === 1"),
         ("runs", "document.querySelector('#runs')?.dataset.waits === '0'"),
         ("learn", "document.querySelector('#findings [data-curve][data-drawn]')"),
+        ("train", "document.querySelector('#explained[data-network] tbody tr') && document.querySelector('#training .chart')"),
     ] {
         browser.open(&format!("{}&view={view}", running.url))?;
         if view == "learn" {
             browser.click("#diagnose")?;
+        }
+        if view == "train" {
+            train(&browser)?;
         }
         browser.wait(ready)?;
         browser.wait(settled)?;

@@ -10,6 +10,7 @@ mod rollouts;
 mod runs;
 mod server;
 mod support;
+mod training;
 mod unsaved;
 mod views;
 mod webdriver;

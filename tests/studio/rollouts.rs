@@ -14,7 +14,7 @@ fn known<T>(found: Found<T>) -> Result<T> {
 }
 
 fn rolled(studio: &Studio, at_s: f64, ahead_s: f64) -> Result<RolloutText> {
-    known(studio.rollout(&RolloutWanted { flight: 0, at_s: Some(at_s), ahead_s })?)
+    known(studio.rollout(&RolloutWanted { flight: 0, at_s: Some(at_s), ahead_s, network: None })?)
 }
 
 /// The distance of two columns of three at a place.
@@ -54,21 +54,23 @@ fn a_rollout_begins_where_it_is_asked_to_and_its_errors_are_those_of_its_states(
     let long = rolled(&studio, 5.0, 10.0)?;
     assert!(long.ahead_s.len() <= 201 && (long.ahead_s[long.ahead_s.len() - 1] - 10.0).abs() < 1e-9);
     let refused = |wanted| assert!(matches!(studio.rollout(&wanted), Err(Error::Config { .. })), "{wanted:?}");
-    refused(RolloutWanted { flight: 99, at_s: None, ahead_s: 1.0 });
-    [0.0, -1.0, 1e3, f64::NAN].into_iter().for_each(|ahead_s| refused(RolloutWanted { flight: 0, at_s: None, ahead_s }));
-    refused(RolloutWanted { flight: 0, at_s: Some(f64::NAN), ahead_s: 1.0 });
+    refused(RolloutWanted { flight: 99, at_s: None, ahead_s: 1.0, network: None });
+    [0.0, -1.0, 1e3, f64::NAN]
+        .into_iter()
+        .for_each(|ahead_s| refused(RolloutWanted { flight: 0, at_s: None, ahead_s, network: None }));
+    refused(RolloutWanted { flight: 0, at_s: Some(f64::NAN), ahead_s: 1.0, network: None });
     Ok(())
 }
 
 #[test]
 fn over_all_starts_the_model_predicts_more_than_no_change() -> Result<()> {
     let studio = studio(None)?;
-    let found = known(studio.rollouts(0.5)?)?;
+    let found = known(studio.rollouts(0.5, None)?)?;
     let rows = &found.rollouts.rows;
     assert!(rows[0].whole.n > 100 && found.rollouts.relative_to == "model, rates held", "{}", found.basis);
     let [held, model] = [&rows[0].whole.sum, &rows[2].whole.sum];
     assert!(model.velocity < held.velocity && model.position < held.position && model.rates < held.rates, "{rows:?}");
-    assert!(matches!(studio.rollouts(0.0), Err(Error::Config { .. })));
+    assert!(matches!(studio.rollouts(0.0, None), Err(Error::Config { .. })));
     Ok(())
 }
 
@@ -96,11 +98,11 @@ fn a_log_that_does_not_allow_it_is_told_what_to_do() -> Result<()> {
     let found = rolled(&blind, 5.0, 1.0)?;
     assert!(found.note.is_some_and(|note| note.contains("recorded velocity")), "the way made stands for the position");
     assert!(found.paths[2].error.position.last().is_some_and(|error| error.is_finite() && *error > 0.0));
-    assert!(known(blind.rollouts(1.0)?)?.rollouts.position_from_velocity);
+    assert!(known(blind.rollouts(1.0, None)?)?.rollouts.position_from_velocity);
     // No flight has room for a minute.
-    let short = why(blind.rollout(&RolloutWanted { flight: 0, at_s: None, ahead_s: 60.0 })?);
+    let short = why(blind.rollout(&RolloutWanted { flight: 0, at_s: None, ahead_s: 60.0, network: None })?);
     assert!(short.contains("too short") && short.contains("choose a longer flight"), "{short}");
-    let all = why(blind.rollouts(60.0)?);
+    let all = why(blind.rollouts(60.0, None)?);
     assert!(all.contains("long enough to look 60 s ahead; look at most"), "{all}");
     Ok(())
 }

@@ -41,6 +41,11 @@ fn where_it_fails_tells_regions_and_what_the_residual_is_in_time() -> Result<()>
     browser.click("#score [data-channel=vz_dot]")?;
     browser.wait("document.querySelector('#regions h2').textContent.includes('vz_dot')")?;
     assert_ne!(text(&browser, lasts)?, yaw);
+    // From a region to the ten seconds that hold most of it.
+    browser.click("#regions tbody tr:nth-child(2) .visit")?;
+    browser.wait("location.hash.includes('view=compare') && Number(document.querySelector('#compare-plots')?.dataset.points) > 100")?;
+    let width = browser.value("(() => { const at = new URLSearchParams(location.hash.slice(1)); return at.get('to') - at.get('from'); })()")?;
+    assert!(width.as_f64().is_some_and(|width| (9.0..10.1).contains(&width)), "{width}");
     assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
     Ok(())
 }
@@ -104,6 +109,52 @@ fn runs_stand_beside_each_other_and_a_file_that_does_not_read_says_why() -> Resu
     browser.click("#runs [data-key=error]")?;
     browser.wait("document.querySelector('#runs tbody tr:nth-child(2)').dataset.run === 'second.toml'")?;
     browser.wait("location.hash.includes('sort=error') && document.querySelector('#runs').dataset.waits === '0'")?;
+    assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
+    Ok(())
+}
+
+/// Trains a small network in the view that is open.
+pub fn train(browser: &Browser) -> Result<()> {
+    browser.wait("document.querySelector('#train-form')")?;
+    browser.run("const history = document.querySelector('#train-history'); history.value = '64'; history.dispatchEvent(new Event('change'))")?;
+    browser.run(
+        "const width = document.querySelector('#train-width'); width.value = '16'; width.dispatchEvent(new Event('change'))",
+    )?;
+    browser.write("#train-epochs", "3")?;
+    browser.click("#train")
+}
+
+#[test]
+fn a_network_is_trained_while_its_losses_are_watched_and_rolled_out() -> Result<()> {
+    let Some(browser) = Browser::start(1280, 720)? else {
+        println!("skipped: no chromedriver with a Chromium (Debian: chromium, chromium-driver)");
+        return Ok(());
+    };
+    let place = folder()?;
+    let running = Running::new(studio(Some(&place.path().join("model.toml")))?)?;
+    browser.open(&format!("{}&view=train&channel=5", running.url))?;
+    browser.write("#train-epochs", "0")?;
+    browser.click("#train")?;
+    browser.wait("document.querySelector('#train-told').textContent.includes('whole number')")?;
+    train(&browser)?;
+    browser.wait("document.querySelector('#training').dataset.progress === 'running'")?;
+    browser.wait(
+        "/epoch 1 of 3, step [1-9][0-9]* of [0-9]+, loss .* left/.test(document.querySelector('#training .progress').textContent)",
+    )?;
+    browser.wait("document.querySelector('[data-view=train] .spin')")?;
+    browser.click("#train-stop")?;
+    browser.wait("document.querySelector('#training').dataset.progress === 'stopped'")?;
+    browser.click("[data-go-on=run]")?;
+    browser.wait("document.querySelector('#training').dataset.progress === 'done'")?;
+    browser.wait("document.querySelectorAll('#training .chart path').length === 2")?;
+    browser.wait("document.querySelectorAll('#explained[data-network=run] tbody tr').length === 6")?;
+    browser.reload()?;
+    browser.wait("document.querySelector('#training')?.dataset.epochs === '3'")?;
+    browser.click("#roll-network")?;
+    browser
+        .wait("location.hash.includes('network=run') && document.querySelectorAll('#rollout-one .legend > span').length === 5")?;
+    browser.wait("document.querySelectorAll('#rollout-all tbody tr').length === 4")?;
+    assert!(place.path().join("run").join("network.safetensors").is_file());
     assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
     Ok(())
 }

@@ -8,7 +8,7 @@ pub mod regions;
 pub mod surface;
 pub mod time;
 
-pub use regions::{Region, Split, regions};
+pub use regions::{Region, Split, Where, regions};
 pub use surface::{Surface, SurfaceCell, informative_pair, surface};
 pub use time::{Autocorrelation, Spectrum, StickCorrelation, autocorrelation, spectrum, stick_correlations};
 

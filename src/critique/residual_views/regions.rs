@@ -34,6 +34,15 @@ pub struct Split {
     pub threshold: f64,
 }
 
+/// A block of ten seconds, or what of one was recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Where {
+    /// Index of the flight.
+    pub flight: usize,
+    /// Its first and its last row, s since the flight's first sample.
+    pub between_s: [f64; 2],
+}
+
 /// A region of flight and the error in it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Region {
@@ -49,6 +58,8 @@ pub struct Region {
     pub share_of_error: f64,
     /// Share of the rows that lie here, 0 to 1.
     pub share_of_rows: f64,
+    /// The block that holds most of its squares.
+    pub worst: Option<Where>,
     /// How it is parted; absent in a leaf.
     pub split: Option<Split>,
     /// Its parts: none or two.
@@ -144,6 +155,7 @@ impl Growing<'_> {
             ci95: mean.and_then(|mean| mean.root_interval()),
             share_of_error: share(sum, self.total),
             share_of_rows: share(rows.len() as f64, self.table.len() as f64),
+            worst: self.worst(&rows),
             split: None,
             parts: Vec::new(),
         };
@@ -155,6 +167,17 @@ impl Growing<'_> {
             region.parts = vec![self.region(low, depth - 1), self.region(high, depth - 1)];
         }
         region
+    }
+
+    /// The block in which most of the squares of some rows lie.
+    fn worst(&self, rows: &[usize]) -> Option<Where> {
+        let mut sums = vec![0.0; self.blocks];
+        rows.iter().for_each(|row| sums[self.table.block[*row]] += self.squares[*row]);
+        let worst = (0..self.blocks).max_by(|left, right| sums[*left].total_cmp(&sums[*right]))?;
+        // Blocks never fall, so a block is a stretch of rows.
+        let first = self.table.block.partition_point(|block| *block < worst);
+        let last = self.table.block.partition_point(|block| *block <= worst).checked_sub(1)?;
+        Some(Where { flight: self.table.flight[first], between_s: [self.table.time_s[first], self.table.time_s[last]] })
     }
 
     /// The best split of some rows: feature and threshold.
@@ -218,6 +241,16 @@ mod tests {
         assert!(split.variable == "height" && split.unit == "m" && (split.threshold + 0.5).abs() < 0.15, "{split:?}");
         assert!(tree.parts[0].share_of_error > 0.7 && tree.parts[0].rmse > 3.0 * tree.parts[1].rmse);
         assert!(tree.parts[0].ci95.is_some_and(|[low, high]| low < 4.0 && 4.0 < high), "{:?}", tree.parts[0]);
+        // The block with the most of it, counted by hand.
+        let within = |row: &usize| table.features[1][*row] <= split.threshold;
+        let mut sums = std::collections::BTreeMap::<usize, f64>::new();
+        for row in (0..table.len()).filter(within) {
+            *sums.entry(table.block[row]).or_default() += table.residual[Channel::WxDot][row].powi(2);
+        }
+        let (block, _) = sums.into_iter().fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });
+        let rows: Vec<usize> = (0..table.len()).filter(|row| table.block[*row] == block).collect();
+        let between_s = [table.time_s[rows[0]], table.time_s[rows[rows.len() - 1]]];
+        assert_eq!(tree.parts[0].worst, Some(Where { flight: table.flight[rows[0]], between_s }));
         Ok(())
     }
 
@@ -230,6 +263,7 @@ mod tests {
             ci95: None,
             share_of_error: 0.5,
             share_of_rows: 0.5,
+            worst: None,
             split: None,
             parts: Vec::new(),
         };

@@ -14,7 +14,7 @@ import { read } from './place.js';
  * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_first_half: boolean, saved: boolean, file: string | null,
  *   file_changed: boolean, kept: string | null, unkept: string | null, left: Left[], revision: number }} Steps
  * @typedef {{ file: string, written_s: number, steps: string[], search: string | null, fault: string | null }} Left
- * @typedef {{ revision: number, file_changed: boolean, search: Job['progress'] }} Pulse
+ * @typedef {{ revision: number, file_changed: boolean, search: Job['progress'], training: Job['progress'] }} Pulse
  * @typedef {{ name: string, meaning: string, value: number, unit: string, ci95: [number, number] | null, usual: [number, number] | null,
  *   bounds: [number | null, number | null], slider: [number, number], fixed: boolean, by_flight: [number, number, number] | null }} Numeral
  * @typedef {{ name: string, kind: string, meaning: string, formula: string, enabled: boolean, baseline: boolean, added_by: string | null,
@@ -34,7 +34,9 @@ import { read } from './place.js';
  * @typedef {{ surface: { channel: string, variables: [string, string], edges: [number[], number[]], share: number,
  *   cells: { column: number, row: number, mean: number, ci95: [number, number] | null, n: number, blocks: number, thin: boolean }[] } | null,
  *   units: [string, string], names: string[] }} Surface
- * @typedef {{ rule: string, rmse: number, ci95: [number, number] | null, share_of_error: number, share_of_time: number, blocks: number }} Region
+ * @typedef {{ flight: number, from_s: number, to_s: number }} Spot
+ * @typedef {{ rule: string, rmse: number, ci95: [number, number] | null, share_of_error: number, share_of_time: number, blocks: number,
+ *   worst: Spot | null }} Region
  * @typedef {{ whole: Region | null, regions: Region[], even: boolean, why: string | null }} Regions
  * @typedef {{ stick: string, lag_s: number[], correlation: number[], band95: (number | null)[], feedback_warning: boolean }} Following
  * @typedef {{ autocorrelation: { lag_s: number[], correlation: number[], lasts_s: number | null } | null,
@@ -62,6 +64,16 @@ import { read } from './place.js';
  *   worth?: { effect: string, share: Record<string, Share> }[], notes: string[], seconds: number }} Diagnosis
  * @typedef {{ progress: 'idle' | 'running' | 'stopping' | 'stopped' | 'failed' | 'done', stage: string, seconds: number, error: string | null,
  *   diagnosis: Diagnosis | null, state: number | null, state_did: string | null }} Job
+ * @typedef {{ folder: string, history: number, width: number, epochs: number, step_s: number,
+ *   unfinished: { folder: string, name: string, says: string, why: string | null }[] }} TrainingPlan
+ * @typedef {{ training: number, validation: number | null }} EpochLoss
+ * @typedef {{ progress: Job['progress'], says: string, folder: string, name: string, state: number | null, state_did: string | null,
+ *   parameters: number | null, windows: [number, number], steps: [number, number], epochs: [number, number], loss: number | null, curve: EpochLoss[],
+ *   seconds: number, left_s: number | null, error: string | null,
+ *   trained: { epoch: number, training_loss: number, validation_loss: number | null, curve: EpochLoss[] } | null }} Training
+ * @typedef {Record<keyof PerChannel, Share | null>} ShareOf
+ * @typedef {{ says: string, rmse: [PerChannel, PerChannel], ci95: [Intervals, Intervals], basis: string, shares: { physics: ShareOf, network: ShareOf,
+ *   neither: ShareOf, of_network: { linear_history: ShareOf, network_itself: ShareOf } | null } }} Explained
  * @typedef {{ message: string | null, at: number | null, caution: string | null }} FormulaCheck
  * @typedef {{ file: string, kept: string | null, ledger: string | null }} Saved
  */

@@ -20,7 +20,7 @@ function dialog(title, ...content) {
 
 export function keysHelp() {
   const keys = [
-    ['1 … 6', 'Compare, Where it fails, Roll out, Learn, Model, Runs'],
+    ['1 … 7', 'Compare, Where it fails, Roll out, Learn, Model, Train, Runs'],
     ['u  or  Ctrl Z', 'undo'],
     ['r  or  Ctrl Shift Z', 'redo'],
     ['s', 'save'],

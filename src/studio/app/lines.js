@@ -16,7 +16,7 @@ import { scale } from './charts.js';
  * @property {number[]} x
  * @property {Curve[]} curves
  * @property {(number | null)[]} [band] half the width of a band about zero within which values are chance
- * @property {boolean} [log] logarithmic axes; what is not above zero is left out
+ * @property {boolean | 'up'} [log] logarithmic axes, or the upright one alone; what is not above zero is left out
  * @property {[number, number]} [at_least] what the upright axis shows in any case
  * @property {{ at: number, text: string }} [mark] a line across at a value
  * @property {boolean} [small] a picture of a row of four
@@ -64,18 +64,19 @@ function extent(values, log) {
 export function lines(picture) {
   const { x, log = false, small = false } = picture;
   const shown = (/** @type {number | null} */ value) => value !== null && Number.isFinite(value) && (!log || value > 0);
-  const kept = x.map((_, index) => index).filter((index) => !log || x[index] > 0);
+  const kept = x.map((_, index) => index).filter((index) => log !== true || x[index] > 0);
   const values = picture.curves.flatMap((curve) => kept.map((index) => curve.y[index])).filter(shown);
   const band = (picture.band ?? []).flatMap((half) => (half === null ? [] : [half, -half]));
   const all = /** @type {number[]} */ ([...values, ...band, ...(picture.at_least ?? [])]);
   if (all.length === 0 || kept.length === 0) return h('p', { class: 'quiet' }, 'Nothing finite to draw.');
   const [width, height, left, bottom, top] = small ? [300, 190, 56, 40, 10] : [420, 260, 60, 44, 12];
-  const [low, high] = extent(all, log);
-  const to = log ? Math.log10 : (/** @type {number} */ value) => value;
-  const flat = scale(to(x[kept[0]]), to(x[kept[kept.length - 1]]), left, width - 12);
-  const rise = scale(to(low), to(high), height - bottom, top);
+  const [low, high] = extent(all, log !== false);
+  const same = (/** @type {number} */ value) => value;
+  const [across, up] = [log === true ? Math.log10 : same, log ? Math.log10 : same];
+  const flat = scale(across(x[kept[0]]), across(x[kept[kept.length - 1]]), left, width - 12);
+  const rise = scale(up(low), up(high), height - bottom, top);
   const [right, base] = [width - 12, height - bottom];
-  const place = { x: (/** @type {number} */ value) => flat(to(value)), y: (/** @type {number} */ value) => rise(to(value)) };
+  const place = { x: (/** @type {number} */ value) => flat(across(value)), y: (/** @type {number} */ value) => rise(up(value)) };
   const frame = axes(picture, place, [low, high], { left, right, base, top, height });
   const path = (/** @type {Curve} */ curve) =>
     s('path', {
@@ -145,17 +146,17 @@ function axes(picture, place, [low, high], { left, right, base, top, height }) {
   const { x, log = false, small = false } = picture;
   const first = log ? x.find((value) => value > 0) ?? x[0] : x[0];
   const last = x[x.length - 1];
-  const [atX, atY] = log
-    ? [decades(first, last), decades(low, high)]
-    : [ticks(first, last, small ? 4 : 6), ticks(low, high, small ? 4 : 5)];
-  const [textX, textY] = log ? [number, number] : [tickText(atX), tickText(atY)];
+  const atX = log === true ? decades(first, last) : ticks(first, last, small ? 4 : 6);
+  const atY = log ? decades(low, high) : ticks(low, high, small ? 4 : 5);
+  const textX = log === true ? short : tickText(atX);
+  const textY = log ? short : tickText(atY);
   return [
     ...atX.map((at) =>
       s(
         'g',
         {},
         s('line', { class: 'grid', x1: place.x(at), x2: place.x(at), y1: top, y2: base }),
-        s('text', { x: place.x(at), y: base + 15, 'text-anchor': 'middle' }, log ? short(at) : textX(at)),
+        s('text', { x: place.x(at), y: base + 15, 'text-anchor': 'middle' }, textX(at)),
       ),
     ),
     ...atY.map((at) =>
@@ -163,7 +164,7 @@ function axes(picture, place, [low, high], { left, right, base, top, height }) {
         'g',
         {},
         s('line', { class: 'grid', x1: left, x2: right, y1: place.y(at), y2: place.y(at) }),
-        s('text', { x: left - 6, y: place.y(at) + 4, 'text-anchor': 'end' }, log ? short(at) : textY(at)),
+        s('text', { x: left - 6, y: place.y(at) + 4, 'text-anchor': 'end' }, textY(at)),
       ),
     ),
     !log && low < 0 ? s('line', { class: 'zero', x1: left, x2: right, y1: place.y(0), y2: place.y(0) }) : null,

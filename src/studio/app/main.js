@@ -12,6 +12,7 @@ import * as model from './model.js';
 import { go, read, slide, VIEWS } from './place.js';
 import * as rollout from './rollout.js';
 import * as runs from './runs.js';
+import * as train from './train.js';
 import * as where from './where.js';
 
 /**
@@ -32,8 +33,21 @@ import * as where from './where.js';
  */
 
 /** @type {Record<string, View>} */
-const views = { compare, where, rollout, learn, model, runs };
-const NAMES = { compare: 'Compare', where: 'Where it fails', rollout: 'Roll out', learn: 'Learn', model: 'Model', runs: 'Runs' };
+const views = { compare, where, rollout, learn, model, train, runs };
+const NAMES = {
+  compare: 'Compare',
+  where: 'Where it fails',
+  rollout: 'Roll out',
+  learn: 'Learn',
+  model: 'Model',
+  train: 'Train',
+  runs: 'Runs',
+};
+/** What goes on while other views are looked at: the view that it belongs to, and what is said when it ends. */
+const WORKS = /** @type {const} */ ([
+  { of: 'search', view: 'learn', goes: ', a search runs', ended: 'Diagnose has ended: see Learn.' },
+  { of: 'training', view: 'train', goes: ', a network is trained', ended: 'The network is trained: see Train.' },
+]);
 const THEME = 'phyture-theme';
 /** How often is asked whether what is shown is still so, ms. */
 const PULSE_MS = 1500;
@@ -42,8 +56,11 @@ const PULSE_MS = 1500;
 let app;
 let shown = '';
 let busy = 0;
-/** How far a search was at the last look. */
-let search = /** @type {import('./api.js').Job['progress']} */ ('idle');
+/**
+ * How far each work was at the last look.
+ * @type {Record<'search' | 'training', import('./api.js').Job['progress']>}
+ */
+let works = { search: 'idle', training: 'idle' };
 
 /** @param {unknown} error */
 function failed(error) {
@@ -112,10 +129,12 @@ async function look() {
       await refresh();
       return;
     }
-    if (search === 'running' && pulse.search === 'done' && read().view !== 'learn') note('Diagnose has ended: see Learn.');
+    for (const { of, view, ended } of WORKS) {
+      if (works[of] === 'running' && pulse[of] === 'done' && read().view !== view) note(ended);
+    }
     const isNew = pulse.revision !== app.steps.revision || pulse.file_changed !== app.steps.file_changed;
-    if (!isNew && pulse.search === search) return;
-    search = pulse.search;
+    if (!isNew && WORKS.every(({ of }) => pulse[of] === works[of])) return;
+    works = { search: pulse.search, training: pulse.training };
     const before = app.steps;
     app.steps = await ask('steps');
     const path = (/** @type {typeof before} */ of) => JSON.stringify([of.at, of.steps.map((step) => step.id)]);
@@ -148,9 +167,9 @@ function head() {
         },
       },
       NAMES[name],
-      name === 'learn' && search === 'running'
-        ? h('i', { class: 'spin', role: 'img', 'aria-label': ', a search runs' })
-        : null,
+      WORKS.filter(({ of, view }) => view === name && works[of] === 'running').map(({ goes }) =>
+        h('i', { class: 'spin', role: 'img', 'aria-label': goes }),
+      ),
     );
   const tool = (
     /** @type {string} */ id,

@@ -4,7 +4,7 @@
 /**
  * @typedef {object} Place
  * @property {string} token secret of the running studio
- * @property {'compare' | 'where' | 'rollout' | 'learn' | 'model' | 'runs'} view
+ * @property {'compare' | 'where' | 'rollout' | 'learn' | 'model' | 'train' | 'runs'} view
  * @property {number} flight index
  * @property {number} channel index
  * @property {number | null} from s
@@ -16,10 +16,11 @@
  * @property {'manoeuvre' | 'regime'} by
  * @property {'date' | 'error'} sort order of runs
  * @property {string} variable name; empty is the one on which the error depends most
+ * @property {string} network a network in the folder of the model; empty is none, or the newest
  * @property {string} second name of a second variable; empty is none
  */
 
-export const VIEWS = /** @type {const} */ (['compare', 'where', 'rollout', 'learn', 'model', 'runs']);
+export const VIEWS = /** @type {const} */ (['compare', 'where', 'rollout', 'learn', 'model', 'train', 'runs']);
 
 /** @returns {Place} */
 export function read() {
@@ -50,6 +51,7 @@ export function read() {
     by: oneOf('by', /** @type {const} */ (['manoeuvre', 'regime'])),
     sort: oneOf('sort', /** @type {const} */ (['date', 'error'])),
     variable: given.get('variable') ?? '',
+    network: given.get('network') ?? '',
     second: given.get('second') ?? '',
   };
 }

@@ -4,7 +4,9 @@
 import { h, scroller } from './dom.js';
 import { interval, measure, number, percent } from './format.js';
 import { DASHES, lines } from './lines.js';
+import { go } from './place.js';
 
+/** Names of the sticks. */
 const STICKS = { u1: 'lateral', u2: 'longitudinal', u3: 'tail', u4: 'collective' };
 
 /**
@@ -27,6 +29,16 @@ function rules(rule) {
 }
 
 /**
+ * A way to the ten seconds that hold most of a region's error.
+ * @param {import('./api.js').Spot} worst
+ * @param {string} rule
+ */
+function visit(worst, rule) {
+  const to = () => go({ view: 'compare', flight: worst.flight, from: worst.from_s, to: worst.to_s });
+  return h('button', { type: 'button', class: 'plain visit', 'aria-label': `the worst ten seconds of ${rule}`, title: 'its worst ten seconds', onclick: to }, '→');
+}
+
+/**
  * Regions as a table with bars.
  * @param {import('./api.js').Channel} channel
  * @param {import('./api.js').Regions} found
@@ -43,7 +55,7 @@ export function regions(channel, found) {
     return h(
       'tr',
       { 'data-rule': one.rule },
-      h('th', { scope: 'row' }, one === whole ? one.rule : rules(one.rule)),
+      h('th', { scope: 'row' }, one === whole ? one.rule : rules(one.rule), one.worst ? visit(one.worst, one.rule) : null),
       h('td', { class: 'fill' }, h('div', { class: 'track' }, bar)),
       h('td', {}, number(one.rmse), one.ci95 ? h('small', { class: 'quiet' }, ` [${interval(one.ci95)}]`) : null),
       h('td', { class: dense ? 'rise' : '' }, percent(one.share_of_error)),
@@ -70,7 +82,7 @@ export function regions(channel, found) {
       { class: 'quiet' },
       found.even
         ? 'The error is even: no rule finds a region in which it is a quarter larger than in all flights.'
-        : 'Simple rules part the flights so that the error differs from part to part. A part with more of the error than of the time is where the model lacks something, or where the air is rougher. Errors of means over tenths of a second, with 95 % intervals from blocks of ten seconds.',
+        : 'Simple rules part the flights so that the error differs from part to part. A part with more of the error than of the time is where the model lacks something, or where the air is rougher. Errors of means over tenths of a second, with 95 % intervals from blocks of ten seconds; an arrow leads to the ten seconds that hold most of it.',
     ),
   );
 }

@@ -28,11 +28,12 @@ const QUANTITIES = [
   { key: 'rates', unit: 'rad/s', title: 'Rates', of: ['wx', 'wy', 'wz'] },
 ];
 
-/** Lines of predictors, in the order in which they come: both yardsticks, then the model. */
+/** Lines of predictors, in the order in which they come: both yardsticks, then the model, then the network. */
 const LOOKS = [
   { colour: 3, dash: DASHES[2] },
   { colour: 2, dash: DASHES[1] },
   { colour: 1, dash: '', wide: true },
+  { colour: 4, dash: DASHES[3], wide: true },
 ];
 
 /** @param {string} name */
@@ -50,17 +51,21 @@ export async function show(app, into) {
   const mine = ++asked;
   const pixels = Math.min(4000, Math.round(timeWidth(into.clientWidth) * devicePixelRatio));
   const at_s = place.at ?? place.from;
+  /** @type {import('./api.js').Runs} */
+  const runs = await ask('runs');
+  const networks = runs.rows.filter((run) => run.kind === 'network' && run.error === null).map((run) => run.name);
+  const network = networks.includes(place.network) ? place.network : null;
   /** @type {[import('./api.js').Trace, import('./api.js').Rollout | import('./api.js').Missing]} */
   const [trace, found] = await Promise.all([
     ask('trace', { flight, channel: place.channel, from_s: place.from, to_s: place.to, pixels, against: null }),
-    ask('rollout', { flight, at_s, ahead_s: place.ahead }),
+    ask('rollout', { flight, at_s, ahead_s: place.ahead, network }),
   ]);
   if (mine !== asked || read().view !== 'rollout') return;
   const where = h('div', { class: 'stack', id: 'rollout-strip' });
   const all = h('section', { class: 'card', id: 'rollout-all' }, h('h2', {}, 'Over all starts'), h('p', { class: 'quiet' }, 'Rolling out …'));
   const one = 'why' in found ? missing(found) : single(found);
   strip?.destroy();
-  into.replaceChildren(controls(app, flight, found), where, one, all);
+  into.replaceChildren(controls(app, flight, found, networks), where, one, all);
   drawn = { at: 'why' in found ? trace.whole_s[0] : found.at_s, ahead: place.ahead };
   strip = stack(where, channel, 'model', null, {
     zoom: (from, to) => slide({ from, to }),
@@ -71,7 +76,7 @@ export async function show(app, into) {
   });
   strip.draw(trace);
   /** @type {import('./api.js').Rollouts | import('./api.js').Missing} */
-  const errors = await ask('rollouts', { ahead_s: place.ahead });
+  const errors = await ask('rollouts', { ahead_s: place.ahead, network });
   if (mine !== asked || read().view !== 'rollout') return;
   all.replaceWith('why' in errors ? missing(errors, 'rollout-all') : over(errors));
 }
@@ -89,10 +94,11 @@ const rounded = (at) => Number(at.toFixed(2));
  * @param {import('./main.js').App} app
  * @param {number} flight
  * @param {import('./api.js').Rollout | import('./api.js').Missing} found
+ * @param {string[]} networks
  */
-function controls(app, flight, found) {
+function controls(app, flight, found, networks) {
   const { flights } = app.overview;
-  const { ahead, from, to } = read();
+  const { ahead, from, to, network } = read();
   const to_flight = (/** @type {number} */ index) =>
     slide({ flight: Math.min(flights.length - 1, Math.max(0, index)), from: null, to: null, at: null });
   const start = h('input', {
@@ -131,6 +137,15 @@ function controls(app, flight, found) {
       String(ahead),
       (value) => slide({ ahead: Number(value) }),
     ),
+    networks.length
+      ? choice(
+          'Network',
+          'rollout-network',
+          [['', 'none'], ...networks.map((name) => /** @type {[string, string]} */ ([name, name]))],
+          networks.includes(network) ? network : '',
+          (value) => slide({ network: value }),
+        )
+      : null,
     h('span', { class: 'gap' }),
     from !== null || to !== null
       ? h('button', { type: 'button', onclick: () => slide({ from: null, to: null }) }, 'Whole flight')

@@ -36,6 +36,7 @@ const FILES: &[(&str, &str, &str)] = &[
     file!("remains.js", SCRIPT),
     file!("rollout.js", SCRIPT),
     file!("runs.js", SCRIPT),
+    file!("train.js", SCRIPT),
     file!("where.js", SCRIPT),
     file!("vendor/uPlot.esm.js", SCRIPT),
     file!("vendor/uPlot.min.css", CSS),

@@ -2,7 +2,7 @@
 
 use super::Refusal;
 use crate::flight::Channel;
-use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, RolloutWanted, Studio, SurfaceWanted, TraceWanted};
+use crate::studio::{By, Edit, Owner, PartWanted, PlaceWanted, RolloutWanted, Studio, SurfaceWanted, TraceWanted, TrainingWanted};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -36,10 +36,18 @@ struct ChannelWanted {
     channel: Channel,
 }
 
-/// How far rollouts go.
+/// How far rollouts go, and the network that takes part.
 #[derive(Deserialize)]
 struct AheadWanted {
     ahead_s: f64,
+    #[serde(default)]
+    network: Option<String>,
+}
+
+/// A network by its name in the folder.
+#[derive(Deserialize)]
+struct NetworkWanted {
+    name: String,
 }
 
 /// A run by its name in the folder; the present state without.
@@ -107,7 +115,10 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
             json(&studio.in_time(part, channel)?)
         }
         "rollout" => json(&studio.rollout(&parsed::<RolloutWanted>(body)?)?),
-        "rollouts" => json(&studio.rollouts(parsed::<AheadWanted>(body)?.ahead_s)?),
+        "rollouts" => {
+            let AheadWanted { ahead_s, network } = parsed(body)?;
+            json(&studio.rollouts(ahead_s, network.as_deref())?)
+        }
         "runs" => json(&studio.runs()),
         "run_errors" => json(&studio.run_errors(parsed::<RunWanted>(body)?.name.as_deref())?),
         "curve" => json(&studio.curve(&parsed::<CurveWanted>(body)?.effect)?),
@@ -115,6 +126,11 @@ pub(super) fn answer(studio: &Arc<Studio>, name: &str, body: &[u8]) -> Result<Ve
         "diagnose" => json(&studio.diagnose()?),
         "job" => json(&studio.job()),
         "stop" => json(&studio.stop()),
+        "training_plan" => json(&studio.training_plan()),
+        "train" => json(&studio.train(&parsed::<TrainingWanted>(body)?)?),
+        "training" => json(&studio.training()),
+        "stop_training" => json(&studio.stop_training()),
+        "explained" => json(&studio.explained(&parsed::<NetworkWanted>(body)?.name)?),
         "take_up" => json(&studio.take_up(&parsed::<LeftWanted>(body)?.file)?),
         "discard" => json(&studio.discard(&parsed::<LeftWanted>(body)?.file)?),
         "save" => {

@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// Compare, diagnose, add effects and watch the error fall, in a browser on this machine
 ///
 /// Prints an address to open. The server listens on 127.0.0.1 alone and answers nobody who lacks the token in that address; everything the page
-/// needs is in the program. Ctrl-C ends it; steps that were not saved lie in a file beside the model and are offered when it is opened again.
+/// needs is in the program. Ctrl-C ends it; steps that were not saved lie in a file beside the model and are offered when it is opened again, and so is a training.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  phyture studio flights -m n9.toml\n  phyture studio phyture-demo/flights --port 8421")]
 pub struct Args {
@@ -46,6 +46,9 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     context.json(&json!({ "url": server.url(), "port": server.port() }))?;
     context.print(format!("\nstudio: {}\nopen this address in a browser; Ctrl-C ends the studio", server.url()));
     server.run(Arc::clone(&studio), &end)?;
+    if let Some(run) = studio.finish() {
+        context.say(format!("the training in {} was stopped and is saved; the studio goes on with it, in Train", run.display()));
+    }
     let kept = studio
         .kept()
         .map_or_else(String::new, |file| format!("; steps that are not saved lie in {file} and are offered next time"));

@@ -1,4 +1,5 @@
-//! Errors on their way to Python: one exception, with the library's message and the kind of error in one word.
+//! Errors on their way to Python: one exception, with the library's message and the kind of error in one word. Where a message names an option of the
+//! command line, Python has an argument of that name.
 
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
@@ -13,12 +14,29 @@ pyo3::create_exception!(
 
 /// An error of the library.
 pub fn raised(error: &phyture::Error) -> PyErr {
-    of_kind(error.kind(), error.to_string())
+    of_kind(error.kind(), arguments(&error.to_string()))
 }
 
 /// A panic of the library, which stops here.
 pub fn fault(said: &str) -> PyErr {
     of_kind("fault", format!("a fault of the library: {said}"))
+}
+
+/// A message with the names of arguments in the place of options: `lock` for `--lock`, `split_at_gaps` for `--split-at-gaps`.
+fn arguments(message: &str) -> String {
+    let mut parts = message.split("--");
+    let mut said = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|letter: char| !(letter.is_ascii_lowercase() || letter == '-')).unwrap_or(part.len());
+        let (name, rest) = part.split_at(end);
+        if name.is_empty() || said.ends_with(|last: char| !(last.is_whitespace() || "`(".contains(last))) {
+            said.extend(["--", part]);
+            continue;
+        }
+        let quote = if said.ends_with('`') { "" } else { "`" };
+        said.extend([quote, &name.replace('-', "_"), quote, rest]);
+    }
+    said
 }
 
 fn of_kind(kind: &str, message: String) -> PyErr {

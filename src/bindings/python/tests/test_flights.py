@@ -62,6 +62,16 @@ def test_a_cell_without_a_number_is_refused_by_flight_line_and_column(flights):
     assert str(caught.value).startswith(f"{name}, line 5, column `vx`: found ")
 
 
+def test_a_message_names_the_argument_that_helps(flights):
+    name = flights.names[0]
+    given = {column: values.copy() for column, values in columns(flights, name).items()}
+    given["t"][100:] += 5.0
+    with pytest.raises(phyture.Error) as caught:
+        phyture.Flights.from_columns({name: given})
+    assert "`split_at_gaps` makes a flight of each part" in str(caught.value) and "--" not in str(caught.value)
+    assert len(phyture.Flights.from_columns({name: given}, split_at_gaps=True)) == 2
+
+
 def test_what_is_no_table_is_refused(flights):
     with pytest.raises(phyture.Error, match="columns of one length"):
         phyture.Flights.from_columns({"hover/a": {"t": [0.0, 0.1], "vx": [1.0]}})

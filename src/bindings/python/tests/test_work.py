@@ -50,7 +50,7 @@ def test_ctrl_c_saves_a_training_run_that_is_gone_on_with(flights, calibrated, t
     assert any(stage.startswith("training, epoch") and 0 < done <= of for stage, done, of in progress.told)
     with pytest.raises(phyture.Error) as caught:
         phyture.train(flights, calibrated, tmp_path / "run", config=config)
-    assert caught.value.kind == "exists"
+    assert caught.value.kind == "exists" and str(caught.value).endswith("or `force` to overwrite it")
     again = phyture.train(flights, calibrated, tmp_path / "run", config=config, resume=True)
     whole = phyture.train(flights, calibrated, tmp_path / "whole", config=config)
     assert again["training_loss"] == whole["training_loss"]
