@@ -1,4 +1,5 @@
-//! What everybody can read: axe-core finds no serious fault in any view, in light and dark, wide and narrow, and a print of a view loses no word.
+//! What everybody can read: axe-core finds no serious fault in any view, dialog or page that is saved, in light and dark, wide and narrow, and a print of
+//! a view loses no word.
 //!
 //! axe-core comes through npm when the test runs, and `pdftotext` is of poppler-utils; where one is not found, the test says so and leaves that out.
 
@@ -9,6 +10,7 @@ use phyture::{Error, Result};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
 
 const AXE: &str = "axe-core@4.14.1";
 
@@ -105,7 +107,8 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         println!("skipped axe-core: npm could not fetch {AXE}");
     }
     let place = folder()?;
-    let running = Running::new(studio(Some(&place.path().join("model.toml")))?)?;
+    let studio = studio(Some(&place.path().join("model.toml")))?;
+    let running = Running::new(Arc::clone(&studio))?;
     let settled = "!document.body.classList.contains('busy')";
     let mut found = Vec::new();
     for (view, ready) in [
@@ -133,6 +136,22 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
             found.extend(faults(&browser, axe, view)?);
         }
         found.extend(print_faults(&browser, place.path(), view)?);
+    }
+    if let Some(axe) = &axe {
+        for (key, name) in [("s", "save"), ("?", "keys")] {
+            browser.keys("#main", key)?;
+            browser.wait("document.querySelector('dialog[open]')")?;
+            found.extend(faults(&browser, axe, name)?);
+            browser.click("dialog .plain")?;
+        }
+        let pages = ["comparison.html", "diagnosis.html"].map(|name| place.path().join(name).display().to_string());
+        studio.save_page(&pages[0], false)?;
+        studio.save_diagnosis(&pages[1], false)?;
+        for page in pages {
+            browser.open(&format!("file://{page}"))?;
+            browser.wait("document.querySelector('svg')")?;
+            found.extend(faults(&browser, axe, &page)?);
+        }
     }
     assert_eq!(found, Vec::<String>::new(), "{}", Value::from(found.join("\n")));
     Ok(())

@@ -43,8 +43,10 @@ fn where_it_fails_tells_regions_and_what_the_residual_is_in_time() -> Result<()>
     assert_ne!(text(&browser, lasts)?, yaw);
     // From a region to the ten seconds that hold most of it.
     browser.click("#regions tbody tr:nth-child(2) .visit")?;
-    browser.wait("location.hash.includes('view=compare') && Number(document.querySelector('#compare-plots')?.dataset.points) > 100")?;
-    let width = browser.value("(() => { const at = new URLSearchParams(location.hash.slice(1)); return at.get('to') - at.get('from'); })()")?;
+    browser
+        .wait("location.hash.includes('view=compare') && Number(document.querySelector('#compare-plots')?.dataset.points) > 100")?;
+    let width = browser
+        .value("(() => { const at = new URLSearchParams(location.hash.slice(1)); return at.get('to') - at.get('from'); })()")?;
     assert!(width.as_f64().is_some_and(|width| (9.0..10.1).contains(&width)), "{width}");
     assert_eq!(browser.faults()?, Vec::<String>::new(), "the console is free of faults");
     Ok(())

@@ -8,7 +8,7 @@ import { scale } from './charts.js';
 /**
  * @typedef {{ name: string, y: (number | null)[], colour: number, dash?: string, wide?: boolean }} Curve a colour of the style sheet, 1 to 6; 0 is that
  *   of text
- * @typedef {{ name: string, unit: string }} Axis
+ * @typedef {{ name: string, unit: string, whole?: boolean }} Axis `whole`: it counts, and has no ticks between whole numbers
  * @typedef {object} Picture
  * @property {string} title
  * @property {Axis} across
@@ -146,7 +146,7 @@ function axes(picture, place, [low, high], { left, right, base, top, height }) {
   const { x, log = false, small = false } = picture;
   const first = log ? x.find((value) => value > 0) ?? x[0] : x[0];
   const last = x[x.length - 1];
-  const atX = log === true ? decades(first, last) : ticks(first, last, small ? 4 : 6);
+  const atX = log === true ? decades(first, last) : ticks(first, last, picture.across.whole ? Math.min(6, last - first) : small ? 4 : 6);
   const atY = log ? decades(low, high) : ticks(low, high, small ? 4 : 5);
   const textX = log === true ? short : tickText(atX);
   const textY = log ? short : tickText(atY);

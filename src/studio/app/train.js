@@ -3,7 +3,7 @@
 
 import { ask, Refused } from './api.js';
 import { choice, h, prose, s, scroller } from './dom.js';
-import { interval, measure, number, percent, time } from './format.js';
+import { interval, measure, number, percent } from './format.js';
 import { lines } from './lines.js';
 import { go, read, slide } from './place.js';
 
@@ -44,9 +44,9 @@ export async function show(app, into) {
   into.replaceChildren(
     h(
       'div',
-      { class: 'columns train' },
-      h('div', { class: 'below' }, goes ? null : form(app, plan, into), goes ? null : unfinished(app, plan, into)),
-      h('div', { class: 'below' }, watched(app, training, into)),
+      { class: goes ? 'train' : 'columns train' },
+      goes ? null : h('div', { class: 'below' }, form(app, plan, into), unfinished(app, plan, into)),
+      watched(app, training, into),
     ),
     h('section', { class: 'card', id: 'explained' }),
   );
@@ -250,15 +250,21 @@ function sizes({ parameters, windows }) {
  */
 function says({ progress, steps, epochs, loss, seconds, left_s, error, trained, folder }) {
   const at = `epoch ${Math.min(epochs[0] + 1, epochs[1])} of ${epochs[1]}, step ${steps[0]} of ${steps[1]}`;
-  const left = left_s === null ? '' : `, about ${time(Math.max(1, Math.round(left_s)))} left`;
+  const left = left_s === null ? '' : `, about ${roughly(left_s)} left`;
   if (progress === 'stopping') return 'stopping after this step; it saves where it is';
   if (progress === 'running') return steps[1] ? `${at}${loss === null ? '' : `, loss ${number(loss)}`}${left}` : 'reading the windows';
   if (progress === 'stopped') return `stopped after step ${steps[0]} of ${steps[1]}, and saved in ${folder}: go on whenever you like`;
   if (progress === 'failed') return error ?? '';
   if (!trained) return '';
   const validation = trained.validation_loss === null ? '' : `, validation loss ${number(trained.validation_loss)}`;
-  return `trained in ${time(Math.round(seconds))}: weights of epoch ${trained.epoch} of ${trained.curve.length}, training loss ${number(trained.training_loss)}${validation}`;
+  return `trained in ${roughly(seconds)}: weights of epoch ${trained.epoch} of ${trained.curve.length}, training loss ${number(trained.training_loss)}${validation}`;
 }
+
+/**
+ * A time that nobody needs to the second.
+ * @param {number} seconds
+ */
+const roughly = (seconds) => (seconds < 100 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
 
 /** @param {number} share */
 function bar(share) {
@@ -270,7 +276,7 @@ function losses({ curve }) {
   const validates = curve.some((epoch) => epoch.validation !== null);
   return lines({
     title: 'losses by epoch',
-    across: { name: 'epoch', unit: '1' },
+    across: { name: 'epoch', unit: '1', whole: true },
     up: { name: 'loss', unit: LOSS },
     x: curve.map((_, index) => index + 1),
     log: 'up',
@@ -359,7 +365,7 @@ function table(found, channels) {
         'table',
         { class: 'numbers wide explained' },
         h('caption', {}, 'Shares of the variance of what was measured, and the root mean square error without and with the network'),
-        h('thead', {}, h('tr', {}, ['', '', ...parts.map(([, words]) => words), 'physics alone', 'with network'].map((text) => (text ? h('th', { scope: 'col' }, text) : h('td'))))),
+        h('thead', {}, h('tr', {}, ['acceleration', '', ...parts.map(([, words]) => words), 'physics alone', 'with network'].map((text) => (text ? h('th', { scope: 'col' }, text) : h('td'))))),
         h('tbody', {}, channels.map(row)),
       ),
     ),
