@@ -13,15 +13,56 @@ struct Sums<const K: usize> {
 }
 
 impl<const K: usize> Sums<K> {
+    const NOTHING: Self = Self { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 };
+
     fn total(several: &[Self]) -> Self {
-        let empty = Self { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 };
-        several.iter().fold(empty, |mut sum, one| {
-            sum.gram.as_flattened_mut().iter_mut().zip(one.gram.as_flattened()).for_each(|(sum, one)| *sum += one);
-            sum.moment.iter_mut().zip(one.moment).for_each(|(sum, one)| *sum += one);
-            sum.square += one.square;
-            sum.rows += one.rows;
+        several.iter().fold(Self::NOTHING, |mut sum, one| {
+            sum.take(one);
             sum
         })
+    }
+
+    fn take(&mut self, one: &Self) {
+        self.gram.as_flattened_mut().iter_mut().zip(one.gram.as_flattened()).for_each(|(sum, one)| *sum += one);
+        self.moment.iter_mut().zip(one.moment).for_each(|(sum, one)| *sum += one);
+        self.square += one.square;
+        self.rows += one.rows;
+    }
+
+    /// With one column more, that is `column` of some of the rows, whose sums are `after`, and 0 in the others. `J` is `K` + 1.
+    fn stepped<const J: usize>(&self, column: usize, after: &Self) -> Sums<J> {
+        assert_eq!(J, K + 1, "one column more");
+        let place = |i: usize| if i < K { i } else { column };
+        let gram = |i: usize, j: usize| {
+            let sums = if i < K && j < K { self } else { after };
+            sums.gram[place(i)][place(j)]
+        };
+        Sums {
+            gram: std::array::from_fn(|i| std::array::from_fn(|j| gram(i, j))),
+            moment: std::array::from_fn(|i| if i < K { self.moment[i] } else { after.moment[column] }),
+            square: self.square,
+            rows: self.rows,
+        }
+    }
+
+    /// The least-squares fit on these sums. `None` where the columns do not determine β.
+    fn solution(&self) -> Option<Solution<K>> {
+        // Columns in units of their own length, so that the factorisation sees correlations and not units.
+        let scale: [f64; K] = std::array::from_fn(|i| self.gram[i][i].sqrt());
+        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
+            return None;
+        }
+        let gram = DMatrix::from_fn(K, K, |i, j| self.gram[i][j] / (scale[i] * scale[j]));
+        let inverse = Cholesky::new(gram)?.inverse();
+        let scaled = &inverse * DVector::from_fn(K, |i, _| self.moment[i] / scale[i]);
+        let beta: [f64; K] = std::array::from_fn(|i| scaled[i] / scale[i]);
+        beta.iter().all(|beta| beta.is_finite()).then_some(Solution { beta, scale, inverse })
+    }
+
+    /// Squared errors that β leaves.
+    fn error(&self, beta: &[f64; K]) -> f64 {
+        let fitted = |i: usize| (0..K).map(|j| self.gram[i][j] * beta[j]).sum::<f64>();
+        (self.square + (0..K).map(|i| beta[i] * (fitted(i) - 2.0 * self.moment[i])).sum::<f64>()).max(0.0)
     }
 }
 
@@ -56,7 +97,7 @@ impl<const K: usize> BlockRegression<K> {
     pub fn add(&mut self, block: (usize, usize), row: &[f64; K], value: f64) {
         if self.open != Some(block) {
             self.open = Some(block);
-            self.blocks.push(Sums { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 });
+            self.blocks.push(Sums::NOTHING);
         }
         let Some(sums) = self.blocks.last_mut() else { return };
         sums.square += value * value;
@@ -91,23 +132,26 @@ impl<const K: usize> BlockRegression<K> {
 
     /// With one column more: one of the others from this block on, and 0 before. `J` is `K` + 1.
     pub fn stepped<const J: usize>(&self, column: usize, from: usize) -> BlockRegression<J> {
-        assert_eq!(J, K + 1, "one column more");
-        let of = |(block, sums): (usize, &Sums<K>)| {
-            let is_after = if block < from { 0.0 } else { 1.0 };
-            let place = |i: usize| if i < K { (i, 1.0) } else { (column, is_after) };
-            Sums {
-                gram: std::array::from_fn(|i| {
-                    std::array::from_fn(|j| {
-                        let ((row, one), (along, other)) = (place(i), place(j));
-                        one * other * sums.gram[row][along]
-                    })
-                }),
-                moment: std::array::from_fn(|i| place(i).1 * sums.moment[place(i).0]),
-                square: sums.square,
-                rows: sums.rows,
-            }
-        };
+        let of = |(block, sums): (usize, &Sums<K>)| sums.stepped(column, if block < from { &Sums::NOTHING } else { sums });
         BlockRegression { blocks: self.blocks.iter().enumerate().map(of).collect(), open: None }
+    }
+
+    /// Of [`BlockRegression::stepped`] from each of some blocks on: the squared errors of its fit, and that block, where the fit is determined. In one pass
+    /// over the blocks.
+    pub fn steps<const J: usize>(&self, column: usize, places: std::ops::Range<usize>) -> Vec<(f64, usize)> {
+        if self.blocks.len() <= J || places.end > self.blocks.len() {
+            return Vec::new();
+        }
+        let total = Sums::total(&self.blocks);
+        let mut after = Sums::total(&self.blocks[places.end..]);
+        let of = |from: usize| {
+            after.take(&self.blocks[from]);
+            let stepped = total.stepped::<J>(column, &after);
+            Some((stepped.error(&stepped.solution()?.beta), from))
+        };
+        let mut left: Vec<(f64, usize)> = places.rev().filter_map(of).collect();
+        left.reverse();
+        left
     }
 
     /// The blocks of several as one.
@@ -168,17 +212,7 @@ impl<const K: usize> BlockRegression<K> {
         if self.blocks.len() <= K {
             return None;
         }
-        let total = Sums::total(&self.blocks);
-        // Columns in units of their own length, so that the factorisation sees correlations and not units.
-        let scale: [f64; K] = std::array::from_fn(|i| total.gram[i][i].sqrt());
-        if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
-            return None;
-        }
-        let gram = DMatrix::from_fn(K, K, |i, j| total.gram[i][j] / (scale[i] * scale[j]));
-        let inverse = Cholesky::new(gram)?.inverse();
-        let scaled = &inverse * DVector::from_fn(K, |i, _| total.moment[i] / scale[i]);
-        let beta: [f64; K] = std::array::from_fn(|i| scaled[i] / scale[i]);
-        beta.iter().all(|beta| beta.is_finite()).then_some(Solution { beta, scale, inverse })
+        Sums::total(&self.blocks).solution()
     }
 
     /// Rows added.
@@ -189,10 +223,33 @@ impl<const K: usize> BlockRegression<K> {
     /// Sum of squared errors of each block under the common least-squares fit. `None` as in [`BlockRegression::estimates`].
     pub fn errors(&self) -> Option<Vec<f64>> {
         let beta = self.solution()?.beta;
-        let error = |sums: &Sums<K>| {
-            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j]).sum::<f64>();
-            (sums.square + (0..K).map(|i| beta[i] * (fitted(i) - 2.0 * sums.moment[i])).sum::<f64>()).max(0.0)
-        };
-        Some(self.blocks.iter().map(error).collect())
+        Some(self.blocks.iter().map(|sums| sums.error(&beta)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use phyture_kernels::random::Stream;
+
+    #[test]
+    fn steps_are_those_of_the_stepped_regressions() {
+        let stream = Stream::new(5, 0, 0, 0);
+        let drawn = |index: u64| stream.uniform(index) - 0.5;
+        let mut regression = BlockRegression::<3>::new();
+        for index in 0..600 {
+            let row = [1.0, drawn(3 * index), drawn(3 * index + 1)];
+            let block = index as usize / 20;
+            let gain = if block < 17 { 2.0 } else { 3.0 };
+            regression.add((0, block), &row, 0.5 + gain * row[1] - row[2] + 0.3 * drawn(3 * index + 2));
+        }
+        let found = regression.steps::<4>(1, 4..27);
+        assert_eq!(found.iter().map(|step| step.1).collect::<Vec<_>>(), (4..27).collect::<Vec<_>>());
+        for (left, from) in &found {
+            let errors = regression.stepped::<4>(1, *from).errors().map(|errors| errors.iter().sum::<f64>());
+            assert!(errors.is_some_and(|errors| (left / errors - 1.0).abs() < 1e-9), "{from}: {left} {errors:?}");
+        }
+        assert_eq!(found.iter().min_by(|one, other| one.0.total_cmp(&other.0)).map(|step| step.1), Some(17));
+        assert!(regression.part(0..4).steps::<4>(1, 1..3).is_empty() && regression.steps::<4>(1, 4..31).is_empty());
     }
 }

@@ -112,8 +112,8 @@ fn switch(regression: &BlockRegression<COLUMNS>, stick: usize) -> Option<(f64, u
     let whole = errors(regression.errors())?;
     let with = |from: usize| regression.stepped::<{ COLUMNS + 1 }>(FIRST + stick, from);
     let places = BESIDE..(regression.blocks() + 1).saturating_sub(BESIDE);
-    let left = places.filter_map(|from| Some((errors(with(from).errors())?, from)));
-    let (left, from) = left.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let left = regression.steps::<{ COLUMNS + 1 }>(FIRST + stick, places);
+    let (left, from) = left.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
     let estimates = with(from).estimates()?;
     let (before, step) = (estimates[FIRST + stick], estimates[COLUMNS]);
     let half = 0.5 * (step.interval[1] - step.interval[0]);

@@ -130,8 +130,8 @@ fn step(regression: &BlockRegression<{ CONSTANT + 1 }>, stick: usize, least: f64
     let whole = errors(regression.errors())?;
     let with = |from: usize| regression.stepped::<{ CONSTANT + 2 }>(CONSTANT, from);
     let places = BESIDE..regression.blocks().saturating_sub(BESIDE) + 1;
-    let left = places.filter_map(|from| Some((errors(with(from).errors())?, from)));
-    let (left, from) = left.min_by(|one, other| one.0.total_cmp(&other.0))?;
+    let left = regression.steps::<{ CONSTANT + 2 }>(CONSTANT, places);
+    let (left, from) = left.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
     let estimates = with(from).estimates()?;
     let (gain, step) = (estimates[FIRST + stick], estimates[CONSTANT + 1]);
     let half = 0.5 * (step.interval[1] - step.interval[0]);
