@@ -152,6 +152,15 @@ fn a_stream_gives_the_same_bits_as_a_flight() -> Result<()> {
         stream.reset(flight.start_s);
         for sample in 0..flight.len() {
             let state = flight.state(sample);
+            if sample == 100 {
+                // What is no number is not taken: nothing of it stays in what remembers.
+                let mut broken = state;
+                broken[Column::Vy as usize] = f64::NAN;
+                let refused = |found: Result<PerChannel<f64>>| found.map_err(|error| error.to_string()).err().unwrap_or_default();
+                let said = refused(stream.push_with(&broken, &[12.0]));
+                assert!(said.contains("sample 100: `vy` is NaN"), "{said}");
+                assert!(refused(stream.push_with(&state, &[f64::INFINITY])).contains("`battery` is inf"));
+            }
             let found = stream.push_with(&state, &[flight.extra["battery"][sample]])?;
             for (channel, values) in predicted.pairs() {
                 assert_eq!(found[channel].to_bits(), values[sample].to_bits(), "round {round}, sample {sample}, channel {channel}");

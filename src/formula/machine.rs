@@ -45,8 +45,8 @@ pub(super) struct Recalled<'a> {
 pub struct Machine {
     steps: Vec<Step>,
     pub(super) memory: Vec<Memory>,
-    /// One column a slot; those of constants are filled once.
-    columns: Vec<Vec<f64>>,
+    /// The columns, one behind the other, each as long as a block; those of constants are filled once.
+    columns: Vec<f64>,
     roots: Vec<Slot>,
     /// Index in the graph's inputs of each column that is read; those of values that are given follow them.
     inputs: Vec<usize>,
@@ -143,9 +143,17 @@ impl Machine {
         }
         machine.roots = roots.iter().map(|root| slots.of(*root)).collect();
         machine.block = (NUMBERS_AT_ONCE / slots.count.max(1)).clamp(SHORTEST_BLOCK, LONGEST_BLOCK);
-        machine.columns = vec![vec![0.0; machine.block]; slots.count];
-        constants.iter().for_each(|&(slot, value)| machine.columns[slot as usize].fill(value));
+        machine.columns = vec![0.0; machine.block * slots.count];
+        let block = machine.block;
+        constants.iter().for_each(|&(slot, value)| machine.columns[slot as usize * block..][..block].fill(value));
         Ok(machine)
+    }
+
+    /// The same for one sample at a time. What a sample touches then lies side by side: in flight, long after the last one, it comes from far away.
+    #[must_use]
+    pub fn one_by_one(self) -> Self {
+        let columns = self.columns.iter().step_by(self.block).copied().collect();
+        Self { columns, block: 1, ..self }
     }
 
     /// Adds what takes a column from outside.
@@ -230,16 +238,22 @@ impl Machine {
         recall: &mut dyn FnMut(usize, Recalled<'_>),
     ) {
         assert!(samples <= self.block, "{samples} samples at once, at most {}", self.block);
-        let Self { steps, columns, isa, .. } = self;
+        let Self { steps, columns, isa, block, .. } = self;
+        let block = *block;
         for step in steps {
             let (Step::Input { out, .. }
             | Step::One { out, .. }
             | Step::Two { out, .. }
             | Step::PowerInteger { out, .. }
             | Step::Recall { out, .. }) = *step;
-            let mut result = std::mem::take(&mut columns[out as usize]);
+            // What is filled, and the columns before and behind it, which are read.
+            let (before, rest) = columns.split_at_mut(out as usize * block);
+            let (result, behind) = rest.split_at_mut(block);
             let values = &mut result[..samples];
-            let column = |slot: Slot| &columns[slot as usize][..samples];
+            let column = |slot: Slot| match slot.checked_sub(out + 1) {
+                Some(slot) => &behind[slot as usize * block..][..samples],
+                None => &before[slot as usize * block..][..samples],
+            };
             match *step {
                 Step::Input { input: index, .. } => values.copy_from_slice(input(index as usize)),
                 Step::One { operation, x, .. } => operation.of_column(*isa, column(x), values),
@@ -250,13 +264,12 @@ impl Machine {
                     recall(index as usize, Recalled { isa: *isa, signal, number, tangents, out: values });
                 }
             }
-            columns[out as usize] = result;
         }
     }
 
     /// Values of a root at the samples last taken, in front.
     pub fn root(&self, index: usize) -> &[f64] {
-        &self.columns[self.roots[index] as usize]
+        &self.columns[self.roots[index] as usize * self.block..][..self.block]
     }
 }
 
@@ -313,6 +326,11 @@ impl StreamingFormula {
     /// The columns it reads, in the order in which [`StreamingFormula::push`] takes their samples.
     pub fn inputs(&self) -> &[String] {
         &self.inputs
+    }
+
+    /// The same for one sample at a time, as [`Machine::one_by_one`].
+    pub(crate) fn one_by_one(self) -> Self {
+        Self { machine: self.machine.one_by_one(), ..self }
     }
 
     /// Forgets the past.

@@ -321,7 +321,8 @@ impl StreamingModel {
         model.check()?;
         let mut composer = Composer::new();
         let composed = composer.add(model, None, false)?;
-        let bound = Bound::new(&composer, composed.channels.values(), step_s, None)?;
+        let Bound { sources, extras, machine } = Bound::new(&composer, composed.channels.values(), step_s, None)?;
+        let bound = Bound { sources, extras, machine: machine.one_by_one() };
         // Pushing allocates nothing.
         let values = Vec::with_capacity(bound.sources.len());
         Ok(Self { bound, step_s, start_s: 0.0, samples: 0, values })
@@ -353,7 +354,8 @@ impl StreamingModel {
     /// [`Column::STATE`].
     ///
     /// # Errors
-    /// [`Error::Shape`] if the model reads further columns.
+    /// [`Error::Shape`] if the model reads further columns; [`Error::Undetermined`] if something that it reads is no finite number: operators that remember
+    /// would not forget it. The sample is then not taken.
     pub fn push(&mut self, state: &[f64; 16]) -> Result<PerChannel<f64>> {
         self.push_with(state, &[])
     }
@@ -361,7 +363,7 @@ impl StreamingModel {
     /// As [`StreamingModel::push`], with one number for each of [`StreamingModel::extra_inputs`].
     ///
     /// # Errors
-    /// [`Error::Shape`] if their count differs.
+    /// As [`StreamingModel::push`]; [`Error::Shape`] if their count differs.
     pub fn push_with(&mut self, state: &[f64; 16], extra: &[f64]) -> Result<PerChannel<f64>> {
         let Bound { sources, extras, machine } = &mut self.bound;
         if extra.len() != extras.len() {
@@ -369,7 +371,6 @@ impl StreamingModel {
             return Err(Error::Shape { operation: "streaming model", message });
         }
         let time_s = self.start_s + self.step_s * self.samples as f64;
-        self.samples += 1;
         self.values.clear();
         for source in sources.iter() {
             match source {
@@ -378,6 +379,16 @@ impl StreamingModel {
                 Source::Extra(index) => self.values.push(extra[*index]),
             }
         }
+        if let Some(place) = self.values.iter().position(|value| !value.is_finite()) {
+            let name = match &sources[place] {
+                Source::State(column) => column.name(),
+                Source::Derived(derived) => derived.name(),
+                Source::Extra(index) => &extras[*index],
+            };
+            let message = format!("sample {}: `{name}` is {}, not a finite number", self.samples, self.values[place]);
+            return Err(Error::Undetermined(message));
+        }
+        self.samples += 1;
         let values = &self.values;
         machine.advance(1, &|input| &values[input..=input]);
         Ok(PerChannel::from_fn(|channel| machine.root(channel.index())[0]))

@@ -12,6 +12,7 @@ use phyture::flight::{DataSet, Flight};
 use phyture::physics::Model;
 use phyture::tape::Threads;
 use phyture::{Error, Result, workflow};
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -216,19 +217,41 @@ pub fn data_sha256(set: &DataSet) -> String {
     set.source.sha256.clone()
 }
 
-/// A flag that Ctrl-C (and a polite kill) raises; the second time it ends the program at once. Installed once.
-pub fn interruption() -> Result<Arc<AtomicBool>> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let raised = Arc::clone(&flag);
+/// Work that Ctrl-C (and a polite kill) asks to stop, as long as this lives: a flag that it raises. The second time, and once this is gone, it ends
+/// the program at once.
+pub struct Interruption {
+    raised: Arc<AtomicBool>,
+    over: Arc<AtomicBool>,
+}
+
+impl Deref for Interruption {
+    type Target = AtomicBool;
+
+    fn deref(&self) -> &AtomicBool {
+        &self.raised
+    }
+}
+
+impl Drop for Interruption {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Listens to Ctrl-C. Installed once.
+pub fn interruption() -> Result<Interruption> {
+    let made = Interruption { raised: Arc::default(), over: Arc::default() };
+    let (raised, over) = (Arc::clone(&made.raised), Arc::clone(&made.over));
     let raise = move || {
-        if raised.swap(true, Ordering::Relaxed) {
+        if raised.swap(true, Ordering::Relaxed) || over.load(Ordering::Relaxed) {
             std::process::exit(crate::INTERRUPTED.into());
         }
     };
     ctrlc::set_handler(raise)
         .map_err(|error| Error::Undetermined(format!("the handler of Ctrl-C cannot be installed: {error}")))?;
-    Ok(flag)
+    Ok(made)
 }
+
 /// A number of things, in words for one and for several.
 fn counted(count: usize, one: &str, several: &str) -> String {
     format!("{count} {}", if count == 1 { one } else { several })
