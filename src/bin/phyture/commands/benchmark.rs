@@ -335,8 +335,8 @@ impl Queue<'_> {
             let working = self.folder.working(&key);
             let outcome = self.experiment.run(run, &working, &mut |share| {
                 self.experiment.take_notes().iter().for_each(|note| self.context.say(note));
-                // What has no steps to count is taken to need its time.
-                let gone = (share * cost).max(begun.elapsed().as_secs_f64().min(0.95 * cost));
+                // What has no steps to count is taken to need its time; steps are believed, however long they take.
+                let gone = if share > 0.0 { share * cost } else { begun.elapsed().as_secs_f64().min(0.95 * cost) };
                 progress.at((1e3 * (behind + gone)) as u64, || format!("run {} of {}: {run}", index + 1, self.left.len()));
                 !interrupted.load(Ordering::Relaxed)
             })?;
