@@ -7,7 +7,7 @@
 //! cargo run --release --features sim --example stream_a_hybrid -- run/network.safetensors
 //! ```
 //!
-//! It needs none of the features: what runs on board reads no logs. Here the built-in helicopter stands in for the aircraft.
+//! It needs the default features alone: what runs on board reads no logs. Here the built-in helicopter stands in for the aircraft.
 
 use phyture::flight::{Channel, PerChannel};
 use phyture::hybrid::Hybrid;

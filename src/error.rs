@@ -5,7 +5,9 @@
 
 use phyture_kernels::instruction_set::{ENVIRONMENT_VARIABLE, InstructionSetError};
 use std::io;
-use std::path::{Path, PathBuf};
+#[cfg(feature = "disk")]
+use std::path::Path;
+use std::path::PathBuf;
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -141,6 +143,7 @@ impl Error {
 
     /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`. Where the folder of the path is what is
     /// missing, it says so.
+    #[cfg(feature = "disk")]
     pub fn io(path: impl Into<PathBuf>) -> impl FnOnce(io::Error) -> Self {
         let path = path.into();
         move |source| {
@@ -157,6 +160,7 @@ impl Error {
 }
 
 /// The uppermost folder on the way to a file that is not there.
+#[cfg(feature = "disk")]
 fn missing_folder(path: &Path) -> Option<&Path> {
     let absent = |folder: &&Path| !folder.as_os_str().is_empty() && matches!(folder.try_exists(), Ok(false));
     path.ancestors().skip(1).take_while(absent).last()
@@ -204,6 +208,7 @@ mod tests {
         assert_eq!(error.to_string(), "formula: unknown name `vq`\n  vx + vq\n       ^");
     }
 
+    #[cfg(feature = "disk")]
     #[test]
     fn the_operating_systems_words_become_sentences_without_numbers() {
         let message = |kind: io::ErrorKind| Error::io("a.csv")(kind.into()).to_string();

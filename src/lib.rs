@@ -42,6 +42,7 @@
 
 pub mod blocks;
 pub mod critique;
+#[cfg(feature = "disk")]
 pub mod disk;
 pub mod error;
 pub mod flight;
@@ -55,6 +56,7 @@ pub mod protocol;
 pub mod report;
 #[cfg(feature = "sim")]
 pub mod sim;
+mod stopwatch;
 pub mod student_t;
 #[cfg(feature = "studio")]
 pub mod studio;

@@ -254,6 +254,7 @@ fn the_result_is_stored_under_the_agreed_keys() -> Result<()> {
     Ok(())
 }
 
+#[cfg(feature = "disk")]
 #[test]
 fn a_model_fits_into_a_binary_container() -> Result<()> {
     let truth = randomised(paper(), 2);

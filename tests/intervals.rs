@@ -1,5 +1,5 @@
 //! What a hybrid promises of its predictions: intervals that hold on flights no training saw, and an envelope that such flights may leave.
-#![cfg(feature = "sim")]
+#![cfg(all(feature = "disk", feature = "sim"))]
 
 use phyture::critique::{Coverage, coverage};
 use phyture::flight::split::{Protocol, Split};

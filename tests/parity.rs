@@ -1,5 +1,6 @@
 //! Agreement with another program's Phy-Ture: outputs, loss, every gradient, one Adam step. Needs the exported files; says so
 //! and passes where they are absent.
+#![cfg(feature = "disk")]
 
 use phyture::Result;
 use phyture::nn::parity;

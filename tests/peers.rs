@@ -1,5 +1,6 @@
 //! The peer networks: gradients of each against differences, agreement with PyTorch on the golden files, the same bits on any number
 //! of threads, and a training step.
+#![cfg(feature = "disk")]
 
 use phyture::nn::{Architecture, Network, OutputScale, parity};
 use phyture::tape::{DropoutKey, Session, Threads, gradcheck};

@@ -12,7 +12,7 @@
 //!
 //! All but gelu take their derivative from their own output, so that the input need not be kept.
 
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
+use core::f64::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 
 use crate::elementary::{erf, exp, sigmoid, tanh};
 use crate::instruction_set::{InstructionSet, Isa, Kernel};

@@ -39,8 +39,8 @@ pub fn step<T: Real>(
     let n = parameters.len();
     assert!(gradient.len() == n && first.len() == n && second.len() == n, "adam: {n} parameters, other slices differ");
     // powi takes i32; powf keeps every step number.
-    let correction1 = 1.0 - adam.beta1.powf(step as f64);
-    let correction2 = 1.0 - adam.beta2.powf(step as f64);
+    let correction1 = 1.0 - Real::powf(adam.beta1, step as f64);
+    let correction2 = 1.0 - Real::powf(adam.beta2, step as f64);
     T::adam_step(
         isa,
         Step {
@@ -50,7 +50,7 @@ pub fn step<T: Real>(
             rest1: T::of(1.0 - adam.beta1),
             rest2: T::of(1.0 - adam.beta2),
             rate: T::of(adam.learning_rate / correction1),
-            root: T::of(1.0 / correction2.sqrt()),
+            root: T::of(1.0 / Real::sqrt(correction2)),
             epsilon: T::of(adam.epsilon),
             gradient,
             parameters,

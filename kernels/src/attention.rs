@@ -84,19 +84,19 @@ impl Shape {
 
     /// 1/√d_k
     fn scale<T: Real>(&self) -> T {
-        T::of(1.0 / (self.size as f64).sqrt())
+        T::of(1.0 / Real::sqrt(self.size as f64))
     }
 
     /// log₂e/√d_k
     fn score_scale<T: Real>(&self) -> T {
-        T::of(std::f64::consts::LOG2_E / (self.size as f64).sqrt())
+        T::of(core::f64::consts::LOG2_E / Real::sqrt(self.size as f64))
     }
 }
 
 /// Takes `len` numbers off the front of the scratch.
 #[inline(always)]
 fn take<'a, T>(scratch: &mut &'a mut [T], len: usize) -> &'a mut [T] {
-    let (taken, rest) = std::mem::take(scratch).split_at_mut(len);
+    let (taken, rest) = core::mem::take(scratch).split_at_mut(len);
     *scratch = rest;
     taken
 }

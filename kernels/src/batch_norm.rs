@@ -57,7 +57,7 @@ pub fn combine<T: Real>(parts: &[T], rows: usize, total: &mut [T]) {
     for (c, (mean, variance)) in mean.iter_mut().zip(variance).enumerate() {
         let of = |at: usize| parts.iter().skip(at).step_by(2 * channels).map(|part| part.f64());
         let all = of(c).sum::<f64>() / samples as f64;
-        let between: f64 = of(c).map(|part| (part - all).powi(2)).sum();
+        let between: f64 = of(c).map(|part| (part - all) * (part - all)).sum();
         let within: f64 = of(channels + c).sum();
         *mean = T::of(all);
         *variance = T::of((within / rows as f64 + between) / samples as f64);

@@ -25,7 +25,7 @@ impl Mask {
     /// Drops each element with probability `rate`, 0 ≤ rate < 1 (other values are clamped into that range; NaN is 0).
     pub fn new(stream: Stream, rate: f64) -> Self {
         // A float-to-integer cast saturates, and so does the rate.
-        Self { stream, dropped: (rate * HALVES).round() as u16 }
+        Self { stream, dropped: Real::round(rate * HALVES) as u16 }
     }
 
     /// The mask's words for one row.

@@ -59,7 +59,7 @@ impl Elementary for f32 {
     const ERFCX: &'static [Self] =
         &[-9.56533318e-5, 0.284014921, 0.265512955, 0.327061703, -0.0598443775, 0.50851586, -0.433586576, 0.108398193];
     const LN_2: [Self; 2] = [0.693_359_375, -2.121_944_4e-4];
-    const LOG2_E: Self = std::f32::consts::LOG2_E;
+    const LOG2_E: Self = core::f32::consts::LOG2_E;
     const EXP_RANGE: [Self; 2] = [-104.0, 89.0];
     const ROUNDER: Self = 12_582_912.0;
     const EXP_SUBNORMAL: Self = -87.0;
@@ -94,7 +94,7 @@ impl Elementary for f64 {
         2.5100424157005067e-8,
     ];
     const POWER: &'static [Self] = &[
-        std::f64::consts::LN_2,
+        core::f64::consts::LN_2,
         0.24022650695910071,
         0.055504108664821627,
         0.0096181291076284795,
@@ -155,7 +155,7 @@ impl Elementary for f64 {
         0.007301134995856917,
     ];
     const LN_2: [Self; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-    const LOG2_E: Self = std::f64::consts::LOG2_E;
+    const LOG2_E: Self = core::f64::consts::LOG2_E;
     const EXP_RANGE: [Self; 2] = [-746.0, 710.0];
     const ROUNDER: Self = 6_755_399_441_055_744.0;
     const EXP_SUBNORMAL: Self = -708.0;

@@ -16,8 +16,8 @@ pub fn sinusoidal<T: Real>(mut table: RowsMut<'_, T>) {
     let width = table.cols() as f64;
     for p in 0..table.rows() {
         for (c, value) in table.row_mut(p).iter_mut().enumerate() {
-            let angle = p as f64 * BASE.powf(-((c - c % 2) as f64) / width);
-            *value = T::of(if c % 2 == 0 { angle.sin() } else { angle.cos() });
+            let angle = p as f64 * Real::powf(BASE, -((c - c % 2) as f64) / width);
+            *value = T::of(if c % 2 == 0 { Real::sin(angle) } else { Real::cos(angle) });
         }
     }
 }

@@ -4,19 +4,25 @@
 //! has that level's instructions enabled, so that the compiler turns the same loops into wider registers. This file is the only
 //! place that calls such a function, and so the only place where the choice has to be argued to be safe.
 //!
+//! Without the feature `std` nobody can ask the processor: the levels are those that the whole program was compiled for.
+//!
 //! Not here: any arithmetic.
 
-use std::fmt;
-use std::marker::PhantomData;
-use std::sync::OnceLock;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+use core::marker::PhantomData;
 
 use crate::Real;
+use crate::maths::MUL_ADD_IS_INLINE;
 use crate::vector::Vector;
 
 /// Environment variable that forces a level: `plain`, `avx2`, `avx512` or `neon`.
 pub const ENVIRONMENT_VARIABLE: &str = "PHYTURE_ISA";
 
-/// A level this processor is known to have. Values other than [`InstructionSet::PLAIN`] exist only after the processor was asked.
+/// A level this processor is known to have. Values other than [`InstructionSet::PLAIN`] exist only after the processor was asked, or where the program
+/// was compiled for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InstructionSet(Kind);
 
@@ -57,24 +63,34 @@ impl fmt::Display for InstructionSetError {
     }
 }
 
-impl std::error::Error for InstructionSetError {}
+impl core::error::Error for InstructionSetError {}
 
 impl InstructionSet {
     /// What every processor of the architecture has.
     pub const PLAIN: Self = Self(Kind::Plain);
 
-    /// The level named in `PHYTURE_ISA`, otherwise the best one of this processor. Decided once a process.
+    /// The level named in `PHYTURE_ISA`, otherwise the best one of this processor. Decided once a process. Without the feature `std` no
+    /// environment is read: the best one that the program was compiled for.
     ///
     /// # Errors
     /// If `PHYTURE_ISA` names a level that is unknown or not available; nothing else is silently used in its place.
     pub fn detect() -> Result<Self, InstructionSetError> {
-        static CHOSEN: OnceLock<Result<InstructionSet, InstructionSetError>> = OnceLock::new();
-        CHOSEN
-            .get_or_init(|| match std::env::var_os(ENVIRONMENT_VARIABLE) {
-                Some(name) if !name.is_empty() => Self::named(&name.to_string_lossy()),
-                _ => Ok(Self::available().last().copied().unwrap_or(Self::PLAIN)),
-            })
-            .clone()
+        #[cfg(feature = "std")]
+        {
+            static CHOSEN: std::sync::OnceLock<Result<InstructionSet, InstructionSetError>> = std::sync::OnceLock::new();
+            CHOSEN
+                .get_or_init(|| match std::env::var_os(ENVIRONMENT_VARIABLE) {
+                    Some(name) if !name.is_empty() => Self::named(&name.to_string_lossy()),
+                    _ => Ok(Self::best()),
+                })
+                .clone()
+        }
+        #[cfg(not(feature = "std"))]
+        Ok(Self::best())
+    }
+
+    fn best() -> Self {
+        Self::available().last().copied().unwrap_or(Self::PLAIN)
     }
 
     /// The level of this name.
@@ -102,7 +118,7 @@ impl InstructionSet {
     pub(crate) fn run<K: Kernel>(self, kernel: K) {
         match self.0 {
             #[cfg(target_arch = "x86_64")]
-            // SAFETY: a InstructionSet of this kind is made only by `named` and `available`, after the processor reported avx2 and fma.
+            // SAFETY: an InstructionSet of this kind is made only by `named` and `available`, after `has` said that there are avx2 and fma.
             Kind::Avx2 => unsafe { avx2(kernel) },
             #[cfg(target_arch = "x86_64")]
             // SAFETY: as above, for avx512f, avx512bw, avx512dq, avx512vl, avx2 and fma.
@@ -127,22 +143,36 @@ impl fmt::Display for InstructionSet {
     }
 }
 
+/// Whether there are these kinds of instructions: what the processor says or, without the feature `std`, what the program was compiled for.
+#[cfg(all(feature = "std", target_arch = "x86_64"))]
+macro_rules! has {
+    ($($feature:tt),*) => {
+        $(std::arch::is_x86_feature_detected!($feature))&&*
+    };
+}
+#[cfg(all(feature = "std", target_arch = "aarch64"))]
+macro_rules! has {
+    ($($feature:tt),*) => {
+        $(std::arch::is_aarch64_feature_detected!($feature))&&*
+    };
+}
+#[cfg(all(not(feature = "std"), any(target_arch = "x86_64", target_arch = "aarch64")))]
+macro_rules! has {
+    ($($feature:tt),*) => {
+        cfg!(all($(target_feature = $feature),*))
+    };
+}
+
 impl Kind {
     fn is_available(self) -> bool {
         match self {
             Self::Plain => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Self::Avx2 => has!("avx2", "fma"),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => {
-                is_x86_feature_detected!("avx512f")
-                    && is_x86_feature_detected!("avx512bw")
-                    && is_x86_feature_detected!("avx512dq")
-                    && is_x86_feature_detected!("avx512vl")
-                    && Self::Avx2.is_available()
-            }
+            Self::Avx512 => has!("avx512f", "avx512bw", "avx512dq", "avx512vl", "avx2", "fma"),
             #[cfg(target_arch = "aarch64")]
-            Self::Neon => std::arch::is_aarch64_feature_detected!("neon"),
+            Self::Neon => has!("neon"),
             _ => false,
         }
     }
@@ -210,7 +240,7 @@ pub(crate) trait Isa {
     /// a·b + c, rounded once where the level can.
     #[inline(always)]
     fn mul_add<T: Real>(a: T, b: T, c: T) -> T {
-        if Self::FMA { a.mul_add(b, c) } else { a * b + c }
+        if Self::FMA && MUL_ADD_IS_INLINE { a.mul_add(b, c) } else { a * b + c }
     }
 }
 
@@ -299,6 +329,7 @@ mod tests {
         assert_eq!(InstructionSet::named(missing), Err(InstructionSetError::Unavailable(missing)));
     }
 
+    #[cfg(feature = "std")]
     #[test]
     fn the_environment_variable_decides() {
         let expected = match std::env::var(ENVIRONMENT_VARIABLE) {

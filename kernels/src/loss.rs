@@ -10,7 +10,8 @@ use crate::{Real, Rows, RowsMut, Write};
 /// weight·Σ (y − target)², summed in f64.
 pub fn squared_error<T: Real>(y: Rows<'_, T>, target: Rows<'_, T>, weight: f64) -> f64 {
     same_shape(&y, &target);
-    let row = |i: usize| y.row(i).iter().zip(target.row(i)).map(|(y, t)| (y.f64() - t.f64()).powi(2)).sum::<f64>();
+    let square = |(y, t): (&T, &T)| (y.f64() - t.f64()) * (y.f64() - t.f64());
+    let row = |i: usize| y.row(i).iter().zip(target.row(i)).map(square).sum::<f64>();
     weight * (0..y.rows()).map(row).sum::<f64>()
 }
 

@@ -35,7 +35,7 @@ impl Geometry {
     }
 
     #[inline(always)]
-    fn window(self, t: usize, rows: usize) -> std::ops::Range<usize> {
+    fn window(self, t: usize, rows: usize) -> core::ops::Range<usize> {
         let first = t * self.stride;
         first.saturating_sub(self.padding)..(first + self.width - self.padding).min(rows)
     }

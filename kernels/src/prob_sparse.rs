@@ -32,7 +32,7 @@ pub struct Sparse {
 impl Sparse {
     /// U of the keys, or u of the queries, for so many.
     pub fn chosen(self, length: usize) -> usize {
-        (self.factor * (length as f64).ln().ceil() as usize).clamp(1, length.max(1))
+        (self.factor * Real::ceil(Real::ln(length as f64)) as usize).clamp(1, length.max(1))
     }
 
     /// Numbers kept for the backward pass.
@@ -81,7 +81,7 @@ pub fn forward<T: Real>(
         let gathered = Rows::packed(gathered, count, size);
         let mut map = RowsMut::packed(&mut probabilities[h * count * keys..][..count * keys], count, keys);
         gemm::abt(isa, gathered, k.columns(h * size, size), map.reborrow(), Write::Set, scratch);
-        let scale = T::of(1.0 / (size as f64).sqrt());
+        let scale = T::of(1.0 / Real::sqrt(size as f64));
         T::prob_sparse_softmax(isa, Softmax { scale, chosen: sparse.masked.then_some(&*chosen), map: map.reborrow() });
         let mut sums = RowsMut::packed(&mut *result, count, size);
         gemm::ab(isa, map.view(), v.columns(h * size, size), sums.reborrow(), Write::Set, scratch);
@@ -272,7 +272,7 @@ pub fn backward<T: Real>(
     let (gathered_o, scratch) = scratch.split_at_mut(count * size);
     let (result, scratch) = scratch.split_at_mut(count * size);
     let (dmap, scratch) = scratch.split_at_mut(count * keys);
-    let scale = T::of(1.0 / (size as f64).sqrt());
+    let scale = T::of(1.0 / Real::sqrt(size as f64));
     for (h, chosen) in chosen.chunks_exact(count).enumerate() {
         let (start, width) = (h * size, size);
         gather(q.columns(start, width), chosen, gathered_q);

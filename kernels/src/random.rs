@@ -7,6 +7,8 @@
 //! 2011), keyed before its first and inside its second round, so that two streams are not shifted copies of each other.
 //! For dropout and initial weights; not for secrets.
 
+use alloc::vec::Vec;
+
 /// Where in a run random words are drawn: the seed, and what makes this draw different from all others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream {

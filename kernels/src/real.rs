@@ -1,11 +1,12 @@
 //! The two float types the kernels are written for, as one trait.
 
-use std::fmt::{Debug, Display};
-use std::iter::Sum;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
+use core::fmt::{Debug, Display};
+use core::iter::Sum;
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
 use crate::compiled::Compiled;
 use crate::elementary::Elementary;
+use crate::maths;
 use crate::registers::Registers;
 
 /// f32 or f64: one generic source, two instantiations.
@@ -33,8 +34,18 @@ pub trait Real:
     fn ln(self) -> Self;
     /// tanh x
     fn tanh(self) -> Self;
+    /// sin x
+    fn sin(self) -> Self;
+    /// cos x
+    fn cos(self) -> Self;
     /// √x
     fn sqrt(self) -> Self;
+    /// x to a power
+    fn powf(self, exponent: Self) -> Self;
+    /// The smallest whole number that is not below x.
+    fn ceil(self) -> Self;
+    /// The nearest whole number, from the middle between two away from 0.
+    fn round(self) -> Self;
     /// |x|
     fn abs(self) -> Self;
     /// self·a + b, rounded once
@@ -46,7 +57,7 @@ pub trait Real:
 }
 
 macro_rules! real {
-    ($t:ident) => {
+    ($t:ident, $maths:ident) => {
         impl Real for $t {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
@@ -62,19 +73,39 @@ macro_rules! real {
             }
             #[inline(always)]
             fn exp(self) -> Self {
-                $t::exp(self)
+                maths::$maths::exp(self)
             }
             #[inline(always)]
             fn ln(self) -> Self {
-                $t::ln(self)
+                maths::$maths::ln(self)
             }
             #[inline(always)]
             fn tanh(self) -> Self {
-                $t::tanh(self)
+                maths::$maths::tanh(self)
+            }
+            #[inline(always)]
+            fn sin(self) -> Self {
+                maths::$maths::sin(self)
+            }
+            #[inline(always)]
+            fn cos(self) -> Self {
+                maths::$maths::cos(self)
             }
             #[inline(always)]
             fn sqrt(self) -> Self {
-                $t::sqrt(self)
+                maths::$maths::sqrt(self)
+            }
+            #[inline(always)]
+            fn powf(self, exponent: Self) -> Self {
+                maths::$maths::powf(self, exponent)
+            }
+            #[inline(always)]
+            fn ceil(self) -> Self {
+                maths::$maths::ceil(self)
+            }
+            #[inline(always)]
+            fn round(self) -> Self {
+                maths::$maths::round(self)
             }
             #[inline(always)]
             fn abs(self) -> Self {
@@ -82,7 +113,7 @@ macro_rules! real {
             }
             #[inline(always)]
             fn mul_add(self, a: Self, b: Self) -> Self {
-                $t::mul_add(self, a, b)
+                maths::$maths::mul_add(self, a, b)
             }
             #[inline(always)]
             fn is_sign_negative(self) -> bool {
@@ -96,5 +127,5 @@ macro_rules! real {
     };
 }
 
-real!(f32);
-real!(f64);
+real!(f32, single);
+real!(f64, double);

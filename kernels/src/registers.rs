@@ -54,15 +54,15 @@ macro_rules! registers {
         #[expect(private_bounds, reason = "as above")]
         impl Registers for $t {
             #[cfg(target_arch = "x86_64")]
-            type Plain = std::arch::x86_64::$sse;
+            type Plain = core::arch::x86_64::$sse;
             #[cfg(not(target_arch = "x86_64"))]
             type Plain = Array<$t, { $lanes }, false>;
             #[cfg(target_arch = "x86_64")]
-            type Avx2 = std::arch::x86_64::$avx2;
+            type Avx2 = core::arch::x86_64::$avx2;
             #[cfg(target_arch = "x86_64")]
-            type Avx512 = std::arch::x86_64::$avx512;
+            type Avx512 = core::arch::x86_64::$avx512;
             #[cfg(target_arch = "aarch64")]
-            type Neon = std::arch::aarch64::$neon;
+            type Neon = core::arch::aarch64::$neon;
             registers!(@tiles plain_tile plain_tall_tile Plain $plain);
             #[cfg(target_arch = "x86_64")]
             registers!(@tiles avx2_tile avx2_tall_tile crate::instruction_set::Avx2 $avx2_tile);

@@ -9,7 +9,8 @@
 //! radix r combines r stretches of rows, all channels of a stretch side by side. 1000 = 2³·5³ takes six passes; a prime length is its
 //! own definition. The gradient needs the chosen frequencies only.
 
-use std::cmp::Ordering;
+use alloc::vec::Vec;
+use core::cmp::Ordering;
 
 use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::{Real, Rows, RowsMut};
@@ -40,8 +41,8 @@ impl Transform {
                 divisor += 1;
             }
         }
-        let point = |k: usize| (std::f64::consts::TAU * k as f64 / n as f64).sin_cos();
-        Self { n, factors, circle: (0..n).map(point).map(|(sine, cosine)| (cosine, -sine)).collect() }
+        let angle = |k: usize| core::f64::consts::TAU * k as f64 / n as f64;
+        Self { n, factors, circle: (0..n).map(angle).map(|angle| (Real::cos(angle), -Real::sin(angle))).collect() }
     }
 
     /// Rows of the sequences it is for.
@@ -81,7 +82,7 @@ impl<T: Real> Kernel for Amplitudes<'_, T> {
         let (mut from, mut to) = self.scratch.split_at_mut(2 * len);
         // An odd number of passes begins in the back half, so that the last one ends in the front.
         if factors.len() % 2 == 1 {
-            std::mem::swap(&mut from, &mut to);
+            core::mem::swap(&mut from, &mut to);
         }
         for t in 0..n {
             from[t * channels..][..channels].copy_from_slice(self.x.row(t));
@@ -91,7 +92,7 @@ impl<T: Real> Kernel for Amplitudes<'_, T> {
         let (mut stretch, mut size) = (1, n);
         for &radix in factors {
             pass::<T, I>(circle, (n, channels), (radix, stretch, size / radix), from, to);
-            std::mem::swap(&mut from, &mut to);
+            core::mem::swap(&mut from, &mut to);
             stretch *= radix;
             size /= radix;
         }

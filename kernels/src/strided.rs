@@ -88,7 +88,7 @@ impl<'a, T> Rows<'a, T> {
     {
         for i in 0..self.rows {
             for x in self.row(i).iter().step_by(CACHE_LINE_BYTES / size_of::<T>()) {
-                std::hint::black_box(*x);
+                core::hint::black_box(*x);
             }
         }
     }

@@ -75,17 +75,17 @@ impl<T: Real, const N: usize, const FMA: bool> Vector<T> for Array<T, N, FMA> {
 #[cfg_attr(target_arch = "aarch64", allow(unused_unsafe, reason = "every processor of that architecture has these instructions"))]
 mod instructions {
     #[cfg(target_arch = "aarch64")]
-    use std::arch::aarch64 as arch;
+    use core::arch::aarch64 as arch;
     #[cfg(target_arch = "x86_64")]
-    use std::arch::x86_64 as arch;
+    use core::arch::x86_64 as arch;
 
     use super::Vector;
 
     macro_rules! register {
         ($register:ident of $lanes:literal $t:ident: $splat:ident $load:ident $store:ident $add:ident $mul_add:expr) => {
             // SAFETY, of every block here: the instructions exist. A kernel meets this type only as the register of its level, and a
-            // level's kernel runs only inside the function of instruction_set.rs that enables the level's instructions, after the processor
-            // reported them. Pointers are the caller's to vouch for.
+            // level's kernel runs only inside the function of instruction_set.rs that enables the level's instructions, where the processor
+            // has them. Pointers are the caller's to vouch for.
             impl Vector<$t> for arch::$register {
                 const LANES: usize = $lanes;
                 #[inline(always)]

@@ -295,28 +295,47 @@ impl Hybrid {
         &self.description
     }
 
-    /// Writes one safetensors file: the weights under the names of the exchange with PyTorch, everything else as metadata.
+    /// Writes [`Hybrid::to_bytes`] to a file.
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
+    #[cfg(feature = "disk")]
     pub fn write(&self, path: &Path) -> Result<()> {
+        let bytes = self.to_bytes()?;
+        crate::disk::write_atomically(path, |file| file.write_all(&bytes))
+    }
+
+    /// One safetensors file: the weights under the names of the exchange with PyTorch, everything else as metadata.
+    ///
+    /// # Errors
+    /// [`Error::File`] if what it is cannot be written as JSON.
+    pub fn to_bytes(&self) -> Result<Vec<u8>> {
         let text = serde_json::to_string(&self.description)
-            .map_err(|error| Error::File { path: path.into(), message: error.to_string() })?;
+            .map_err(|error| Error::File { path: "hybrid".into(), message: error.to_string() })?;
         let tensor = |parameter: &Parameter| {
             let numbers = Numbers::F32(parameter.to_file_order(&self.parameters));
             (parameter.name.clone(), Tensor { shape: parameter.file_lengths(), numbers })
         };
         let tensors = self.network.parameters().iter().map(tensor).collect();
-        SafeTensors { metadata: [(METADATA.to_owned(), text)].into(), tensors }.write(path)
+        Ok(SafeTensors { metadata: [(METADATA.to_owned(), text)].into(), tensors }.to_bytes())
     }
 
-    /// Reads what [`Hybrid::write`] wrote. The file may come from anywhere: whatever is wrong with it is an error.
+    /// Reads what [`Hybrid::write`] wrote.
     ///
     /// # Errors
-    /// [`Error::Io`] or [`Error::File`] saying what is wrong.
+    /// [`Error::Io`] if it cannot be read; as [`Hybrid::from_bytes`].
+    #[cfg(feature = "disk")]
     pub fn read(path: &Path) -> Result<Self> {
-        let file = SafeTensors::read(path)?;
+        Self::from_bytes(&std::fs::read(path).map_err(Error::io(path))?, path)
+    }
+
+    /// From the bytes of a file, which errors name `path`; nothing is opened. They may come from anywhere: whatever is wrong with them is an error.
+    ///
+    /// # Errors
+    /// [`Error::File`] saying what is wrong.
+    pub fn from_bytes(bytes: &[u8], path: &Path) -> Result<Self> {
         let fault = |message: String| Error::File { path: path.into(), message };
+        let file = SafeTensors::parse(bytes).map_err(fault)?;
         let text = file.metadata.get(METADATA).ok_or_else(|| fault("holds no hybrid of phyture (no such metadata)".into()))?;
         let description: Description =
             serde_json::from_str(text).map_err(|error| fault(format!("its description does not read: {error}")))?;

@@ -9,6 +9,7 @@ mod configuration;
 mod error;
 mod layers;
 mod network;
+#[cfg(feature = "disk")]
 pub mod parity;
 pub mod peers;
 mod phyture;

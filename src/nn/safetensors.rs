@@ -4,10 +4,14 @@
 //! A damaged or hostile file is an [`Error::File`], never a panic, and never makes this allocate more than the file is long.
 //! Training checkpoints are another format.
 
+#[cfg(feature = "disk")]
 use crate::disk::write_atomically;
-use crate::error::{Error, Result};
+#[cfg(feature = "disk")]
+use crate::error::Error;
+use crate::error::Result;
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
+#[cfg(feature = "disk")]
 use std::path::Path;
 
 /// Longest header accepted, bytes; the limit of the format's reference implementation.
@@ -82,6 +86,7 @@ impl SafeTensors {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be read, [`Error::File`] if it is not a sound safetensors file of f32 and f64 tensors.
+    #[cfg(feature = "disk")]
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = std::fs::read(path).map_err(Error::io(path))?;
         Self::parse(&bytes).map_err(|message| Error::File { path: path.into(), message })
@@ -91,6 +96,7 @@ impl SafeTensors {
     ///
     /// # Errors
     /// [`Error::Io`] if it cannot be written.
+    #[cfg(feature = "disk")]
     pub fn write(&self, path: &Path) -> Result<()> {
         write_atomically(path, |file| file.write_all(&self.to_bytes()))
     }
@@ -216,6 +222,7 @@ mod tests {
         [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), data].concat()
     }
 
+    #[cfg(feature = "disk")]
     #[test]
     fn files_round_trip_bitwise() -> Result<()> {
         let folder = tempfile::tempdir().map_err(Error::io("temporary folder"))?;

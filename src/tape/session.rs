@@ -33,7 +33,7 @@ mod shards;
 mod update;
 
 /// Most numbers of all samples of a step in which they wait for each other: 32 GiB in f32.
-const LARGEST_STEP: usize = 1 << 33;
+const LARGEST_STEP: u64 = 1 << 33;
 
 /// Key of the random streams of one training step. With the same key the same dropout masks are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -195,10 +195,10 @@ impl<T: Real> Session<T> {
     /// Samples that wait for each other have a slab each.
     fn check_lanes(&self, samples: usize, dropout: Option<DropoutKey>) -> Result<()> {
         let numbers = samples.saturating_mul(self.plan.slab_len);
-        if self.lockstep.is_none() || dropout.is_none() || numbers <= LARGEST_STEP {
+        if self.lockstep.is_none() || dropout.is_none() || numbers as u64 <= LARGEST_STEP {
             return Ok(());
         }
-        let most = LARGEST_STEP / self.plan.slab_len.max(1);
+        let most = LARGEST_STEP / self.plan.slab_len.max(1) as u64;
         let message =
             format!("{samples} samples that wait for each other, {numbers} numbers; at most {most} samples: lower `batch`");
         Err(Error::Shape { operation: "session", message })

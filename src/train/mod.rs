@@ -4,17 +4,22 @@
 //! bit for bit the run that was not, on any number of threads.
 
 pub mod config;
+#[cfg(feature = "disk")]
 pub mod container;
 mod job;
+#[cfg(feature = "disk")]
 pub mod run;
 pub mod schedule;
 #[cfg(feature = "files")]
 mod text;
 pub mod trainer;
+#[cfg(feature = "disk")]
 mod training;
 
 pub use config::TrainConfig;
 pub use job::Job;
+#[cfg(feature = "disk")]
 pub use run::{Checkpointed, Outcome, Report, RunFolder};
 pub use trainer::{Best, EpochLoss, State, StepReport, Trainer};
+#[cfg(feature = "disk")]
 pub use training::{Begun, Ended, Event, Losses, Trained, Training};

@@ -12,9 +12,9 @@ use crate::flight::{Accelerations, DataSet, Flight, PerChannel, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::linear::LinearConfig;
 use crate::physics::Model;
+use crate::stopwatch::Stopwatch;
 use crate::tape::Threads;
 use std::collections::BTreeSet;
-use std::time::Instant;
 
 /// Time that the networks together may take by default, s.
 const BUDGET_S: f64 = 60.0;
@@ -35,7 +35,7 @@ pub struct Affordable {
 /// Samples from one window to the next with which all networks take at most about a minute: 1 where they can do every window.
 ///
 /// Measured on a few windows, more of them until it takes long enough to be a measure; then rounded up to 1, 2 or 5 times a power of ten,
-/// so that the next run on this machine most likely has the same.
+/// so that the next run on this machine most likely has the same. Where there is no clock every window is taken.
 ///
 /// # Errors
 /// As [`Hybrid::predict`].
@@ -50,9 +50,9 @@ pub fn affordable_stride(
         let mut count = FIRST_WINDOWS;
         loop {
             let some = every.get(..count).unwrap_or(every);
-            let begun = Instant::now();
+            let begun = Stopwatch::start();
             hybrid.stages(flights, some, threads)?;
-            let gone = begun.elapsed().as_secs_f64();
+            let gone = begun.seconds();
             if gone >= MEASURED_S || some.len() == every.len() {
                 seconds += gone / some.len().max(1) as f64;
                 break;

@@ -7,6 +7,8 @@ mod contest;
 mod division;
 mod document;
 mod flights;
+#[cfg(feature = "disk")]
+mod ledger;
 #[cfg(feature = "files")]
 mod prediction;
 #[cfg(feature = "report")]
@@ -21,11 +23,13 @@ pub use contest::{Affordable, Contest, Judged, affordable_stride, rows_needed};
 pub use division::Division;
 pub use document::document;
 pub use flights::{SUSPECTS, without};
+#[cfg(feature = "disk")]
+pub use ledger::append_to_ledger;
 #[cfg(feature = "files")]
 pub use prediction::{PredictionSummary, PredictionTable, Predictions, Predictor, read_network};
 #[cfg(feature = "report")]
 pub use provenance::provenance;
 pub use rollout::{FromOne, Path, Rolling};
-pub use search::{Looped, NetworkSearch, SearchTask, append_to_ledger, convention_fault, network_search};
+pub use search::{Looped, NetworkSearch, SearchTask, convention_fault, network_search};
 #[cfg(feature = "files")]
 pub use training::{Epoch, Run, TrainedNetwork, digest, train, training_digest};

@@ -1,18 +1,17 @@
-//! Which physical effect is missing, asked of a data set: one search, or searches with adding and calibrating until nothing is left, with the
-//! ledger of what was added. The searching itself is done in `critique::diagnose`.
+//! Which physical effect is missing, asked of a data set: one search, or searches with adding and calibrating until nothing is left. The searching itself
+//! is done in `critique::diagnose`.
 
 use crate::critique::check::{self, CheckReport};
 use crate::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, searched};
 use crate::critique::floor_of_spans;
-use crate::disk::append_lines;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::flight::split::Split;
 use crate::flight::{DataSet, Flight, Span};
 use crate::hybrid::{Hybrid, network_target};
 use crate::physics::Model;
 use crate::tape::Threads;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Most windows of a network with a short history that are evaluated when its output is searched; a long one costs ten times as much.
 const MOST_WINDOWS: usize = 100_000;
@@ -129,48 +128,4 @@ pub struct Looped {
     pub model: Option<PathBuf>,
     /// There is one once something was added to a model.
     pub ledger: Option<PathBuf>,
-}
-
-/// One line of the ledger.
-#[derive(Serialize)]
-struct LedgerLine<'a> {
-    round: usize,
-    effect: &'a str,
-    coefficients: &'a [crate::critique::diagnose::Number],
-    parameters: &'a [crate::critique::diagnose::ParameterValue],
-    selection_frequency: f64,
-    indistinguishable: &'a [String],
-    p_value: f64,
-    rmse_locked: Option<crate::critique::ChannelValues>,
-    data_sha256: &'a str,
-    version: &'a str,
-}
-
-/// Adds the effects of a round at the end of a ledger, a line each, and never changes what is there. A round that a killed run has written stands
-/// in it once.
-///
-/// # Errors
-/// [`Error::Io`].
-pub fn append_to_ledger(ledger: &Path, round: usize, diagnosis: &Diagnosis) -> Result<()> {
-    let mut lines = Vec::new();
-    for step in &diagnosis.steps {
-        let line = LedgerLine {
-            round,
-            effect: &step.effect,
-            coefficients: &step.coefficients,
-            parameters: &step.parameters,
-            selection_frequency: step.selection_frequency,
-            indistinguishable: &step.indistinguishable,
-            p_value: step.p_value,
-            rmse_locked: diagnosis
-                .locked
-                .as_ref()
-                .and_then(|locked| locked.waterfall.iter().find(|bar| bar.added.contains(&step.effect)))
-                .map(|bar| bar.rmse),
-            data_sha256: &diagnosis.data_sha256,
-            version: &diagnosis.version,
-        };
-        lines.push(serde_json::to_string(&line).map_err(|error| Error::Undetermined(error.to_string()))?);
-    }
-    append_lines(ledger, &lines)
 }

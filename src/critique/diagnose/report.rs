@@ -346,7 +346,7 @@ pub struct Diagnosis {
     pub method: Option<Method>,
     /// What a person should know besides.
     pub notes: Vec<String>,
-    /// Time taken, s.
+    /// Time taken, s; 0 where there is no clock.
     pub seconds: f64,
     /// Version of this program.
     pub version: String,

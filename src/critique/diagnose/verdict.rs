@@ -23,7 +23,7 @@ use crate::critique::unknown::Unknown;
 use crate::error::{Error, Result};
 use crate::flight::{Flight, PerChannel, Span};
 use crate::physics::{Effect, Model};
-use std::time::Instant;
+use crate::stopwatch::Stopwatch;
 
 /// Effects that are looked for one after the other, at most, where they cannot be fitted at once.
 const MOST_FORWARD: usize = 6;
@@ -52,7 +52,7 @@ pub fn diagnose(
     part: &str,
     options: &Options,
 ) -> Result<Outcome> {
-    let begun = Instant::now();
+    let begun = Stopwatch::start();
     let mut base = model.clone();
     base.effects.retain(|effect| effect.enabled);
     let mut block_s = BLOCK_S;
@@ -84,7 +84,7 @@ pub fn diagnose(
     };
     if count < FEWEST_BLOCKS {
         let summary = sentences::too_few_blocks(count, block_s, FEWEST_BLOCKS, SHORTEST_BLOCK_S);
-        let seconds = begun.elapsed().as_secs_f64();
+        let seconds = begun.seconds();
         let diagnosis = Diagnosis { method: Some(method), seconds, ..Diagnosis::nothing(Verdict::TooLittleData, summary) };
         return Ok(Outcome { diagnosis, model: base });
     }
@@ -113,7 +113,7 @@ pub fn diagnose(
             break heard;
         }
     };
-    diagnosis.seconds = begun.elapsed().as_secs_f64();
+    diagnosis.seconds = begun.seconds();
     search.conclude(&ground, heard, diagnosis)
 }
 
@@ -216,7 +216,7 @@ impl Search<'_> {
 
     /// From what was found to the verdict: confirmation, suggestions tried, where the rest of the error lies, words.
     fn conclude(&self, ground: &Ground<'_>, heard: Heard, mut diagnosis: Diagnosis) -> Result<Outcome> {
-        let begun = Instant::now();
+        let begun = Stopwatch::start();
         let Heard { mut found, left, unknown, roads, at_once } = heard;
         let Ground { flights, locked, part, block_s, .. } = *ground;
         self.options.watch.at("what each effect does to flights that the search has not seen")?;
@@ -255,7 +255,7 @@ impl Search<'_> {
         diagnosis.notes.extend(if judged { wrong_signs(&after) } else { self.sign_notes(&after)? });
         diagnosis.notes.extend(after.assumptions());
         diagnosis.summary = summary(&diagnosis);
-        diagnosis.seconds += begun.elapsed().as_secs_f64();
+        diagnosis.seconds += begun.seconds();
         Ok(Outcome { diagnosis, model: after })
     }
 
