@@ -11,7 +11,7 @@ use std::backtrace::Backtrace;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::OnceLock;
-use targets::{MOST_BYTES, TARGETS, seeds};
+use targets::{MOST_BYTES, TARGETS, hostile, seeds};
 
 static TARGET: OnceLock<fn(&[u8]) -> bool> = OnceLock::new();
 
@@ -47,11 +47,12 @@ fn set_up() {
     TARGET.get_or_init(|| *run);
 }
 
-/// Writes the seeds of a target into a folder, and the words in them beside it, as libFuzzer reads them.
+/// Writes the seeds of a target, and what was found before, into a folder, and the words in them beside it, as libFuzzer reads them.
 fn put_seeds(name: &str, folder: &Path) -> std::io::Result<()> {
-    let mut words = BTreeSet::new();
-    for (number, seed) in seeds(name).iter().enumerate() {
-        std::fs::write(folder.join(format!("seed-{number}")), seed)?;
+    let mut words = BTreeSet::from(["\"nan\"\n", "\"inf\"\n", "\"1e308\"\n"].map(str::to_owned));
+    let found = hostile(name).iter().map(std::fs::read).collect::<std::io::Result<Vec<_>>>()?;
+    for (number, seed) in seeds(name).iter().chain(&found).enumerate() {
+        std::fs::write(folder.join(number.to_string()), seed)?;
         let text = String::from_utf8_lossy(seed);
         let parts = text.split(|letter: char| !(letter.is_ascii_alphanumeric() || "_-/.".contains(letter)));
         words.extend(parts.filter(|word| (3..30).contains(&word.len())).map(|word| format!("\"{word}\"\n")));

@@ -14,17 +14,17 @@ pub fn csv(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     let path = folder.put("hover/log.csv", bytes);
     let is_odd = bytes.len() % 2 == 1;
-    let is_taken = read(&folder, "hover", "log.csv", ReadOptions { split_at_gaps: is_odd, ..ReadOptions::default() });
+    let is_taken = read(&folder, "hover", &["log.csv"], ReadOptions { split_at_gaps: is_odd, ..ReadOptions::default() });
     if is_odd {
         return is_taken;
     }
     match guess::guess(&path) {
         Ok(guess) => {
             let described = Some(guess.text);
-            read(&folder, "hover", "", ReadOptions { described, ..ReadOptions::default() });
+            read(&folder, "hover", &["log.csv", "dataset.toml"], ReadOptions { described, ..ReadOptions::default() });
             is_taken
         }
-        Err(error) => check_error(&error, "log.csv"),
+        Err(error) => check_error(&error, &["log.csv"]),
     }
 }
 
@@ -32,7 +32,7 @@ pub fn csv(bytes: &[u8]) -> bool {
 pub fn parquet(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     folder.put("hover/log.parquet", bytes);
-    read(&folder, "hover", "log.parquet", ReadOptions::default())
+    read(&folder, "hover", &["log.parquet"], ReadOptions::default())
 }
 
 /// A PX4 log, whole or up to where it is damaged.
@@ -50,7 +50,7 @@ fn streams(name: &str, bytes: &[u8]) -> bool {
     folder.put(&format!("hover/{name}"), bytes);
     // Most of what a fuzzer makes is damaged somewhere.
     let described = Some("damaged = \"stop\"\nresample_hz = 50\n".into());
-    read(&folder, "hover", name, ReadOptions { described, split_at_gaps: bytes.len() % 2 == 1, ..ReadOptions::default() })
+    read(&folder, "hover", &[name], ReadOptions { described, split_at_gaps: bytes.len() % 2 == 1, ..ReadOptions::default() })
 }
 
 /// A flight in the Stanford layout: states, a line, controls.
@@ -60,7 +60,12 @@ pub fn stanford(bytes: &[u8]) -> bool {
     let (states, controls) = at.map_or((bytes, &[][..]), |at| (&bytes[..at], &bytes[at + BETWEEN.len()..]));
     folder.put("a/smoother.txt", states);
     folder.put("a/controls.txt", controls);
-    read(&folder, "a", ".txt", ReadOptions { split_at_gaps: bytes.len() % 2 == 1, ..ReadOptions::default() })
+    read(
+        &folder,
+        "a",
+        &["smoother.txt", "controls.txt"],
+        ReadOptions { split_at_gaps: bytes.len() % 2 == 1, ..ReadOptions::default() },
+    )
 }
 
 /// A `dataset.toml` for a log that is in the canonical form and has columns beyond it.
@@ -68,7 +73,7 @@ pub fn dataset(bytes: &[u8]) -> bool {
     let folder = Folder::new();
     folder.put("data/hover/log.csv", log().as_bytes());
     folder.put("data/dataset.toml", bytes);
-    read(&folder, "data", "", ReadOptions::default())
+    read(&folder, "data", &["dataset.toml", "log.csv"], ReadOptions::default())
 }
 
 /// The log that descriptions are tried on.
@@ -90,11 +95,11 @@ fn log() -> &'static str {
     })
 }
 
-/// Reads; an error has `name` in it.
-fn read(folder: &Folder, inside: &str, name: &str, options: ReadOptions) -> bool {
+/// Reads; an error names one of the files.
+fn read(folder: &Folder, inside: &str, files: &[&str], options: ReadOptions) -> bool {
     match data_set(&folder.path(inside), &options) {
         Ok(data) => check(folder, &data),
-        Err(error) => check_error(&error, name),
+        Err(error) => check_error(&error, files),
     }
 }
 

@@ -45,7 +45,7 @@ pub fn model(bytes: &[u8]) -> bool {
     let path = Path::new("model.toml");
     let model = match Model::from_toml(text, path) {
         Ok(model) => model,
-        Err(error) => return check_error(&error, "model.toml"),
+        Err(error) => return check_error(&error, &["model.toml"]),
     };
     let written = model.to_toml().expect("what was read can be written");
     let again = Model::from_toml(&written, path).expect("what was written can be read");

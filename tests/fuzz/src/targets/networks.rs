@@ -93,7 +93,7 @@ pub fn training(bytes: &[u8]) -> bool {
     let (path, base) = (Path::new("train.toml"), TrainConfig::default());
     let config = match TrainConfig::from_text(text, path, &base) {
         Ok(config) => config,
-        Err(error) => return check_error(&error, "train.toml"),
+        Err(error) => return check_error(&error, &["train.toml"]),
     };
     // TOML has no seeds beyond 2^63.
     let Ok(written) = config.template() else { return true };
@@ -127,7 +127,7 @@ pub fn description(bytes: &[u8]) -> bool {
 fn hybrid(folder: &Folder, path: &Path) -> bool {
     let hybrid = match Hybrid::read(path) {
         Ok(hybrid) => hybrid,
-        Err(error) => return check_error(&error, "network.safetensors"),
+        Err(error) => return check_error(&error, &["network.safetensors"]),
     };
     let again = folder.path("again.safetensors");
     hybrid.write(&again).expect("what was read can be written");
@@ -164,7 +164,7 @@ fn resume(bytes: &[u8]) -> bool {
     let run = RunFolder::create(folder.path("run")).expect("a run folder");
     let state = match run.resume(config, DATA) {
         Ok(state) => state,
-        Err(error) => return check_error(&error, "checkpoint.phyture"),
+        Err(error) => return check_error(&error, &["checkpoint.phyture"]),
     };
     let path = folder.path("again");
     container::write(&path, &state).expect("what was read can be written");
