@@ -1,5 +1,6 @@
 //! Recorded flights and their descriptions: whatever is accepted is made of finite numbers, and comes back the same when it is written.
 
+use super::seeds::ULOG;
 use super::{Folder, check_error, flight, same_bits};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::{Column, DataSet, Flight, guess, write};
@@ -68,12 +69,14 @@ pub fn stanford(bytes: &[u8]) -> bool {
     )
 }
 
-/// A `dataset.toml` for a log that is in the canonical form and has columns beyond it.
+/// A `dataset.toml`: one of an even length for a log in the canonical form that has columns beyond it, one of an odd length for a PX4 log, which says
+/// much by itself.
 pub fn dataset(bytes: &[u8]) -> bool {
     let folder = Folder::new();
-    folder.put("data/hover/log.csv", log().as_bytes());
+    let (name, content) = if bytes.len() % 2 == 0 { ("log.csv", log().as_bytes()) } else { ("log.ulg", ULOG) };
+    folder.put(&format!("data/hover/{name}"), content);
     folder.put("data/dataset.toml", bytes);
-    read(&folder, "data", &["dataset.toml", "log.csv"], ReadOptions::default())
+    read(&folder, "data", &["dataset.toml", name], ReadOptions::default())
 }
 
 /// The log that descriptions are tried on.

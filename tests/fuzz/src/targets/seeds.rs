@@ -9,12 +9,10 @@ use phyture::train::TrainConfig;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-const ULOG: &[u8] = include_bytes!("../../../../fixtures/logs/px4.ulg");
-const DATAFLASH: &[u8] = include_bytes!("../../../../fixtures/logs/ardupilot.bin");
-
-/// Bytes of those that are kept: the definitions, and half a second.
-const ULOG_BYTES: usize = 12_000;
-const DATAFLASH_BYTES: usize = 12_000;
+/// The definitions of a log and half a second, cut in a message.
+pub(super) const ULOG: &[u8] = include_bytes!("../../../../fixtures/logs/px4.ulg").split_at(KEPT).0;
+const DATAFLASH: &[u8] = include_bytes!("../../../../fixtures/logs/ardupilot.bin").split_at(KEPT).0;
+const KEPT: usize = 12_000;
 
 /// The seeds of a target: texts from files, the rest made.
 pub fn seeds(target: &str) -> Vec<Vec<u8>> {
@@ -27,8 +25,8 @@ pub fn seeds(target: &str) -> Vec<Vec<u8>> {
     seeds.extend(match target {
         "csv" => vec![csv(&Column::ALL), csv(Column::STATE)],
         "parquet" => vec![parquet()],
-        "ulog" => vec![ULOG[..ULOG_BYTES].to_vec()],
-        "dataflash" => vec![DATAFLASH[..DATAFLASH_BYTES].to_vec()],
+        "ulog" => vec![ULOG.to_vec()],
+        "dataflash" => vec![DATAFLASH.to_vec()],
         "stanford" => vec![stanford()],
         "model" => model_files(),
         "training" => training(),
