@@ -9,7 +9,11 @@ mod counting;
 mod targets;
 
 use phyture::flight::guard;
+use std::time::{Duration, Instant};
 use targets::{MOST_BYTES, TARGETS, hostile, seeds};
+
+/// Time that one file may take; none takes a second where nothing else runs.
+const LONGEST: Duration = Duration::from_secs(20);
 
 #[test]
 fn what_was_found_stays_mended_and_what_is_sound_is_taken() {
@@ -29,9 +33,11 @@ fn what_was_found_stays_mended_and_what_is_sound_is_taken() {
         for path in hostile(name) {
             eprintln!("{}", path.display());
             let bytes = std::fs::read(&path).expect("a file that is there");
+            let begun = Instant::now();
             let taken = counting::most_held(|| {
                 target(&bytes);
             });
+            assert!(begun.elapsed() < LONGEST, "{}: {:?}", path.display(), begun.elapsed());
             assert!(taken <= MOST_BYTES, "{}: {taken} bytes of memory for {} bytes", path.display(), bytes.len());
         }
     }

@@ -48,7 +48,7 @@ fn below(stated: &str, other: &str) -> Option<String> {
     for (key, value) in other.parse::<toml::Table>().ok()? {
         match value {
             toml::Value::Table(mut inside) => {
-                inside.retain(|name, _| !(key == "columns" && unwanted.contains(&name.as_str())) && own.get(&key, name).is_none());
+                inside.retain(|name, _| !(key == "columns" && unwanted.contains(&name)) && own.get(&key, name).is_none());
                 // Every key by itself would be read back by itself.
                 if own.get("", &key).is_none() && !inside.is_empty() {
                     made = made.with_section(&key, &inside)?;
