@@ -1,7 +1,7 @@
 //! What the fuzzer found once, and seeds that it begins with, through the very functions that it calls (`tests/fuzz`): nothing panics, takes memory
 //! for a size that a file claims, or comes back as something else. Needs no fuzzer.
 //!
-//! A file of its own, because the allocator counts for the whole program; and one test, because it counts for all threads.
+//! A file of its own, because the allocator counts for the whole program; and hardly more than one test, because it counts for all threads.
 #![cfg(all(feature = "cli", unix))]
 
 mod counting;
