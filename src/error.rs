@@ -141,6 +141,15 @@ impl Error {
         }
     }
 
+    /// An error in a formula with the place where the formula stands before what is wrong; another as it is.
+    #[cfg(feature = "files")]
+    pub(crate) fn standing_in(self, place: &str) -> Self {
+        match self {
+            Self::Formula { message, formula, at } => Self::Formula { message: format!("{place}: {message}"), formula, at },
+            other => other,
+        }
+    }
+
     /// An [`Error::Io`] that remembers its path: `std::fs::read(p).map_err(Error::io(p))`. Where the folder of the path is what is
     /// missing, it says so.
     #[cfg(feature = "disk")]

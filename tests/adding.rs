@@ -26,7 +26,7 @@ fn every_example_stands_in_the_file_that_it_is_from() -> std::io::Result<()> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = std::fs::read_to_string(root.join("docs/adding.md"))?;
     let examples = examples(&page);
-    assert_eq!(examples.len(), 9);
+    assert_eq!(examples.len(), 10);
     for (file, block) in examples {
         let source = std::fs::read_to_string(root.join(file))?;
         let lines = |text: &str| text.lines().map(str::trim).filter(|line| !line.is_empty()).collect::<Vec<_>>().join("\n");

@@ -43,13 +43,16 @@ pub(super) enum Place {
 /// Folders in which the system shows devices and open files by name. Their links are no links to a place in a file system.
 const OF_THE_SYSTEM: [&str; 2] = ["/dev", "/proc"];
 
+/// A folder among them that holds plain files, in memory.
+const SHARED_MEMORY: &str = "/dev/shm";
+
 /// As many links as Linux follows.
 const MOST_LINKS: usize = 40;
 
 impl Place {
     /// Looks at `path`.
     pub(super) fn of(path: &Path) -> io::Result<Self> {
-        if OF_THE_SYSTEM.iter().any(|folder| path.starts_with(folder)) {
+        if OF_THE_SYSTEM.iter().any(|folder| path.starts_with(folder)) && !path.starts_with(SHARED_MEMORY) {
             return Ok(Self::Node);
         }
         match fs::metadata(path) {

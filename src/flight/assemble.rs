@@ -139,7 +139,8 @@ fn of_part(
     let targets = derive(&table, &mut columns, schema, step_s, done)?;
     let samples = columns.get(Column::Vx).map_or(0, <[f64]>::len);
 
-    let mut used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s))?;
+    let used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s));
+    let mut used = used.map_err(|error| error.standing_in(&format!("{}, `use` of dataset.toml", table.path.display())))?;
     used.iter_mut().enumerate().for_each(|(sample, used)| *used &= whole.contains(&sample));
     let runs = runs(&used);
     if !schema.rows.is_empty() {

@@ -24,3 +24,12 @@ pub(super) const MOST_SAMPLES: f64 = 2e7;
 
 /// Lowest cut-off of the differentiator as a part of the sampling rate: a window of some 40 000 samples.
 pub(super) const LOWEST_CUTOFF: f64 = 5e-5;
+
+/// Numbers of a Parquet file: a hundred for each of its bytes. Equal numbers take next to no bytes there, so a small file could hold any amount; of a
+/// flight's numbers few are equal.
+#[cfg(feature = "parquet")]
+pub(super) const MOST_NUMBERS_A_BYTE: usize = 100;
+
+/// Numbers that a Parquet file may hold however small it is: quarter of an hour of 22 columns at 100 Hz.
+#[cfg(feature = "parquet")]
+pub(super) const FEW_NUMBERS: usize = 2_000_000;

@@ -72,7 +72,11 @@ pub(super) fn source(table: &RawTable, schema: &Schema, step_s: f64, name: &str)
         let get = |name: &str| table.column(name).map(Value::from);
         let known: Vec<&str> = table.names.iter().map(String::as_str).collect();
         match Formula::parse(text).and_then(|formula| formula.check_names(&known).map(|()| formula)) {
-            Ok(formula) => return Ok(Some((scaled(&formula.evaluate(table.rows(), step_s, &get)?), text.clone()))),
+            Ok(formula) => {
+                let place = || format!("{}, `columns.{name}` of dataset.toml", table.path.display());
+                let values = formula.evaluate(table.rows(), step_s, &get).map_err(|error| error.standing_in(&place()))?;
+                return Ok(Some((scaled(&values), text.clone())));
+            }
             Err(error) => first_error = first_error.or(Some((text, error))),
         }
     }

@@ -55,6 +55,14 @@ impl Description {
         Self::parse(&text).filter(|made| made.table == table)
     }
 
+    /// The description with a section that it does not have, as [`Description::with`].
+    pub fn with_section(&self, section: &str, keys: &Table) -> Option<Self> {
+        let mut table = self.table.clone();
+        table.insert(section.into(), Value::Table(keys.clone()));
+        let lines: String = keys.iter().map(|(key, value)| format!("{key} = {value}\n")).collect();
+        Self::parse(&self.at_end(&format!("[{section}]\n{lines}"))).filter(|made| made.table == table)
+    }
+
     /// The description with one more rule `[[section]]`, as [`Description::with`].
     pub fn with_rule(&self, section: &str, rule: &Table, comment: &str) -> Option<Self> {
         let mut table = self.table.clone();

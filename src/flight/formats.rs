@@ -47,12 +47,15 @@ fn below(stated: &str, other: &str) -> Option<String> {
     let unwanted: &[&str] = if has(&quaternion) { &angles } else { &[] };
     for (key, value) in other.parse::<toml::Table>().ok()? {
         match value {
-            toml::Value::Table(inside) => {
+            toml::Value::Table(mut inside) => {
+                inside.retain(|name, _| !(key == "columns" && unwanted.contains(&name)) && own.get(&key, name).is_none());
+                // Every key by itself would be read back by itself.
+                if own.get("", &key).is_none() && !inside.is_empty() {
+                    made = made.with_section(&key, &inside)?;
+                    continue;
+                }
                 for (name, value) in inside {
-                    let is_unwanted = key == "columns" && unwanted.contains(&name.as_str());
-                    if own.get(&key, &name).is_none() && !is_unwanted {
-                        made = made.with(&key, &name, &value, "")?;
-                    }
+                    made = made.with(&key, &name, &value, "")?;
                 }
             }
             value if own.get("", &key).is_none() => made = made.with("", &key, &value, "")?,

@@ -45,6 +45,8 @@ mod local_polynomial;
 pub mod names;
 #[cfg(feature = "parquet")]
 mod parquet;
+#[cfg(feature = "parquet")]
+mod parquet_sizes;
 #[cfg(feature = "files")]
 pub mod read;
 #[cfg(feature = "files")]

@@ -2,8 +2,10 @@
 //!
 //! The column-by-column interface of the `parquet` crate, without Arrow. What the columns mean is not known here.
 
+use super::bounds::{FEW_NUMBERS, MOST_NUMBERS_A_BYTE};
 use super::format::{Format, Place, Reader};
 use super::guard::guarded;
+use super::parquet_sizes::{check_footer, check_pages};
 use super::source::Read;
 use super::table::{RawTable, check_header, fault};
 use super::values::{Table, Values};
@@ -51,9 +53,12 @@ fn damaged(path: &Path, reason: &dyn std::fmt::Display) -> Error {
     fault(path, format!("unreadable Parquet ({reason})"), expected)
 }
 
-fn parse(path: &Path, bytes: impl ChunkReader + 'static, wanted: &dyn Fn(&str) -> bool) -> Result<RawTable> {
+fn parse<B: ChunkReader + AsRef<[u8]> + Clone + 'static>(path: &Path, bytes: B, wanted: &dyn Fn(&str) -> bool) -> Result<RawTable> {
     let length = bytes.len();
     let damaged = |error: ParquetError| damaged(path, &error);
+    check_footer(bytes.as_ref()).map_err(|claim| damaged(ParquetError::General(claim)))?;
+    let content = bytes.clone();
+    let mut left = content.as_ref().len().saturating_mul(MOST_NUMBERS_A_BYTE).max(FEW_NUMBERS);
     let reader = SerializedFileReader::new(bytes).map_err(damaged)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
     let names: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
@@ -77,7 +82,11 @@ fn parse(path: &Path, bytes: impl ChunkReader + 'static, wanted: &dyn Fn(&str) -
                     format!("a place within the file's {length} bytes; the file is damaged, write it again"),
                 ));
             }
-            let known = read_column(group.get_column_reader(index).map_err(damaged)?, levels == 1, values).map_err(damaged)?;
+            // The place was found to be within the file.
+            let pages = content.as_ref().get(start as usize..(start + size) as usize).unwrap_or_default();
+            check_pages(pages).map_err(|claim| damaged(ParquetError::General(claim)))?;
+            let column = group.get_column_reader(index).map_err(damaged)?;
+            let known = read_column(column, levels == 1, values, &mut left).map_err(damaged)?;
             if !known {
                 let expected = "numbers; a column that holds something else can be named in `ignore` of dataset.toml";
                 return Err(fault(path, format!("text or bytes in the column `{}`", names[index]), expected));
@@ -95,15 +104,15 @@ fn parse(path: &Path, bytes: impl ChunkReader + 'static, wanted: &dyn Fn(&str) -
     Ok(RawTable { path: path.into(), names, columns, lines: (2..rows + 2).collect(), read: None })
 }
 
-/// Appends a chunk to `values`; false if its type is not a number's.
-fn read_column(reader: ColumnReader, nullable: bool, values: &mut Vec<f64>) -> ParquetResult<bool> {
+/// Appends a chunk to `values`, at most so many numbers as are left; false if its type is not a number's.
+fn read_column(reader: ColumnReader, nullable: bool, values: &mut Vec<f64>, left: &mut usize) -> ParquetResult<bool> {
     match reader {
-        ColumnReader::BoolColumnReader(reader) => read_typed(reader, nullable, values, |value| f64::from(u8::from(value))),
-        ColumnReader::Int32ColumnReader(reader) => read_typed(reader, nullable, values, f64::from),
+        ColumnReader::BoolColumnReader(reader) => read_typed(reader, nullable, (values, left), |value| f64::from(u8::from(value))),
+        ColumnReader::Int32ColumnReader(reader) => read_typed(reader, nullable, (values, left), f64::from),
         // Times in ns and counters: beyond 2^53 the nearest double.
-        ColumnReader::Int64ColumnReader(reader) => read_typed(reader, nullable, values, |value| value as f64),
-        ColumnReader::FloatColumnReader(reader) => read_typed(reader, nullable, values, f64::from),
-        ColumnReader::DoubleColumnReader(reader) => read_typed(reader, nullable, values, |value| value),
+        ColumnReader::Int64ColumnReader(reader) => read_typed(reader, nullable, (values, left), |value| value as f64),
+        ColumnReader::FloatColumnReader(reader) => read_typed(reader, nullable, (values, left), f64::from),
+        ColumnReader::DoubleColumnReader(reader) => read_typed(reader, nullable, (values, left), |value| value),
         _ => return Ok(false),
     }?;
     Ok(true)
@@ -112,7 +121,7 @@ fn read_column(reader: ColumnReader, nullable: bool, values: &mut Vec<f64>) -> P
 fn read_typed<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     nullable: bool,
-    values: &mut Vec<f64>,
+    (values, left): (&mut Vec<f64>, &mut usize),
     number: impl Fn(T::T) -> f64,
 ) -> ParquetResult<()> {
     let (mut present, mut levels) = (Vec::new(), Vec::new());
@@ -123,6 +132,7 @@ fn read_typed<T: DataType>(
         if records == 0 {
             return Ok(());
         }
+        *left = left.checked_sub(records).ok_or_else(|| ParquetError::General("more numbers than its bytes can be of".into()))?;
         let mut numbers = present.drain(..).map(&number);
         if nullable {
             values.extend(levels.iter().map(|&level| if level > 0 { numbers.next().unwrap_or(f64::NAN) } else { f64::NAN }));
@@ -168,6 +178,27 @@ pub(super) fn encode(table: &Table) -> ParquetResult<Vec<u8>> {
 mod tests {
     use super::super::write::table_parquet;
     use super::*;
+
+    /// A thousand equal numbers a byte: a small file of any size.
+    #[test]
+    fn a_file_of_equal_numbers_holds_no_more_than_its_bytes_can_be_of() -> Result<(), Box<dyn std::error::Error>> {
+        let field = Type::primitive_type_builder("x", Physical::DOUBLE).with_repetition(Repetition::REQUIRED).build()?;
+        let schema = Arc::new(Type::group_type_builder("schema").with_fields(vec![Arc::new(field)]).build()?);
+        let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::default())?;
+        let mut group = writer.next_row_group()?;
+        let mut column = group.next_column()?.ok_or("a column")?;
+        column.typed::<DoubleType>().write_batch(&vec![1.5; FEW_NUMBERS + BATCH], None, None)?;
+        column.close()?;
+        group.close()?;
+        let bytes = writer.into_inner()?;
+        assert!(bytes.len() < FEW_NUMBERS / MOST_NUMBERS_A_BYTE, "{} bytes", bytes.len());
+        let folder = tempfile::tempdir()?;
+        let path = folder.path().join("a.parquet");
+        std::fs::write(&path, &bytes)?;
+        let refused = read_parquet(&path, &|_| true).map_err(|error| error.to_string());
+        assert!(matches!(&refused, Err(text) if text.contains("more numbers than its bytes")), "{:?}", refused.map(|_| ()));
+        Ok(())
+    }
 
     #[test]
     fn numbers_come_back_with_their_bits_and_text_is_refused_by_name() -> Result<(), Box<dyn std::error::Error>> {

@@ -33,7 +33,7 @@ use super::keys::Keys;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
 /// Components the file's velocity is written in.
@@ -102,6 +102,9 @@ pub(crate) struct Schema {
     pub target_origin: Targets,
     /// Alternatives by canonical name: columns of the file, or formulas.
     pub columns: BTreeMap<String, Vec<String>>,
+    /// What the formulas among these read. Every field of a binary log is held against it: parsing them for each would take a file of a hundred
+    /// thousand fields minutes.
+    pub read: BTreeSet<String>,
     /// Factor to SI by canonical name; 1 if absent.
     pub factors: BTreeMap<&'static str, f64>,
     /// By how much a column comes later than the rest, s.
@@ -138,6 +141,7 @@ impl Default for Schema {
             targets: TargetKind::Derivative,
             target_origin: Targets::Recorded,
             columns: BTreeMap::new(),
+            read: BTreeSet::new(),
             factors: BTreeMap::new(),
             late: BTreeMap::new(),
             late_in: Vec::new(),
@@ -189,7 +193,7 @@ impl Schema {
             velocity: keys.choice("velocity", &FRAMES)?.unwrap_or(Frame::Body),
             targets: keys.choice("targets", &TARGETS)?.unwrap_or(TargetKind::Derivative),
             target_origin: keys.choice("target_origin", &ORIGINS)?.unwrap_or(Targets::Recorded),
-            rows: formulas(keys.texts("use")?.unwrap_or_default())?,
+            rows: formulas(&keys.texts("use")?.unwrap_or_default(), &format!("{place}, `use`"), &[])?,
             minimum_length_s: keys.number("minimum_length_s", 0.0)?.unwrap_or(0.0),
             resample_hz: keys.number("resample_hz", f64::MIN_POSITIVE)?,
             cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?,
@@ -216,6 +220,8 @@ impl Schema {
                     if sources.is_empty() {
                         return Err(columns.fault(name, "an empty list".into(), "a column's name or a formula".into()));
                     }
+                    let formulas = sources.iter().filter_map(|source| Formula::parse(source).ok());
+                    formulas.for_each(|formula| schema.read.extend(formula.names().into_iter().map(str::to_owned)));
                     schema.columns.insert(name.into(), sources);
                 }
             }
@@ -240,15 +246,12 @@ impl Schema {
         }
         for mut rule in keys.sections("repair")? {
             let columns = rule.texts("columns")?.unwrap_or_default();
-            let valid = formulas(rule.texts("valid")?.unwrap_or_default())?;
+            let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
             let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
             let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
                 let expected = "`columns` and `max_gap_s`; `valid` if NaN is not the only sign of a bad cell";
                 return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
             };
-            for formula in &valid {
-                formula.check_names(&["value"])?;
-            }
             rule.finish()?;
             schema.repairs.push(Repair { columns, valid, max_gap_s });
         }
@@ -280,7 +283,8 @@ impl Schema {
         let names = |formula: &Formula| formula.names().contains(&name);
         extra.iter().any(|kept| kept == name)
             || units::column_names().any(|canonical| canonical == name)
-            || self.columns.values().flatten().any(|source| source == name || Formula::parse(source).is_ok_and(|f| names(&f)))
+            || self.read.contains(name)
+            || self.columns.values().flatten().any(|source| source == name)
             || self.rows.iter().any(names)
             || self.repairs.iter().any(|rule| rule.columns.iter().any(|column| column == name))
     }
@@ -312,8 +316,13 @@ fn stated(table: &Table) -> BTreeMap<String, String> {
     stated
 }
 
-fn formulas(texts: Vec<String>) -> Result<Vec<Formula>> {
-    texts.iter().map(|text| Formula::parse(text)).collect()
+/// Formulas of a key; of these names alone, where there are any.
+fn formulas(texts: &[String], place: &str, names: &[&str]) -> Result<Vec<Formula>> {
+    let one = |text: &String| {
+        let formula = Formula::parse(text)?;
+        if names.is_empty() { Ok(formula) } else { formula.check_names(names).map(|()| formula) }
+    };
+    texts.iter().map(one).collect::<Result<_>>().map_err(|error| error.standing_in(place))
 }
 
 fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {

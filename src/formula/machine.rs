@@ -2,7 +2,7 @@
 //! code, block by block or one by one, so that both give the same bits.
 
 use super::graph::{Graph, Kind, Node, Recall, whole_power};
-use super::memory::{MAX_DELAY_SAMPLES, Memory};
+use super::memory::{MOST_DELAYED, Memory};
 use super::operation::{History, Operation, whole_power_of_column};
 use super::{Formula, Value};
 use crate::error::{Error, Result};
@@ -50,6 +50,8 @@ pub struct Machine {
     roots: Vec<Slot>,
     /// Index in the graph's inputs of each column that is read; those of values that are given follow them.
     inputs: Vec<usize>,
+    /// Samples that its delays keep.
+    delayed: f64,
     block: usize,
     isa: InstructionSet,
     pub(super) step_s: f64,
@@ -120,6 +122,7 @@ impl Machine {
             columns: Vec::new(),
             roots: Vec::new(),
             inputs: Vec::new(),
+            delayed: 0.0,
             block: 0,
             isa: InstructionSet::detect().map_err(Error::instruction_set)?,
             step_s,
@@ -185,16 +188,11 @@ impl Machine {
             }
             Kind::Recall(recall, [x, time, tangent, limit]) => {
                 let number = uniform[time.0 as usize];
-                let samples = number.unwrap_or(0.0) / step_s;
-                if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) && samples > MAX_DELAY_SAMPLES {
-                    return Err(Error::Config {
-                        place: "formula".into(),
-                        field: "delay".into(),
-                        found: format!("{} s, {samples:.1e} samples of {step_s:e} s", samples * step_s),
-                        expected: format!("at most {MAX_DELAY_SAMPLES:e} samples, which can be kept"),
-                    });
-                }
                 check_time(recall, number)?;
+                if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) {
+                    self.delayed += number.unwrap_or(0.0) / step_s;
+                    check_delayed(self.delayed, step_s)?;
+                }
                 self.memory.push(Memory::new(recall, number, step_s));
                 let (x, number, tangents) = (slots.of(x), slots.of(time), [slots.of(tangent), slots.of(limit)]);
                 Step::Recall { memory: self.memory.len() as u32 - 1, x, number, tangents, out: slots.take(node) }
@@ -273,6 +271,19 @@ impl Machine {
     }
 }
 
+/// Refuses delays that would keep too much.
+fn check_delayed(samples: f64, step_s: f64) -> Result<()> {
+    if samples <= MOST_DELAYED {
+        return Ok(());
+    }
+    Err(Error::Config {
+        place: "formula".into(),
+        field: "delay".into(),
+        found: format!("{} s in all, {samples:.1e} samples of {step_s:e} s", samples * step_s),
+        expected: format!("at most {MOST_DELAYED:e} samples, which can be kept"),
+    })
+}
+
 /// Refuses a time or a limit that its operator cannot have: one that a symbol was given, as the graph has looked at its own.
 fn check_time(recall: Recall, number: Option<f64>) -> Result<()> {
     let Some(number) = number else { return Ok(()) };
@@ -323,14 +334,20 @@ impl StreamingFormula {
         Ok(Self { inputs: graph.inputs().to_vec(), order: machine.inputs().to_vec(), machine })
     }
 
+    /// A stream of each formula, for one sample at a time ([`Machine::one_by_one`]), which together keep no more than one may.
+    pub(crate) fn of_each(formulas: &[Formula], step_s: f64) -> Result<Vec<Self>> {
+        let mut delayed = 0.0;
+        let mut one = |formula: &Formula| {
+            let stream = formula.stream(step_s)?;
+            delayed += stream.machine.delayed;
+            check_delayed(delayed, step_s).map(|()| Self { machine: stream.machine.one_by_one(), ..stream })
+        };
+        formulas.iter().map(&mut one).collect()
+    }
+
     /// The columns it reads, in the order in which [`StreamingFormula::push`] takes their samples.
     pub fn inputs(&self) -> &[String] {
         &self.inputs
-    }
-
-    /// The same for one sample at a time, as [`Machine::one_by_one`].
-    pub(crate) fn one_by_one(self) -> Self {
-        Self { machine: self.machine.one_by_one(), ..self }
     }
 
     /// Forgets the past.

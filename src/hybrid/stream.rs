@@ -112,7 +112,7 @@ impl<H: Borrow<Hybrid>> StreamingHybrid<H> {
         Ok(Self {
             model,
             linear: linear.transpose()?,
-            inputs: formulas.iter().map(|formula| Ok(formula.stream(description.step_s)?.one_by_one())).collect::<Result<_>>()?,
+            inputs: StreamingFormula::of_each(&formulas, description.step_s)?,
             session,
             state: vec![0.0; history * description.inputs.len()],
             physics: vec![0.0; history * 6],
@@ -270,8 +270,7 @@ struct StreamingLinear {
 
 impl StreamingLinear {
     fn new(formulas: &[Formula], linear: &Linear, step_s: f64) -> Result<Self> {
-        let inputs: Vec<StreamingFormula> =
-            formulas.iter().map(|formula| Ok(formula.stream(step_s)?.one_by_one())).collect::<Result<_>>()?;
+        let inputs = StreamingFormula::of_each(formulas, step_s)?;
         let rows = (0..linear.config().lags).map(|_| Vec::with_capacity(inputs.len())).collect();
         Ok(Self { inputs, rows, filled: 0, features: vec![0.0; linear.config().features()] })
     }

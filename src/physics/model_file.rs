@@ -12,6 +12,7 @@ use super::toml_section::{Section, line_of, number};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::Channel;
+use crate::flight::split::Protocol;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -258,7 +259,14 @@ fn read_data(file: &Section<'_>) -> Result<ModelData> {
     Ok(ModelData {
         control_delay_s: section.number("control_delay_s")?.unwrap_or_default(),
         locked: section.texts("locked")?,
-        split: section.text("split")?.map(str::parse).transpose()?.unwrap_or_default(),
+        split: section.text("split")?.map(|text| read_split(&section, text)).transpose()?.unwrap_or_default(),
+    })
+}
+
+fn read_split(data: &Section<'_>, text: &str) -> Result<Protocol> {
+    text.parse().map_err(|error| match error {
+        Error::Config { found, expected, .. } => data.fault("split", found, expected),
+        other => other,
     })
 }
 

@@ -97,7 +97,7 @@ impl TrainConfig {
             Error::Config { field, found, expected, .. } => {
                 Error::Config { place: path.display().to_string(), field, found, expected }
             }
-            other => other,
+            other => other.standing_in(&path.display().to_string()),
         })?;
         Ok(config)
     }
