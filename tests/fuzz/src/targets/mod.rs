@@ -18,8 +18,11 @@ use phyture::sim::{Level, Simulation, simulate};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+/// Reads bytes, and tells whether the reader took them.
+pub type Target = fn(&[u8]) -> bool;
+
 /// The functions, by the names of their folders in `fixtures/hostile`.
-pub const TARGETS: [(&str, fn(&[u8]) -> bool); 14] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("csv", logs::csv),
     ("parquet", logs::parquet),
     ("ulog", logs::ulog),
