@@ -73,7 +73,7 @@ pub fn stanford(bytes: &[u8]) -> bool {
 /// much by itself.
 pub fn dataset(bytes: &[u8]) -> bool {
     let folder = Folder::new();
-    let (name, content) = if bytes.len() % 2 == 0 { ("log.csv", log().as_bytes()) } else { ("log.ulg", ULOG) };
+    let (name, content) = if bytes.len().is_multiple_of(2) { ("log.csv", log().as_bytes()) } else { ("log.ulg", ULOG) };
     folder.put(&format!("data/hover/{name}"), content);
     folder.put("data/dataset.toml", bytes);
     read(&folder, "data", &["dataset.toml", name], ReadOptions::default())
