@@ -127,6 +127,9 @@ impl Machine {
             isa: InstructionSet::detect().map_err(Error::instruction_set)?,
             step_s,
         };
+        // All of them before any is made.
+        machine.delayed = delayed(graph, behind.iter().filter(|node| !given.contains(node)), &uniform) / step_s;
+        check_delayed(machine.delayed, step_s)?;
         let mut slots = Slots { count: 0, free: Vec::new(), of: vec![None; graph.nodes.len()] };
         // Columns of constants are filled once, so they are never given to anything else.
         let of_constant = |node: &Node| Some((slots.take(*node), uniform[node.0 as usize]?));
@@ -189,10 +192,6 @@ impl Machine {
             Kind::Recall(recall, [x, time, tangent, limit]) => {
                 let number = uniform[time.0 as usize];
                 check_time(recall, number)?;
-                if matches!(recall, Recall::History(History::Delay) | Recall::DelayByTime) {
-                    self.delayed += number.unwrap_or(0.0) / step_s;
-                    check_delayed(self.delayed, step_s)?;
-                }
                 self.memory.push(Memory::new(recall, number, step_s));
                 let (x, number, tangents) = (slots.of(x), slots.of(time), [slots.of(tangent), slots.of(limit)]);
                 Step::Recall { memory: self.memory.len() as u32 - 1, x, number, tangents, out: slots.take(node) }
@@ -269,6 +268,15 @@ impl Machine {
     pub fn root(&self, index: usize) -> &[f64] {
         &self.columns[self.roots[index] as usize * self.block..][..self.block]
     }
+}
+
+/// Seconds that the delays among these nodes keep, but for those of what is the same at all samples.
+fn delayed<'a>(graph: &Graph, nodes: impl Iterator<Item = &'a Node>, uniform: &[Option<f64>]) -> f64 {
+    let one = |node: &Node| match graph.nodes[node.0 as usize] {
+        Kind::Recall(Recall::History(History::Delay) | Recall::DelayByTime, [_, time, ..]) => uniform[time.0 as usize],
+        _ => None,
+    };
+    nodes.filter(|node| uniform[node.0 as usize].is_none()).filter_map(one).map(|time_s| time_s.max(0.0)).sum()
 }
 
 /// Refuses delays that would keep too much.

@@ -21,9 +21,9 @@ impl History {
 /// Samples that a delay keeps beyond those it needs, so that it forgets seldom.
 const SPARE: usize = 512;
 
-/// Samples that all delays of a model, or of the inputs of a network, may keep: 60 s at 16 kHz. Sixteen bytes each are asked for before the first
-/// sample, whatever a file says of time and step.
-pub(super) const MOST_DELAYED: f64 = 1e6;
+/// Samples that all delays of a model, or of the inputs of a network, may keep: 60 s at more than 100 kHz. Sixteen bytes each are asked for before
+/// the first sample, whatever a file says of times and step.
+pub(super) const MOST_DELAYED: f64 = 1e7;
 
 /// State of one operator. T is the step.
 #[derive(Clone, Debug)]

@@ -11,9 +11,9 @@ use std::backtrace::Backtrace;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::OnceLock;
-use targets::{MOST_BYTES, TARGETS, hostile, seeds};
+use targets::{MOST_BYTES, TARGETS, Target, hostile, seeds};
 
-static TARGET: OnceLock<fn(&[u8]) -> bool> = OnceLock::new();
+static TARGET: OnceLock<Target> = OnceLock::new();
 
 fuzz_target!(init: set_up(), |bytes: &[u8]| {
     let Some(target) = TARGET.get() else { return };

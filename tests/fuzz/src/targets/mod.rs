@@ -18,7 +18,7 @@ use phyture::sim::{Level, Simulation, simulate};
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-/// Reads bytes, and tells whether the reader took them.
+/// Reads any bytes, and tells whether the reader took them.
 pub type Target = fn(&[u8]) -> bool;
 
 /// The functions, by the names of their folders in `fixtures/hostile`.
@@ -39,8 +39,9 @@ pub const TARGETS: [(&str, Target); 14] = [
     ("http", studio::http),
 ];
 
-/// Memory that one reading may take, bytes. The inputs have some thousand bytes, so whatever takes more believes a size.
-pub const MOST_BYTES: usize = 64 << 20;
+/// Memory that one reading may take, bytes: that of the longest delays which a formula may have, 10⁷ samples of 16 bytes. All else takes some million;
+/// the inputs have some thousand bytes, so whatever takes more believes a size.
+pub const MOST_BYTES: usize = 192 << 20;
 
 /// Time between two samples, s.
 const STEP_S: f64 = 0.01;
