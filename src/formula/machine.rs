@@ -287,7 +287,7 @@ fn check_delayed(samples: f64, step_s: f64) -> Result<()> {
     Err(Error::Config {
         place: "formula".into(),
         field: "delay".into(),
-        found: format!("{} s in all, {samples:.1e} samples of {step_s:e} s", samples * step_s),
+        found: format!("{} s in all, {samples:.2e} samples of {step_s:e} s", (1e6 * samples * step_s).round() / 1e6),
         expected: format!("at most {MOST_DELAYED:e} samples, which can be kept"),
     })
 }

@@ -211,6 +211,7 @@ impl Studio {
                 Earlier::GoOn => self.begun_on(&path)?,
                 Earlier::Refuse | Earlier::Replace => (wanted.config()?, self.now(), Vec::new()),
             };
+            check_place(&path)?;
             let folder = RunFolder::create(&path)?;
             if wanted.earlier == Earlier::Refuse && folder.is_begun() {
                 return Err(Error::Exists { path, what: "a training run".into() });
@@ -375,6 +376,27 @@ impl Studio {
     fn step_s(&self) -> f64 {
         self.set.flights.first().map_or(0.01, |flight| flight.step_s)
     }
+}
+
+/// A run has a folder of its own: a new one in a folder that is there, an empty one, or that of an earlier run.
+fn check_place(path: &Path) -> Result<()> {
+    let refuse = |found: String, expected: &str| Err(fault("folder", found, expected));
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !parent.is_dir() {
+        return refuse(
+            format!("`{}`, in a folder that is not there", path.display()),
+            "a folder that is there, with the name of the run behind it",
+        );
+    }
+    let is_run = Checkpointed::read(path).map_or(true, |found| found.is_some()) || path.join("network.safetensors").is_file();
+    let mut listed = std::fs::read_dir(path).into_iter().flatten().flatten();
+    if !is_run && listed.any(|entry| !entry.file_name().to_string_lossy().starts_with('.')) {
+        return refuse(
+            format!("`{}`, which holds other files", path.display()),
+            "a folder for the run alone: a new one, or that of an earlier run",
+        );
+    }
+    Ok(())
 }
 
 /// What a configuration trains, in words.

@@ -107,8 +107,11 @@ fn a_run_of_another_model_says_so_and_one_that_is_going_is_saved_at_the_end() ->
     let unfinished = next.training_plan().unfinished;
     assert!(unfinished[0].why.as_deref().is_some_and(|why| why.contains("none of the steps here")), "{unfinished:?}");
     assert!(matches!(next.train(&wanted(&run, Earlier::GoOn)), Err(Error::File { .. })));
-    // Nothing that cannot be is begun.
+    // Nothing that cannot be is begun, and nothing among other files.
+    let nowhere = place.path().join("nowhere").join("run");
     for wrong in [
+        wanted(place.path(), Earlier::Refuse),
+        wanted(&nowhere, Earlier::Refuse),
         TrainingWanted { width: 0, ..wanted(&run, Earlier::Replace) },
         TrainingWanted { epochs: 0, ..wanted(&run, Earlier::Replace) },
         TrainingWanted { folder: " ".into(), ..wanted(&run, Earlier::Refuse) },
@@ -116,6 +119,7 @@ fn a_run_of_another_model_says_so_and_one_that_is_going_is_saved_at_the_end() ->
         assert!(next.train(&wrong).is_err(), "{wrong:?}");
         assert_eq!(next.training().progress, Progress::Idle);
     }
+    assert!(!nowhere.exists() && !place.path().join("checkpoint.phyture").exists());
     std::fs::write(run.join("checkpoint.phyture"), "torn").map_err(Error::io(&run))?;
     assert!(next.training_plan().unfinished[0].why.as_deref().is_some_and(|why| why.contains("checkpoint")));
     Ok(())

@@ -42,18 +42,19 @@ export function keysHelp() {
 
 /** @param {import('./main.js').App} app */
 export function saveDialog(app) {
+  const { file } = app.steps;
   const model = row(
     app,
     'save',
     'Model file',
-    app.steps.file?.replace(/\.toml$/, '-studio.toml') ?? 'model-studio.toml',
+    file ? file.replace(/(-studio)?\.toml$/, '-studio.toml') : 'model-studio.toml',
     'The model with its numbers, for calibrate, diagnose, train. What a search found goes into a ledger beside it.',
   );
   const page = row(
     app,
     'save_page',
     'Page',
-    'studio.html',
+    file ? file.replace(/[^\\/]*$/, 'studio.html') : 'studio.html',
     'Measured against predicted, before the changes and now, as one file to give away.',
   );
   dialog('Save', model, page);

@@ -115,7 +115,7 @@ export function editor(app) {
       'details',
       {},
       h('summary', {}, 'names it may read'),
-      h('p', { class: 'names' }, [...names, ...signals.map(([signal]) => signal)].join('  ')),
+      h('p', { class: 'names' }, [...new Set([...names, ...signals.map(([signal]) => signal)])].join('  ')),
     ),
   );
 }

@@ -168,6 +168,9 @@ function findings(app, job, has) {
     'div',
     { id: 'findings' },
     h('div', { class: 'verdict' }, h('p', {}, prose(found.summary)), all),
+    steps.length > open.length
+      ? h('p', { class: 'fall', id: 'added' }, `${steps.length - open.length} of ${steps.length} in the model${open.length ? `, ${open.length} left` : ': all that was found'}.`)
+      : null,
     steps.map((step) => effect(app, found, step, has.has(step.effect))),
     (found.unknown ?? []).map((one) => unknown(app, one)),
     found.notes.length
@@ -284,11 +287,18 @@ function effect(app, found, step, isIn) {
       h(
         'small',
         { class: 'quiet' },
-        worth ? 'of the error on unseen flights would come back without it' : 'of the error on held-out blocks removed',
+        worth
+          ? 'of the squared error on unseen flights would come back if it alone were taken out of all that was found'
+          : 'of the squared error on held-out blocks removed',
       ),
     ),
     h('div', { 'data-curve': step.effect }),
-    h('table', { class: 'numbers' }, h('tbody', {}, coefficients, parameters)),
+    h(
+      'table',
+      { class: 'numbers' },
+      h('caption', {}, 'Fitted together with all that was found; without the rest it comes out otherwise'),
+      h('tbody', {}, coefficients, parameters),
+    ),
     h('pre', {}, shorter(step.formula)),
     step.indistinguishable.length
       ? h(

@@ -197,6 +197,8 @@ function head() {
       tool('help', '?', 'keys', true, keysHelp),
     ),
   );
+  // Where the tabs are wider than the screen, the one that is shown stands in it.
+  byId('head').querySelector('nav [aria-current]')?.scrollIntoView({ block: 'nearest', inline: 'nearest' });
 }
 
 /** @param {string} path */
@@ -234,7 +236,11 @@ function score() {
       ),
     );
   };
-  byId('score').replaceChildren(h('h2', { class: 'unseen' }, 'Errors'), ...overview.channels.map(cell));
+  byId('score').replaceChildren(
+    h('h2', { class: 'unseen' }, 'Errors'),
+    ...overview.channels.map(cell),
+    h('p', { class: 'basis' }, `Root mean square errors; ${steps.judged_on}`),
+  );
 }
 
 /** All but the view. */

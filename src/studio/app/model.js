@@ -152,6 +152,9 @@ function effectCard(app, effect, preview) {
   );
 }
 
+/** How long a slider rests before its number is taken, ms. */
+const REST_MS = 600;
+
 /**
  * @param {import('./main.js').App} app
  * @param {import('./api.js').Effect} effect
@@ -163,6 +166,12 @@ function slider(app, effect, one, preview) {
   const id = `n-${effect.name}-${one.name}`;
   const shown = h('output', { for: id }, measure(one.value, one.unit));
   const moved = () => ({ effect: effect.name, number: one.name, value: Number(input.value) });
+  // Keys that follow each other are one step.
+  let rests = 0;
+  const rest = () => {
+    window.clearTimeout(rests);
+    rests = window.setTimeout(() => app.edit({ do: 'move', ...moved() }), REST_MS);
+  };
   const input = h('input', {
     type: 'range',
     id,
@@ -175,7 +184,7 @@ function slider(app, effect, one, preview) {
       shown.replaceChildren(measure(Number(input.value), one.unit));
       preview.move(moved());
     },
-    onchange: () => app.edit({ do: 'move', ...moved() }),
+    onchange: rest,
   });
   input.value = String(one.value);
   const says = [

@@ -163,6 +163,20 @@ function spectral(channel, found) {
 }
 
 /**
+ * The stick that the residual follows most, in units of what chance reaches.
+ * @param {import('./api.js').Following[]} sticks
+ */
+function follows(sticks) {
+  const all = sticks.flatMap((one) =>
+    one.lag_s.map((lag, index) => ({ stick: one.stick, lag, value: one.correlation[index], chance: one.band95[index] })),
+  );
+  const behind = all.filter(({ lag, chance }) => lag >= 0 && chance !== null && chance > 0);
+  const most = behind.reduce((best, one) => (Math.abs(one.value) / Number(one.chance) > Math.abs(best.value) / Number(best.chance) ? one : best), behind[0]);
+  if (!most) return '';
+  return `Most of all it follows ${most.stick}: ${number(most.value, 2)} after ${measure(most.lag, 's')}, where chance reaches ±${number(most.chance, 2)}.`;
+}
+
+/**
  * @param {import('./api.js').Channel} channel
  * @param {import('./api.js').Following[]} sticks
  */
@@ -198,7 +212,7 @@ function following(channel, sticks) {
       { class: answers.length ? 'rise' : 'quiet' },
       answers.length
         ? `${answers.join(', ')} ${answers.length > 1 ? 'answer' : 'answers'} to the residual: left of zero it comes first. The pilot or an autopilot corrects what the model does not know, so what this stick seems to explain need not be its effect.`
-        : 'Within the band all is chance (95 %). Right of zero the residual follows the stick, as a delay or a lag would make it; left of zero the stick answers to the residual. None clearly does.',
+        : `Within the band all is chance (95 %). ${follows(sticks)} Right of zero the residual follows the stick, as a delay or a lag that is missing would make it. Left of zero the stick would answer to the residual: none clearly does.`,
     ),
   );
 }

@@ -268,7 +268,7 @@ function over({ rollouts, basis, caution, legend: meaning }) {
               class: sure ? (change < 0 ? 'fall' : 'rise') : 'quiet',
               title: `sum of the error over the horizon, ${ends ? `95 % interval ${percent(ends[0] / 100)} … ${percent(ends[1] / 100)}` : 'no interval'}`,
             },
-            ` ${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change) / 100)}`,
+            ` ${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change) / 100)} in sum`,
           ),
     );
   };

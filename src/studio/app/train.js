@@ -14,6 +14,9 @@ const LOOK_MS = 500;
 const HISTORIES = [64, 128, 256, 512];
 const WIDTHS = [16, 32, 64];
 
+/** More epochs than these are asked about. */
+const MANY_EPOCHS = 1000;
+
 /** The unit of a loss: squared errors summed over the channels. */
 const LOSS = '(m/s²)² + (rad/s²)²';
 
@@ -95,10 +98,20 @@ function form(app, plan, into) {
   const told = h('p', { class: 'told', role: 'status', id: 'train-told' });
   const chosen = { history: plan.history, width: plan.width };
   const seconds = (/** @type {number} */ samples) => `${number(samples * plan.step_s)} s`;
+  let asked_about = 0;
+  const wrong = (/** @type {(Node | string)[]} */ ...what) => {
+    told.dataset.state = 'wrong';
+    told.replaceChildren(...what);
+  };
   const begin = async (/** @type {'refuse' | 'replace'} */ earlier) => {
     const count = Number(epochs.value);
     if (!Number.isInteger(count) || count < 1) {
-      told.replaceChildren('Epochs: a whole number of 1 and more is expected.');
+      wrong('Epochs: a whole number of 1 and more is expected.');
+      return;
+    }
+    if (count > MANY_EPOCHS && asked_about !== count) {
+      asked_about = count;
+      wrong(`${count.toLocaleString('en')} epochs may take days: press Train once more if they are meant.`);
       return;
     }
     try {
@@ -107,7 +120,7 @@ function form(app, plan, into) {
     } catch (error) {
       const exists = error instanceof Refused && error.kind === 'exists';
       const replace = h('button', { type: 'button', id: 'train-replace', onclick: () => begin('replace') }, 'Train anew in its place');
-      told.replaceChildren(error instanceof Error ? `${error.message}. ` : '', exists ? replace : '');
+      wrong(error instanceof Error ? `${error.message}. ` : '', exists ? replace : '');
     }
   };
   return h(
@@ -264,7 +277,11 @@ function says({ progress, steps, epochs, loss, seconds, left_s, error, trained, 
  * A time that nobody needs to the second.
  * @param {number} seconds
  */
-const roughly = (seconds) => (seconds < 100 ? `${Math.max(1, Math.round(seconds))} s` : `${Math.round(seconds / 60)} min`);
+const roughly = (seconds) => {
+  if (seconds < 100) return `${Math.max(1, Math.round(seconds))} s`;
+  if (seconds < 100 * 60) return `${Math.round(seconds / 60)} min`;
+  return seconds < 48 * 3600 ? `${Math.round(seconds / 3600)} h` : `${Math.round(seconds / 86400)} days`;
+};
 
 /** @param {number} share */
 function bar(share) {
@@ -343,7 +360,7 @@ function table(found, channels) {
       'tr',
       { 'data-channel': symbol },
       h('th', { scope: 'row' }, h('b', {}, symbol), h('small', { class: 'quiet' }, ` ${name.replace(' acceleration', '')}`)),
-      h('td', { class: 'fill' }, stacked(symbol, all, parts)),
+      h('td', { class: 'fill' }, stacked(symbol, all, parts.slice(1))),
       parts.map(([, words, , index]) => {
         const one = all[index];
         return h('td', { title: one?.ci95 ? `${words}: 95 % interval ${percent(one.ci95[0])} … ${percent(one.ci95[1])}` : '' }, percent(one?.share));
@@ -357,14 +374,14 @@ function table(found, channels) {
     h(
       'p',
       { class: 'legend' },
-      parts.map(([, words, colour]) => h('span', {}, s('svg', { width: 14, height: 10, 'aria-hidden': 'true' }, s('rect', { class: `part ${colour}`, width: 14, height: 10 })), ` ${words}`)),
+      parts.slice(1).map(([, words, colour]) => h('span', {}, s('svg', { width: 14, height: 10, 'aria-hidden': 'true' }, s('rect', { class: `part ${colour}`, width: 14, height: 10 })), ` ${words}`)),
     ),
     scroller(
       'Who explains what',
       h(
         'table',
         { class: 'numbers wide explained' },
-        h('caption', {}, 'Shares of the variance of what was measured, and the root mean square error without and with the network'),
+        h('caption', {}, 'Bars: who takes what of that which physics leaves. Numbers: shares of the variance of what was measured, and the root mean square error without and with the network'),
         h('thead', {}, h('tr', {}, ['acceleration', '', ...parts.map(([, words]) => words), 'physics alone', 'with network'].map((text) => (text ? h('th', { scope: 'col' }, text) : h('td'))))),
         h('tbody', {}, channels.map(row)),
       ),
@@ -374,14 +391,14 @@ function table(found, channels) {
 }
 
 /**
- * The shares as one bar; a share below zero has no length.
+ * Who takes what of that which physics leaves, as one bar; a share below zero has no length.
  * @param {string} symbol
  * @param {(import('./api.js').Share | null)[]} all
  * @param {(readonly ['physics' | 'linear' | 'network' | 'neither', string, string, number])[]} parts
  */
 function stacked(symbol, all, parts) {
   const lengths = parts.map(([, , , index]) => Math.max(0, all[index]?.share ?? 0));
-  const whole = Math.max(1, lengths.reduce((sum, one) => sum + one, 0));
+  const whole = lengths.reduce((sum, one) => sum + one, 0) || 1;
   let at = 0;
   const pieces = parts.map(([, words, colour, index], order) => {
     const [x, width] = [(200 * at) / whole, (200 * lengths[order]) / whole];

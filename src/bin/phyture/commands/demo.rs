@@ -158,6 +158,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let outlet = figures.beside(context, target)?;
     let Scale { minutes, config } = Scale::new(*quick, context.seed());
 
+    context.say(format!("{minutes} minutes of flight and the whole story on them, in six steps; the full demo takes about two minutes on two cores at rest"));
     let Flown { set, explainable, hidden } = fly(context, out, minutes)?;
 
     context.say("\n2. Conventions and timing of the data");
@@ -229,6 +230,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     folder.close()?;
     let (report, seconds) = (report_path, begun.elapsed().as_secs_f64());
     context.say(format!("done in {seconds:.0} s"));
+    context.say(format!("the same flights in a browser: phyture studio {0}/flights -m {0}/model.toml", out.display()));
     context.json(&Output { rounds, together, comparison: judged.comparison, report, seconds })?;
     Ok(ExitCode::SUCCESS)
 }
