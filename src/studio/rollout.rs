@@ -159,9 +159,7 @@ impl Studio {
             rollouts: Rollouts::clone(&made),
         }))
     }
-}
 
-impl Studio {
     /// The network that is rolled out, and which version of its file it is; neither without a name.
     fn rolled(&self, network: Option<&str>) -> Result<(Option<Version>, Arc<Content>)> {
         let Some(name) = network else { return Ok((None, Arc::default())) };

@@ -1,8 +1,10 @@
 //! A network trained on what a state leaves over: begun in a run folder, watched, stopped, gone on with; and who explains what once it is there. One
 //! at a time. The run itself is `workflow::train`'s, and what it leaves on disk is what `train` on the command line leaves.
 
+use super::found::Found;
 use super::history::State;
 use super::job::{Progress, unbroken};
+use super::recent::Recent;
 use super::runs::Version;
 use super::{Studio, fault, held};
 use crate::critique::shares::Shares;
@@ -11,8 +13,6 @@ use crate::error::{Error, Result};
 use crate::flight::split::{SEGMENT_S, Split};
 use crate::hybrid::linear::LinearConfig;
 use crate::nn::{Architecture, PhyTureConfig};
-use crate::studio::Found;
-use crate::studio::recent::Recent;
 use crate::tape::Threads;
 use crate::train::{Begun, Checkpointed, EpochLoss, Event, RunFolder, TrainConfig, Training};
 use crate::workflow::{Epoch, TrainedNetwork, train, training_digest};
@@ -95,7 +95,7 @@ pub struct TrainingText {
     pub progress: Progress,
     /// What is trained, in words.
     pub says: String,
-    /// Its folder, and the name of its network among the runs.
+    /// Its folder.
     pub folder: String,
     /// Name of the network among the runs.
     pub name: String,
@@ -181,7 +181,9 @@ impl Studio {
         let numbered = |number: usize| folder.join(if number == 1 { FOLDER.into() } else { format!("{FOLDER}-{number}") });
         let free = (1..).map(numbered).find(|path| !path.exists()).unwrap_or_else(|| folder.join(FOLDER));
         let sizes = TrainConfig::in_minutes();
-        let width = if let Architecture::PhyTure(network) = &sizes.network { network.d_model } else { 0 };
+        let Architecture::PhyTure(PhyTureConfig { d_model: width, .. }) = sizes.network else {
+            unreachable!("what ends in minutes is a Phy-Ture")
+        };
         TrainingPlan {
             folder: free.display().to_string(),
             history: sizes.network.history(),
