@@ -8,6 +8,7 @@ import { measure, number, percent, time } from './format.js';
 import { DASHES, legend, lines, tables } from './lines.js';
 import { read, slide } from './place.js';
 import { stack, timeWidth } from './plots.js';
+import { networksOf } from './runs.js';
 
 /** @type {import('./plots.js').Stack | null} */
 let strip = null;
@@ -53,7 +54,7 @@ export async function show(app, into) {
   const at_s = place.at ?? place.from;
   /** @type {import('./api.js').Runs} */
   const runs = await ask('runs');
-  const networks = runs.rows.filter((run) => run.kind === 'network' && run.error === null).map((run) => run.name);
+  const networks = networksOf(runs);
   const network = networks.includes(place.network) ? place.network : null;
   /** @type {[import('./api.js').Trace, import('./api.js').Rollout | import('./api.js').Missing]} */
   const [trace, found] = await Promise.all([

@@ -9,6 +9,12 @@ import { read, slide } from './place.js';
 let asked = 0;
 
 /**
+ * Names of the networks that read, the newest first.
+ * @param {import('./api.js').Runs} found
+ */
+export const networksOf = (found) => found.rows.filter((run) => run.kind === 'network' && run.error === null).map((run) => run.name);
+
+/**
  * A row of the table: the present state, or a file.
  * @typedef {object} Row
  * @property {import('./api.js').Run | null} run none for the present state

@@ -6,6 +6,7 @@ import { choice, h, prose, s, scroller } from './dom.js';
 import { interval, measure, number, percent } from './format.js';
 import { lines } from './lines.js';
 import { go, read, slide } from './place.js';
+import { networksOf } from './runs.js';
 
 /** How often a running training is asked how far it is, ms. */
 const LOOK_MS = 500;
@@ -43,7 +44,7 @@ export async function show(app, into) {
   const isHere = () => mine === asked && read().view === 'train';
   if (!isHere()) return;
   const goes = running(training);
-  const networks = runs.rows.filter((run) => run.kind === 'network' && run.error === null).map((run) => run.name);
+  const networks = networksOf(runs);
   into.replaceChildren(
     h(
       'div',
