@@ -5,7 +5,7 @@ mod support;
 
 use phyture::flight::attitude::{Axes, cross, euler_to_quaternion, gravity_body, rotate, rotation_body_to_inertial};
 use phyture::flight::read::{ReadOptions, data_set};
-use phyture::flight::{Column, DataSet, Targets};
+use phyture::flight::{Column, DataSet, Flight, Targets};
 use phyture_kernels::Tolerance;
 use std::f64::consts::{FRAC_PI_2, PI};
 use support::*;
@@ -118,6 +118,15 @@ fn gaps_split_on_request_and_short_pieces_are_left_out_aloud() -> Outcome {
         &notes,
         &["cut at a jump of 0.210 s before t = 1.200 s", "the piece of 0.10 s (10 samples) from t = 1.20 s on is left out"],
     );
+    Ok(())
+}
+
+#[test]
+fn a_sample_alone_between_gaps_is_no_flight() -> Outcome {
+    let sheet = Sheet::canonical(200).keep_rows(|row| !(90..110).contains(&row) || row == 100);
+    let data = read_with(&sheet.csv(), "", &ReadOptions { split_at_gaps: true, ..ReadOptions::default() })?;
+    assert_eq!(data.flights.iter().map(Flight::len).collect::<Vec<_>>(), [90, 90]);
+    assert_says(&data.notes.join("\n"), &["the piece of 0.01 s (1 sample) from t = 1.00 s on is left out"]);
     Ok(())
 }
 

@@ -87,8 +87,11 @@ struct Identity<'a> {
     alone: bool,
 }
 
+/// Rows below which a piece has no step of its own, so that no file of it could be read.
+const LEAST_ROWS: usize = 2;
+
 fn too_short(rows: usize, step_s: f64, schema: &Schema, cuts: Cuts) -> bool {
-    rows < cuts.minimum_rows.max(1) || (rows as f64) * step_s < schema.minimum_length_s
+    rows < cuts.minimum_rows.max(LEAST_ROWS) || (rows as f64) * step_s < schema.minimum_length_s
 }
 
 fn left_out(name: &str, rows: usize, start_s: f64, step_s: f64) -> String {
@@ -155,7 +158,7 @@ fn of_part(
         let run_start_s = start_s + step_s * run.start as f64;
         if too_short(run.len(), step_s, schema, cuts) {
             if alone && run.len() == samples {
-                let least = cuts.minimum_rows.max((schema.minimum_length_s / step_s).ceil() as usize);
+                let least = cuts.minimum_rows.max(LEAST_ROWS).max((schema.minimum_length_s / step_s).ceil() as usize);
                 let expected = format!("at least {least}, the length of the history (or `minimum_length_s` in dataset.toml)");
                 return Err(table.fault(format!("{samples} samples"), expected));
             }
