@@ -1,20 +1,25 @@
 //! How long a prediction takes in flight: a hybrid fed at the rate of its log, sample by sample in real time, on one thread. Prints one JSON line.
 //!
-//! `cargo bench --features sim --bench latency -- HISTORY WIDTH SECONDS [EVERY]`: a Phy-Ture of this history and width, untrained (time does not
-//! depend on weights), on a physics with the whole catalogue switched on, with envelope and intervals; the network looks at every EVERY-th sample. The
-//! same samples then go through the physics alone. Between samples the thread sleeps, as it does in flight, so caches and clock
+//! `cargo bench --features sim --bench latency -- HISTORY WIDTH SECONDS [EVERY] [FOLDER]`: a Phy-Ture of this history and width, untrained (time does
+//! not depend on weights), on a physics with the whole catalogue switched on, with envelope and intervals; the network looks at every EVERY-th sample.
+//! The same samples then go through the physics alone. Between samples the thread sleeps, as it does in flight, so caches and clock
 //! are as cold as they are there. `run.py` beside it does the same with other programs, and makes the table.
+//!
+//! With a FOLDER, `hybrid.safetensors` and `window.safetensors` are left there: the weights, one window as the network sees it (`input.state` and
+//! `input.physics`, standardised) and what the network says about it, on its unit scale (`output`), so that another program can compute the same.
 
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::windows::windows;
-use phyture::flight::{DataSet, PerChannel};
+use phyture::flight::{DataSet, PerChannel, Window};
 use phyture::hybrid::{Description, Hybrid, sequence};
 use phyture::nn::PhyTureConfig;
+use phyture::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use phyture::physics::{Model, catalogue, typical};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
 use phyture::{Error, Result};
 use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Largest and present resident memory of this process, MiB; Linux tells.
@@ -60,6 +65,30 @@ fn hybrid(set: &DataSet, history: usize, width: usize) -> Result<Hybrid> {
     Ok(hybrid)
 }
 
+/// Weights, a window and what the network says about it, for other programs.
+fn exchange(folder: &Path, hybrid: &Hybrid, set: &DataSet, history: usize) -> Result<()> {
+    let (description, window) = (hybrid.description(), Window { flight: 0, last: history });
+    let flights = set.flights.get(..1).unwrap_or_default();
+    let sequences = sequence::sequences(flights, description)?;
+    let [sequence] = sequences.as_slice() else { unreachable!("a sequence for each flight") };
+    let said = hybrid.predict(flights, &[window], Threads(1))?;
+    let (baseline, scales) = (sequence.baseline(window.last), &description.scaling.output);
+    let on_unit_scale = |said: &PerChannel<f64>| {
+        PerChannel::from_fn(|channel| (said[channel] - baseline[channel] - scales[channel].mean) / scales[channel].deviation)
+            .into_array()
+    };
+    let (mut state, mut physics) = (vec![0.0; history * description.inputs.len()], vec![0.0; history * 6]);
+    sequence.history(window.last, &mut state, &mut physics);
+    let rows = |numbers: Vec<f32>| Tensor { shape: vec![1, history, numbers.len() / history], numbers: Numbers::F32(numbers) };
+    let tensors = [
+        ("input.state".into(), rows(state)),
+        ("input.physics".into(), rows(physics)),
+        ("output".into(), Tensor { shape: vec![1, 1, 6], numbers: Numbers::F64(said.iter().flat_map(on_unit_scale).collect()) }),
+    ];
+    SafeTensors { metadata: [].into(), tensors: tensors.into() }.write(&folder.join("window.safetensors"))?;
+    hybrid.write(&folder.join("hybrid.safetensors"))
+}
+
 /// Sleeps to the next multiple of `step` and times what is done then, s.
 fn paced(samples: usize, step: Duration, mut work: impl FnMut(usize) -> Result<()>) -> Result<Vec<f64>> {
     let begun = Instant::now();
@@ -74,9 +103,12 @@ fn paced(samples: usize, step: Duration, mut work: impl FnMut(usize) -> Result<(
     Ok(seconds)
 }
 
-fn run(history: usize, width: usize, seconds: usize, every: NonZeroUsize) -> Result<String> {
+fn run(history: usize, width: usize, seconds: usize, every: NonZeroUsize, folder: Option<&Path>) -> Result<String> {
     let set = simulate(&Simulation { minutes: 3.0, seed: 8, ..Simulation::default() })?;
     let hybrid = hybrid(&set, history, width)?;
+    if let Some(folder) = folder {
+        exchange(folder, &hybrid, &set, history)?;
+    }
     let states: Vec<[f64; 16]> =
         set.flights.iter().flat_map(|flight| (0..flight.len()).map(|sample| flight.state(sample))).collect();
     let (before, step) = (memory_mib()[1], Duration::from_millis(10));
@@ -105,17 +137,19 @@ fn run(history: usize, width: usize, seconds: usize, every: NonZeroUsize) -> Res
 }
 
 fn main() -> std::process::ExitCode {
-    let numbers: Vec<usize> = std::env::args().skip(1).filter_map(|argument| argument.parse().ok()).collect();
+    let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| !argument.starts_with("--")).collect();
+    let numbers: Vec<usize> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
+    let folder = arguments.iter().find(|argument| argument.parse::<usize>().is_err()).map(PathBuf::from);
     let (sizes, every) = match numbers.as_slice() {
         [sizes @ .., every] if sizes.len() == 3 => (sizes, NonZeroUsize::new(*every)),
         sizes => (sizes, NonZeroUsize::new(1)),
     };
     let (&[history, width, seconds], Some(every)) = (sizes, every) else {
         // `cargo test` may start benches too; there is nothing to check here.
-        eprintln!("usage: HISTORY WIDTH SECONDS [EVERY]");
+        eprintln!("usage: HISTORY WIDTH SECONDS [EVERY] [FOLDER]");
         return std::process::ExitCode::SUCCESS;
     };
-    match run(history, width, seconds, every) {
+    match run(history, width, seconds, every, folder.as_deref()) {
         Ok(line) => {
             println!("{line}");
             std::process::ExitCode::SUCCESS

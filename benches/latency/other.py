@@ -1,21 +1,51 @@
 """One row of the latency of other programs: a forward pass of Phy-Ture on one window, called at 100 Hz in real time. Prints one JSON line.
 
-    other.py CASE HISTORY WIDTH LEVELS SECONDS
+    other.py CASE HISTORY WIDTH LEVELS SECONDS FOLDER
 
-CASE is `naive`, `fused` or `compile` for PyTorch (the network of benches/peers/torch_step.py), `onnx` for ONNX Runtime on what PyTorch exports. Started
-by `run.py` beside it.
+CASE is `naive`, `fused` or `compile` for PyTorch (the network of benches/peers/torch_step.py), `onnx` for ONNX Runtime on what PyTorch exports. Weights
+and window are those that this project's own row has left in FOLDER; what comes out has to be what it says there, or the row fails. Started by `run.py`
+beside it.
 """
 
 import io
 import json
 import pathlib
+import re
 import sys
 import time
 
 import torch
+from safetensors.torch import load_file
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "peers"))
 import torch_step  # noqa: E402
+
+# Largest difference of an output from this project's, over the largest output: rounding in f32, through some fifty layers.
+LARGEST_DIFFERENCE = 1e-3
+
+
+def name_here(name):
+    """What torch_step.py calls a parameter of the exchange with PyTorch."""
+    tree = re.fullmatch(r"mstfe\.(\d+)\.(root|[eo]+)\.(.+)", name)
+    if tree:
+        stack, node, rest = tree.groups()
+        way = [] if node == "root" else [{"e": "even", "o": "odd"}[turn] for turn in node]
+        return ".".join(["trees", stack, *way, rest])
+    return re.sub(r"^(paf|tsdp)\.", "", "tsdp.head" + name[len("tsdp.output"):] if name.startswith("tsdp.output") else name)
+
+
+def with_the_same_weights(network, folder):
+    """Every weight of the file finds its place and none is left over; gives the inputs of the window, and what should come out."""
+    weights = {name_here(name): tensor for name, tensor in load_file(folder / "hybrid.safetensors").items()}
+    missing, unexpected = network.load_state_dict(weights, strict=False)
+    if unexpected or set(missing) != {"encoding"}:
+        sys.exit(f"weights without a place: {unexpected}; places without weights: {missing}")
+    window = load_file(folder / "window.safetensors")
+    return (window["input.state"], window["input.physics"]), window["output"]
+
+
+def difference(output, expected):
+    return float((torch.as_tensor(output).double() - expected).abs().max() / expected.abs().max())
 
 
 def resident_mib():
@@ -34,16 +64,15 @@ def onnx_session(network, inputs):
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     session = onnxruntime.InferenceSession(file.getvalue(), options, providers=["CPUExecutionProvider"])
     state, physics = (tensor.numpy() for tensor in inputs)
-    return (lambda: session.run(None, {"state": state, "physics": physics})), f"ONNX Runtime {onnxruntime.__version__}"
+    return (lambda: session.run(None, {"state": state, "physics": physics})[0]), f"ONNX Runtime {onnxruntime.__version__}"
 
 
 def main():
     case, history, width, levels, seconds = sys.argv[1], *map(int, sys.argv[2:6])
     torch.set_num_threads(1)
-    torch.manual_seed(0)
     torch_step.WIDTH, torch_step.LEVELS = width, levels
     network = torch_step.PhyTure(history, 0.0, "naive" if case in ("naive", "onnx") else "fused").eval()
-    inputs = torch.rand(1, history, torch_step.STATES) * 2 - 1, torch.rand(1, history, torch_step.PHYSICS) * 2 - 1
+    inputs, expected = with_the_same_weights(network, pathlib.Path(sys.argv[6]))
     version = f"PyTorch {torch.__version__}"
     if case == "onnx":
         predict, version = onnx_session(network, inputs)
@@ -55,14 +84,16 @@ def main():
                 return run(*inputs)
 
     for _ in range(10):
-        predict()
+        found = difference(predict(), expected)
+    if not found <= LARGEST_DIFFERENCE:
+        sys.exit(f"the output differs by {found:.1e} of the largest one")
     times, begun = [], time.perf_counter()
     for sample in range(seconds * 100):
         time.sleep(max(0.0, begun + 0.01 * sample - time.perf_counter()))
         start = time.perf_counter()
         predict()
         times.append(time.perf_counter() - start)
-    print(json.dumps({"seconds": times, "resident_mib": resident_mib(), "version": version}))
+    print(json.dumps({"seconds": times, "resident_mib": resident_mib(), "difference": found, "version": version}))
 
 
 if __name__ == "__main__":

@@ -1,10 +1,11 @@
-"""Latency of a prediction in flight, beside PyTorch and ONNX Runtime on a network of the same sizes, on this machine.
+"""Latency of a prediction in flight, beside PyTorch and ONNX Runtime on the same network with the same weights, on this machine.
 
     python3 benches/latency/run.py OUT [--seconds 60]
 
 Every row is a process of its own on one core, fed at 100 Hz in real time for SECONDS, while another process keeps a second core busy where there
 is one. The rows of this project are the whole prediction: physics with the whole catalogue, network, interval, envelope. Those of the others are
-the network alone, called on a history that is there already. Writes OUT.json (every time) and OUT.md. Rows that this project loses are marked.
+the network alone, called on a history that is there already; they load the weights and a window that the first row leaves behind, and a row whose output
+is another fails. Writes OUT.json (every time) and OUT.md. Rows that this project loses are marked.
 """
 
 import argparse
@@ -13,12 +14,13 @@ import os
 import pathlib
 import subprocess
 import sys
+import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "peers"))
 import run as peers  # noqa: E402
 
-VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "onnx==1.23.2", "onnxscript==0.7.2", "onnxruntime==1.32.0"]
+VERSIONS = ["torch==2.15.0", "numpy==2.4.6", "onnx==1.23.2", "onnxscript==0.7.2", "onnxruntime==1.32.0", "safetensors==0.8.0"]
 # History, width, levels of the trees.
 SIZES = [(1000, 64, 3), (100, 16, 2)]
 
@@ -63,6 +65,7 @@ def main():
     options = parser.parse_args()
     python = peers.environment("latency-venv", VERSIONS)
     program = peers.own_program("latency", ["--features", "sim"])
+    folder = tempfile.TemporaryDirectory()
     busy = subprocess.Popen(["taskset", "-c", "1", sys.executable, "-c", "while True: pass"]) if os.cpu_count() > 1 else None
     record, lines = {}, []
     try:
@@ -70,7 +73,7 @@ def main():
             sizes = [history, width, options.seconds]
             title = f"history {history}, width {width}, {options.seconds} s at 100 Hz"
             print(title, file=sys.stderr)
-            found = {"phyture, whole prediction": measure("phyture", [program, *sizes])}
+            found = {"phyture, whole prediction": measure("phyture", [program, *sizes, 1, folder.name])}
             if found["phyture, whole prediction"] is None:
                 sys.exit("this project's own row did not run")
             found["phyture, physics alone (whole catalogue)"] = {"seconds": found["phyture, whole prediction"]["physics_seconds"]}
@@ -78,15 +81,18 @@ def main():
             for case in ["naive", "fused", "compile", "onnx"]:
                 name = {"naive": "PyTorch, stored attention map, inference_mode", "fused": "PyTorch, fused attention, inference_mode",
                         "compile": "PyTorch, torch.compile, inference_mode", "onnx": "ONNX Runtime"}[case]
-                found[name] = measure(name, [python, HERE / "other.py", case, history, width, levels, options.seconds])
+                found[name] = measure(name, [python, HERE / "other.py", case, history, width, levels, options.seconds, folder.name])
             record[title] = found
             lines += table(title, found)
     finally:
         if busy:
             busy.kill()
+        folder.cleanup()
     versions = sorted({result["version"] for found in record.values() for result in found.values() if result and "version" in result})
-    head = [f"{peers.processor()}, one core of {os.cpu_count()}, another kept busy; {'; '.join(versions)}. Memory: of phyture what the stream takes, of the others "
-            "the whole process.", ""]
+    others = [result for found in record.values() for result in found.values() if result and "difference" in result]
+    furthest = max((result["difference"] for result in others), default=0.0)
+    head = [f"{peers.processor()}, one core of {os.cpu_count()}, another kept busy; {'; '.join(versions)}. The same weights: outputs differ by at most "
+            f"{furthest:.0e} of the largest. Memory: of phyture what the stream takes, of the others the whole process.", ""]
     pathlib.Path(options.out + ".json").write_text(json.dumps(record, indent=1))
     pathlib.Path(options.out + ".md").write_text("\n".join([*head, *lines]))
     print("\n".join([*head, *lines]))
