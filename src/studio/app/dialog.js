@@ -30,14 +30,18 @@ export function keysHelp() {
     ['0', 'the whole flight (Compare)'],
     ['drag', 'zoom to what is marked; double click: the whole flight'],
   ];
-  dialog(
-    'Keys',
-    h(
-      'dl',
-      { class: 'keys' },
-      keys.flatMap(([key, does]) => [h('dt', {}, key), h('dd', {}, does)]),
-    ),
-  );
+  const words = [
+    ['residual', 'measured less predicted acceleration, at each sample'],
+    ['unseen', 'flights that no fit and no search is given: errors are judged on these'],
+    ['95 % interval', 'from blocks of flight drawn again and again, so that neighbours in time count once'],
+    ['effect', 'a piece of physics with a formula and a few numbers, which a model has or lacks'],
+    ['p', 'the chance that an effect which is not there would look at least as good'],
+    ['cannot tell it from', 'effects that would do nearly as well on these flights; which one it is, other flights would tell'],
+    ['would come back', 'how much of the squared error is there again if this effect alone is taken out'],
+  ];
+  const list = (/** @type {string[][]} */ pairs, /** @type {string} */ kind) =>
+    h('dl', { class: kind }, pairs.flatMap(([name, says]) => [h('dt', {}, name), h('dd', {}, says)]));
+  dialog('Keys and words', list(keys, 'keys'), h('h3', {}, 'Words'), list(words, 'keys words'));
 }
 
 /** @param {import('./main.js').App} app */

@@ -10,6 +10,7 @@ import { number, percent, time } from './format.js';
 import * as learn from './learn.js';
 import * as model from './model.js';
 import { go, read, slide, VIEWS } from './place.js';
+import { repaint } from './plots.js';
 import * as rollout from './rollout.js';
 import * as runs from './runs.js';
 import * as train from './train.js';
@@ -270,6 +271,21 @@ function theme() {
   draw();
 }
 
+/** Paper is light. */
+function onPaper() {
+  const root = document.documentElement;
+  window.addEventListener('beforeprint', () => {
+    root.dataset.theme = 'light';
+    repaint();
+  });
+  window.addEventListener('afterprint', () => {
+    const before = localStorage.getItem(THEME);
+    if (before) root.dataset.theme = before;
+    else delete root.dataset.theme;
+    repaint();
+  });
+}
+
 /** @param {KeyboardEvent} event */
 function key(event) {
   const target = /** @type {HTMLElement} */ (event.target);
@@ -317,6 +333,7 @@ async function start() {
   window.addEventListener('focus', look);
   // Plots are drawn in the colours of a theme: the system's may change in the evening.
   matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => draw());
+  onPaper();
   await draw();
   document.body.dataset.ready = 'yes';
   watch();

@@ -17,6 +17,14 @@ export function colours() {
   };
 }
 
+/** Pictures that are shown: their colours are asked for each time they are drawn. @type {Set<uPlot>} */
+const shown = new Set();
+
+/** Draws all again, in the colours that the style sheet has now: for paper, before it is printed. */
+export function repaint() {
+  shown.forEach((made) => made.redraw(false, true));
+}
+
 const DASHES = [[], [8, 4], [2, 3], [10, 3, 2, 3]];
 const STICKS = ['u1 lateral', 'u2 longitudinal', 'u3 tail', 'u4 collective'];
 
@@ -36,7 +44,7 @@ export function timeWidth(width) {
  */
 
 /**
- * @typedef {{ label: string, stroke: string, width?: number, dash?: number[] }} Line
+ * @typedef {{ label: string, stroke: () => string, width?: number, dash?: number[] }} Line
  */
 
 /**
@@ -58,9 +66,9 @@ export function timeWidth(width) {
  * @param {Acts} acts
  */
 function plot(title, height, lines, unit, last, { zoom, whole, pick, mark }) {
-  const { ink, quiet, grid } = colours();
+  const grid = () => colours().grid;
   const axis = {
-    stroke: quiet,
+    stroke: () => colours().quiet,
     grid: { stroke: grid, width: 1 },
     ticks: { stroke: grid, width: 1 },
     font: '12px system-ui, sans-serif',
@@ -105,7 +113,7 @@ function plot(title, height, lines, unit, last, { zoom, whole, pick, mark }) {
         time,
         ...lines.map((line) => ({
           label: line.label,
-          stroke: line.stroke || ink,
+          stroke: line.stroke,
           width: line.width ?? 1.25,
           dash: line.dash,
           value: text,
@@ -126,6 +134,7 @@ function plot(title, height, lines, unit, last, { zoom, whole, pick, mark }) {
     [[], ...lines.map(() => [])],
     holder,
   );
+  shown.add(made);
   if (pick) picks(made.over, (left) => pick(made.posToVal(left, 'x')));
   return { holder, made };
 }
@@ -169,8 +178,9 @@ function picks(over, pick) {
  * @returns {Stack}
  */
 export function stack(into, channel, now, against, acts) {
-  const { ink, lines } = colours();
-  const other = against === null ? [] : [{ label: against, stroke: lines[1], dash: DASHES[1] }];
+  const ink = () => colours().ink;
+  const line = (/** @type {number} */ index) => () => colours().lines[index];
+  const other = against === null ? [] : [{ label: against, stroke: line(1), dash: DASHES[1] }];
   const all = (acts.which ?? 'all') === 'all';
   // All three on one screen: what is left of the window below head and controls, less a legend each.
   const left = Math.max(360, Math.min(820, window.innerHeight - 330));
@@ -180,7 +190,7 @@ export function stack(into, channel, now, against, acts) {
         plot(
           channel.symbol,
           tall,
-          [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: lines[0] }, ...other],
+          [{ label: 'measured', stroke: ink, width: 1.5 }, { label: now, stroke: line(0) }, ...other],
           channel.unit,
           false,
           acts,
@@ -191,8 +201,8 @@ export function stack(into, channel, now, against, acts) {
     'residual',
     all ? middle : 170,
     [
-      { label: `measured − ${now}`, stroke: lines[0] },
-      ...other.map((line) => ({ ...line, label: `measured − ${against}` })),
+      { label: `measured − ${now}`, stroke: line(0) },
+      ...other.map((one) => ({ ...one, label: `measured − ${against}` })),
     ],
     channel.unit,
     !all,
@@ -203,7 +213,7 @@ export function stack(into, channel, now, against, acts) {
         plot(
           'sticks',
           low,
-          STICKS.map((label, index) => ({ label, stroke: lines[[4, 1, 2, 3][index]], dash: DASHES[index] })),
+          STICKS.map((label, index) => ({ label, stroke: line([4, 1, 2, 3][index]), dash: DASHES[index] })),
           '1',
           true,
           acts,
@@ -228,11 +238,16 @@ export function stack(into, channel, now, against, acts) {
       plots.forEach((one, index) =>
         one.made.setData(/** @type {uPlot.AlignedData} */ (/** @type {unknown} */ (sets[index]))),
       );
+      // The key names no line that is not there.
+      into.classList.toggle('alone', other.length > 0 && !trace.against?.length);
       resize();
     },
     destroy() {
       watch.disconnect();
-      plots.forEach((one) => one.made.destroy());
+      plots.forEach((one) => {
+        shown.delete(one.made);
+        one.made.destroy();
+      });
     },
     width: () => timeWidth(into.clientWidth),
   };

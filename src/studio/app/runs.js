@@ -72,7 +72,7 @@ function page(app, found, rows) {
   const of = (/** @type {Row} */ row) => row.errors?.rmse[key(channel)] ?? Infinity;
   const [now, ...files] = rows;
   if (sort === 'error') files.sort((left, right) => of(left) - of(right));
-  const least = channels.map((_, index) => Math.min(...rows.map((row) => row.errors?.rmse[key(index)] ?? Infinity)));
+  const best = channels.map((_, index) => clearlyLeast(rows, key(index)));
   const sorts = /** @type {[string, string][]} */ ([
     ['date', 'Newest first'],
     ['error', `Least error of ${channels[channel].symbol} first`],
@@ -106,7 +106,7 @@ function page(app, found, rows) {
             ),
           ),
         ),
-        h('tbody', {}, [now, ...files].map((row) => line(app, row, now, least))),
+        h('tbody', {}, [now, ...files].map((row) => line(app, row, now, best))),
       ),
     ),
     found.why ? h('p', { class: 'rise' }, `${found.why}; save the model, and its folder is looked into.`) : null,
@@ -117,18 +117,32 @@ function page(app, found, rows) {
     h(
       'p',
       { class: 'quiet' },
-      `Root mean square errors, the least of each column bold; below each how it differs from the present state. ${bases.join('; ')}${bases.length ? '. ' : ''}A run that was fitted on these very flights is judged too well: what it was fitted on stands in its file.`,
+      `Root mean square errors; in bold the one whose 95 % interval lies below all others of its column; below each how it differs from the present state. ${bases.join('; ')}${bases.length ? '. ' : ''}A run that was fitted on these very flights is judged too well: what it was fitted on stands in its file.`,
     ),
   );
+}
+
+/**
+ * The row whose error is less than all others' by more than their intervals, if there is one.
+ * @param {Row[]} rows
+ * @param {keyof import('./api.js').PerChannel} channel
+ */
+function clearlyLeast(rows, channel) {
+  const judged = rows.flatMap((row) => {
+    const ends = row.errors?.ci95[channel];
+    return ends ? [{ row, ends }] : [];
+  });
+  const clear = judged.find((one) => judged.every((other) => other === one || one.ends[1] < other.ends[0]));
+  return judged.length > 1 && clear ? clear.row : null;
 }
 
 /**
  * @param {import('./main.js').App} app
  * @param {Row} row
  * @param {Row} now the present state
- * @param {number[]} least by channel
+ * @param {(Row | null)[]} best by channel
  */
-function line(app, row, now, least) {
+function line(app, row, now, best) {
   const { channels } = app.overview;
   const { run, errors, fault } = row;
   const steps = app.steps.steps;
@@ -141,7 +155,7 @@ function line(app, row, now, least) {
     return h(
       'td',
       { title: errors ? `${of.name}: ${measure(value, of.unit)} [${interval(errors.ci95[of.symbol])}]` : '', 'data-channel': of.symbol, 'data-rmse': value },
-      value !== null && value <= least[index] ? h('b', {}, number(value)) : errors ? number(value) : '…',
+      best[index] === row ? h('b', {}, number(value)) : errors ? number(value) : '…',
       change === null
         ? null
         : h('small', { class: much ? (change < 0 ? 'fall' : 'rise') : 'quiet' }, much ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : '='),
