@@ -137,6 +137,12 @@ impl std::fmt::Display for Calibration {
                 "\n         Such a number stands in for physics that the model lacks, or a control acts otherwise than the log says."
             )?;
         }
+        if self.signs.iter().any(|doubt| doubt.finding == SignFinding::NotDetermined) {
+            write!(
+                f,
+                "\nWhere a sign is not determined, zero is possible: leave the effect out, or fly what moves it more and calibrate again."
+            )?;
+        }
         Ok(())
     }
 }
