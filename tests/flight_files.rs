@@ -197,6 +197,29 @@ fn standing_on_the_ground_is_left_out_and_said() -> Outcome {
 }
 
 #[test]
+fn of_a_description_the_stanford_layout_obeys_what_it_can_and_says_what_it_cannot() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    stanford(folder.path(), "hover_02", &Sheet::canonical(400), 0.0, &|_, _, _| {})?;
+    put(
+        folder.path(),
+        "dataset.toml",
+        "resample_hz = 50\nuse = \"vx > -1e9\"\naxes = \"ENU/FLU\"\n[units]\nvelocity = \"ft/s\"\n",
+    )?;
+    let data = data_set(folder.path(), &ReadOptions::default())?;
+    let flight = only(&data);
+    assert_eq!([flight.step_s, flight.start_s].map(f64::to_bits), [0.02, 1_217_980_000.0].map(f64::to_bits));
+    assert_says(
+        &data.notes.join("\n"),
+        &[
+            "resampled from 100.00 Hz to 50 Hz",
+            "`use` keeps 200 of 200 samples",
+            "`axes`, `units` of dataset.toml do not hold for a flight in the Stanford layout",
+        ],
+    );
+    Ok(())
+}
+
+#[test]
 fn what_is_written_in_the_stanford_layout_is_read_again() -> Outcome {
     let folder = tempfile::tempdir()?;
     let [chaos, loops] = [Sheet::canonical(300), Sheet::canonical(400)];

@@ -22,6 +22,10 @@ pub(super) const MOST_COLUMNS: usize = 10_000;
 #[cfg(feature = "files")]
 pub(super) const MOST_SAMPLES: f64 = 2e7;
 
+/// Samples that resampling may make for each one recorded: a receiver's 5 Hz at 500 Hz. More add nothing, and a small file would become a large flight.
+#[cfg(feature = "files")]
+pub(super) const MOST_NEW_PER_OLD: f64 = 100.0;
+
 /// Lowest cut-off of the differentiator as a part of the sampling rate: a window of some 40 000 samples.
 pub(super) const LOWEST_CUTOFF: f64 = 5e-5;
 

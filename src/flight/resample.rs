@@ -4,7 +4,7 @@
 //! longer of the two steps: zero-phase, exact on cubics, and band-limiting when the new rate is the lower one (−3 dB near
 //! 0.29 of the new rate, under 6 % from 0.5 on).
 
-use super::bounds::MOST_SAMPLES;
+use super::bounds::{MOST_NEW_PER_OLD, MOST_SAMPLES};
 use super::local_polynomial::{Quantity, weights};
 use crate::error::{Error, Result};
 
@@ -22,7 +22,7 @@ impl Resampler {
     /// From samples at increasing `time_s` to one every `step_s` from the first time on.
     ///
     /// # Errors
-    /// [`Error::Undetermined`] for fewer than four samples, or more new ones than a log may have.
+    /// [`Error::Undetermined`] for fewer than four samples, or more new ones than a log may have or than its own can carry.
     pub fn new(time_s: &[f64], step_s: f64) -> Result<Self> {
         let few = || Error::Undetermined(format!("{} samples are too few to resample; four are needed", time_s.len()));
         let (Some(&first), Some(&last)) = (time_s.first(), time_s.last()) else { return Err(few()) };
@@ -36,6 +36,14 @@ impl Resampler {
             let says = format!(
                 "resampling {:.0} s to {} Hz would make {steps:.1e} samples, more than {MOST_SAMPLES:.0e}",
                 last - first,
+                1.0 / step_s
+            );
+            return Err(Error::Undetermined(says));
+        }
+        if steps > MOST_NEW_PER_OLD * time_s.len() as f64 {
+            let says = format!(
+                "{:.1} samples a second cannot carry {:.0}: at most {MOST_NEW_PER_OLD} new ones are made for each",
+                1.0 / old_step_s,
                 1.0 / step_s
             );
             return Err(Error::Undetermined(says));
@@ -101,6 +109,14 @@ mod tests {
                 prop_assert!((found - value(at)).abs() <= Tolerance::Approximate.relative_f64());
             }
         }
+    }
+
+    #[test]
+    fn a_slow_log_does_not_become_a_long_one() {
+        let times: Vec<f64> = (0..1000).map(|k| 0.5 * f64::from(k)).collect();
+        assert!(Resampler::new(&times, 0.005).is_ok_and(|resampler| resampler.time_s.len() == 99_901));
+        let refused = Resampler::new(&times, 1e-5).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused.contains("2.0 samples a second cannot carry 100000: at most 100 new ones"), "{refused}");
     }
 
     #[test]

@@ -177,6 +177,10 @@ const TARGETS: [(&str, TargetKind); 4] = [
 /// Canonical columns that a log may lack besides the six accelerations.
 const MAY_LACK: [Column; 4] = [Column::X, Column::Y, Column::Z, Column::Yaw];
 
+/// Keys that hold for columns that are canonical already, or for whole logs.
+const OF_CANONICAL_COLUMNS: [&str; 10] =
+    ["use", "minimum_length_s", "resample_hz", "late", "late_in", "manoeuvre", "classes", "exclude", "leave_out", "notes"];
+
 impl Schema {
     /// Understands a `dataset.toml`; `place` is named in errors.
     ///
@@ -267,6 +271,18 @@ impl Schema {
         }
         schema.late.retain(|_, late_s| *late_s != 0.0);
         schema
+    }
+
+    /// The same for a layout that makes canonical columns by itself: what these are made of is not for the description to say.
+    pub fn of_canonical_columns(&self) -> Self {
+        let Self { rows, minimum_length_s, resample_hz, late, .. } = self.clone();
+        Self { rows, minimum_length_s, resample_hz, late, ..Self::default() }
+    }
+
+    /// The keys that are stated and do not hold for such a layout.
+    pub fn not_of_canonical_columns(&self) -> BTreeSet<&str> {
+        let keys = self.stated.keys().filter_map(|key| key.split('.').next());
+        keys.filter(|key| !OF_CANONICAL_COLUMNS.contains(key)).collect()
     }
 
     /// Factor to SI of a canonical column.

@@ -65,7 +65,7 @@ pub(super) const FORMAT: Format = Format {
     kind: "a flight in the Stanford layout",
     place: Place::Folder(is_flight),
     description: None,
-    reader: Reader::Of(|log, _, cuts| read(&log.path, &log.name, &log.manoeuvre, cuts)),
+    reader: Reader::Of(|log, schema, cuts| read(&log.path, &log.name, &log.manoeuvre, schema, cuts)),
 };
 
 /// Whether a folder is one flight in this layout.
@@ -73,15 +73,16 @@ fn is_flight(folder: &Path) -> bool {
     folder.join(SMOOTHER).is_file() && folder.join(CONTROLS).is_file()
 }
 
-/// Reads one flight's folder.
+/// Reads one flight's folder. What a description says of canonical columns holds; of what it says besides, a note tells.
 ///
 /// # Errors
 /// [`Error::Io`], [`Error::Cell`]; [`Error::Log`] if the files fit no hypothesis, with each one's error.
-fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Result<Assembled> {
+fn read(folder: &Path, name: &str, manoeuvre: &str, schema: &Schema, cuts: Cuts) -> Result<Assembled> {
     let smoother = read_table(&folder.join(SMOOTHER), &SMOOTHER_COLUMNS)?;
     let controls = read_table(&folder.join(CONTROLS), &CONTROL_COLUMNS)?;
     let times = column(&smoother, "time");
-    let parts = parts(&smoother, "time", times, Clock { split: cuts.split_at_gaps, ..Clock::default() })?;
+    let parts =
+        parts(&smoother, "time", times, Clock { split: cuts.split_at_gaps, resampled: schema.resample_hz.is_some(), unit: None })?;
     parts_of_controls(&controls)?;
 
     let idle = idle_rows(&smoother, times);
@@ -97,7 +98,7 @@ fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Result<Assemb
 
     let (first, last) = overlap(&smoother, &controls, idle)?;
     let table = canonical(&smoother.slice(first..last), &controls, &decided, scale.1);
-    let mut done = assemble(table, name, manoeuvre, &Schema::default(), cuts)?;
+    let mut done = assemble(table, name, manoeuvre, &schema.of_canonical_columns(), cuts)?;
     done.files.extend(controls.read);
     if idle > 0 {
         let idle_s = times[idle] - times[0];
@@ -108,6 +109,12 @@ fn read(folder: &Path, name: &str, manoeuvre: &str, cuts: Cuts) -> Result<Assemb
         done.own_notes.push(format!("`{name}`: {} samples without controls are left out", before + after));
     }
     done.common_notes.insert(format!("decided from the data: {}; controls: {}", decided.sentence, scale.0));
+    let not_held = schema.not_of_canonical_columns();
+    if !not_held.is_empty() {
+        let keys = not_held.into_iter().collect::<Vec<_>>().join("`, `");
+        done.common_notes
+            .insert(format!("`{keys}` of dataset.toml do not hold for {}, which is read by what it says itself", FORMAT.kind));
+    }
     Ok(done)
 }
 

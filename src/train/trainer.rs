@@ -166,6 +166,11 @@ impl<'a> Trainer<'a> {
         &self.state
     }
 
+    /// What has been learned; nothing more is.
+    pub fn into_state(self) -> State {
+        self.state
+    }
+
     /// Ends an epoch after its last step: notes its losses, and its weights where they are the best so far and to be kept. Gives the losses.
     ///
     /// # Errors

@@ -141,10 +141,9 @@ impl Training<'_> {
             true => Some(Losses { training: trainer.training_loss()?, validation: trainer.validation_loss()? }),
             false => None,
         };
-        let State { parameters, curve, best, .. } = trainer.state().clone();
+        let State { parameters, curve, best, .. } = trainer.into_state();
         let epoch = best.map_or(curve.len().saturating_sub(1), |best| best.epoch);
         let gate_windows = job.gate_windows.len();
-        drop(trainer);
         let interval_windows = std::mem::take(&mut job.interval_windows);
         let mut hybrid = job.hybrid(flights, parameters, threads)?;
         if with_losses {

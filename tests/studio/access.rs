@@ -96,6 +96,23 @@ fn print_faults(browser: &Browser, folder: &Path, name: &str) -> Result<Vec<Stri
     Ok(bad)
 }
 
+/// Whether the pictures of Compare hold the ink of the light theme, which is nearly black.
+const INKED: &str = "[...document.querySelectorAll('#compare-plots canvas')].some(canvas => { \
+    const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height); \
+    for (let at = 0; at < data.length; at += 4) if (data[at + 3] > 250 && Math.max(data[at], data[at + 1], data[at + 2]) < 38) return true; \
+    return false; })";
+
+/// Compare in the dark theme, printed: light on paper, pictures too, and dark again afterwards.
+fn print_is_light(browser: &Browser) -> Result<()> {
+    browser.cdp("Emulation.setEmulatedMedia", &json!({ "features": [{ "name": "prefers-color-scheme", "value": "dark" }] }))?;
+    browser.wait(&format!("!document.body.classList.contains('busy') && !({INKED})"))?;
+    let note = format!("window.paper = [document.documentElement.dataset.theme, {INKED}]");
+    browser.run(&format!("window.addEventListener('beforeprint', () => {{ {note} }}, {{ once: true }})"))?;
+    browser.cdp("Page.printToPDF", &json!({ "preferCSSPageSize": true, "printBackground": true }))?;
+    assert_eq!(browser.value("window.paper")?, json!(["light", true]));
+    browser.wait(&format!("!document.documentElement.dataset.theme && !({INKED})"))
+}
+
 #[test]
 fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
     let Some(browser) = Browser::start(1280, 900)? else {
@@ -132,6 +149,9 @@ fn every_view_can_be_read_by_everybody_and_printed() -> Result<()> {
         }
         browser.wait(ready)?;
         browser.wait(settled)?;
+        if view == "compare" {
+            print_is_light(&browser)?;
+        }
         if let Some(axe) = &axe {
             found.extend(faults(&browser, axe, view)?);
         }

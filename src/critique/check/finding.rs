@@ -1,5 +1,6 @@
 //! One thing that was measured, and what it means: as data, and as a line of text. Knows no check.
 
+use super::regression::Estimate;
 use crate::critique::wrap::{WIDTH, wrapped};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -88,6 +89,16 @@ impl fmt::Display for Finding {
             write!(f, "{}\n{}", figures.trim_end(), wrapped(&" ".repeat(8), &self.message))?;
         }
         self.set.iter().try_for_each(|set| write!(f, "\n{:>8}set: {}", "", set.replace('\n', "; ")))
+    }
+}
+
+/// A coefficient that is 1 where the conventions hold, and is not judged yet.
+pub(super) fn unjudged(name: &str, estimate: Option<Estimate>) -> Finding {
+    Finding {
+        measured: estimate.map(|estimate| estimate.value),
+        interval: estimate.map(|estimate| estimate.interval),
+        expected: Some(1.0),
+        ..finding(name, Severity::Undetermined, "not determined by these flights".into(), None)
     }
 }
 

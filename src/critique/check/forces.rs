@@ -4,7 +4,7 @@
 //! rotor's thrust is along the body's z axis, so the two are small. And: with free coefficients on gravity and −ω × v, are they 1? Drag and trim
 //! are fitted beside them; what else acts on the helicopter biases a coefficient by some per cent, a wrong convention by 1 or more.
 
-use super::finding::{Finding, Severity, Subject};
+use super::finding::{Finding, Severity, Subject, unjudged};
 use super::increments::{Instant, Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
@@ -175,18 +175,7 @@ impl Forces {
 }
 
 fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
-    let mut finding = Finding {
-        name: format!("{term}_{axis}"),
-        subject: Subject::Conventions,
-        verdict: Severity::Undetermined,
-        measured: estimate.map(|estimate| estimate.value),
-        interval: estimate.map(|estimate| estimate.interval),
-        expected: Some(1.0),
-        unit: "1".into(),
-        message: "not determined by these flights".into(),
-        set: None,
-        flights: Vec::new(),
-    };
+    let mut finding = unjudged(&format!("{term}_{axis}"), estimate);
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let what = if term == "gravity" { "gravity in body axes" } else { "the Coriolis term -w x v" };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;

@@ -3,7 +3,7 @@
 //! Of the heading the angle is asked by which it is turned. This is what flight test calls data compatibility (Klein & Morelli 2006, ch. 10), one
 //! linear regression a relation. Other readings of whole relations are in `relations`.
 
-use super::finding::{Finding, Severity, Subject, finding};
+use super::finding::{Finding, Severity, finding, unjudged};
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
 use super::unexplained::{self, Fit, Left};
@@ -285,18 +285,7 @@ fn reversed(estimate: Estimate, explained: Option<f64>) -> Estimate {
 }
 
 fn gain(relation: &str, axis: &str, column: &str, units: &str, estimate: Option<Estimate>) -> Finding {
-    let mut finding = Finding {
-        name: format!("{relation}_{axis}"),
-        subject: Subject::Conventions,
-        verdict: Severity::Undetermined,
-        measured: estimate.map(|estimate| estimate.value),
-        interval: estimate.map(|estimate| estimate.interval),
-        expected: Some(1.0),
-        unit: "1".into(),
-        message: "not determined by these flights".into(),
-        set: None,
-        flights: Vec::new(),
-    };
+    let mut finding = unjudged(&format!("{relation}_{axis}"), estimate);
     let Some(Estimate { interval: [low, high], value }) = estimate else { return finding };
     let beyond = |margin: f64| low > 1.0 + margin || high < 1.0 - margin;
     let off = |gain: f64| (value / gain).ln().abs();

@@ -195,7 +195,7 @@ function head() {
       tool('redo', '↷ Redo', 'key r', steps.at < steps.steps.length - 1, () => step('redo')),
       tool('save', 'Save …', 'key s', true, () => saveDialog(app)),
       tool('theme', '◐', 'light or dark', true, theme),
-      tool('help', '?', 'keys', true, keysHelp),
+      tool('help', '?', 'keys and words', true, keysHelp),
     ),
   );
   // Where the tabs are wider than the screen, the one that is shown stands in it.
@@ -240,7 +240,13 @@ function score() {
   byId('score').replaceChildren(
     h('h2', { class: 'unseen' }, 'Errors'),
     ...overview.channels.map(cell),
-    h('p', { class: 'basis' }, `Root mean square errors; ${steps.judged_on}`),
+    h(
+      'p',
+      { class: 'basis' },
+      // The head has no room for it on a narrow screen.
+      h('span', { class: 'narrow' }, h('b', {}, now.did), ` (${steps.saved ? 'saved' : 'not saved'}): `),
+      `Root mean square errors; ${steps.judged_on}`,
+    ),
   );
 }
 
