@@ -73,11 +73,11 @@ impl Severity {
 }
 
 /// Columns of a finding's verdict and name.
-const PLACE: usize = 34;
+const PLACE: usize = 35;
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:<8}{:<26}", self.verdict.word(), self.name)?;
+        write!(f, "{:<8}{:<27}", self.verdict.word(), self.name)?;
         let interval = self.interval.map(|[low, high]| format!(" [{low:.3}, {high:.3}]")).unwrap_or_default();
         let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
         let measured = self.measured.map(|value| format!("{value:.3}{interval}{unit}")).unwrap_or_default();
