@@ -106,9 +106,6 @@ fn paced(samples: usize, step: Duration, mut work: impl FnMut(usize) -> Result<(
 fn run(history: usize, width: usize, seconds: usize, every: NonZeroUsize, folder: Option<&Path>) -> Result<String> {
     let set = simulate(&Simulation { minutes: 3.0, seed: 8, ..Simulation::default() })?;
     let hybrid = hybrid(&set, history, width)?;
-    if let Some(folder) = folder {
-        exchange(folder, &hybrid, &set, history)?;
-    }
     let states: Vec<[f64; 16]> =
         set.flights.iter().flat_map(|flight| (0..flight.len()).map(|sample| flight.state(sample))).collect();
     let (before, step) = (memory_mib()[1], Duration::from_millis(10));
@@ -129,8 +126,13 @@ fn run(history: usize, width: usize, seconds: usize, every: NonZeroUsize, folder
     let of_stream = memory_mib()[1].zip(before).map(|(after, before)| after - before);
     let mut alone = hybrid.description().model.stream(0.01)?;
     let physics = paced((seconds * 100).min(1000), step, |sample| alone.push(at(sample)).map(|_| ()))?;
+    let resident = memory_mib()[1];
+    // Last: what it frees would be counted to the stream.
+    if let Some(folder) = folder {
+        exchange(folder, &hybrid, &set, history)?;
+    }
     let line = serde_json::json!({
-        "seconds": whole, "physics_seconds": physics, "stream_mib": of_stream, "resident_mib": memory_mib()[1],
+        "seconds": whole, "physics_seconds": physics, "stream_mib": of_stream, "resident_mib": resident,
         "version": format!("phyture {}", env!("CARGO_PKG_VERSION")),
     });
     Ok(line.to_string())
