@@ -59,7 +59,7 @@ impl Regime {
             Self::Descent => "descent",
             Self::Forward => "forward",
             Self::Backward => "backward",
-            Self::Sideward => "sideward",
+            Self::Sideward => "sideways",
         }
     }
 
@@ -151,7 +151,7 @@ mod tests {
         assert_eq!(regime(&[(Roll, PI), (Vx, 8.0)], &[])?, Regime::Inverted);
         assert_eq!(regime(&[(Z, -1.0), (Vx, 8.0)], &[])?, Regime::Low);
         assert_eq!(regime(&[(Z, -1.0), (Vx, 8.0)], &[Z])?, Regime::Forward);
-        // Nose up by almost a right angle and moving along the nose is a climb; on the side, moving along body down is sideward.
+        // Nose up by almost a right angle and moving along the nose is a climb; on the side, moving along body down is sideways.
         assert_eq!(regime(&[(Pitch, FRAC_PI_2 - 0.1), (Vx, 8.0)], &[])?, Regime::Climb);
         assert_eq!(regime(&[(Roll, FRAC_PI_2 - 0.1), (Vz, 8.0)], &[])?, Regime::Sideward);
         Ok(())

@@ -264,6 +264,11 @@ impl Machine {
         }
     }
 
+    /// Number of roots.
+    pub fn roots(&self) -> usize {
+        self.roots.len()
+    }
+
     /// Values of a root at the samples last taken, in front.
     pub fn root(&self, index: usize) -> &[f64] {
         &self.columns[self.roots[index] as usize * self.block..][..self.block]

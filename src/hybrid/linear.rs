@@ -195,6 +195,15 @@ impl Linear {
         })
     }
 
+    /// Of a number with these derivatives by the six values, those by the inputs, as `each(lag, input, slope)`.
+    pub(super) fn pull(&self, by: &PerChannel<f64>, each: &mut dyn FnMut(usize, usize, f64)) {
+        let (features, inputs) = (self.config.features(), self.mean.len());
+        for place in 0..self.config.lags * inputs {
+            let slope: f64 = by.pairs().map(|(channel, by)| by * self.weights[channel.index() * features + place]).sum();
+            each(place / inputs, place % inputs, slope * self.inverse_deviation[place % inputs]);
+        }
+    }
+
     /// The six values at a sample of a flight. Before the flight's first row, its first row stands in.
     pub fn at(&self, signals: &Signals, sample: usize) -> PerChannel<f64> {
         self.predict(|lag| signals.row(sample, lag), &mut vec![0.0; self.config.features()])

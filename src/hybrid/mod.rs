@@ -4,6 +4,7 @@
 //! trained is in `train`.
 
 pub mod envelope;
+pub(crate) mod histories;
 pub mod inputs;
 pub mod intervals;
 pub mod linear;
@@ -89,7 +90,7 @@ impl Description {
     }
 
     /// From the network's unit scale to physical units.
-    fn output_scale(&self) -> OutputScale {
+    pub(crate) fn output_scale(&self) -> OutputScale {
         OutputScale {
             scale: self.scaling.output.iter().map(|scale| scale.deviation).collect(),
             offset: self.scaling.output.iter().map(|scale| scale.mean).collect(),

@@ -2,7 +2,8 @@
 //! step begins and held over it. The history behind a rollout is measured up to its start and predicted from there on. How a model is
 //! integrated is in `physics::rollout`.
 
-use super::linear::{Linear, Signals};
+use super::histories::Histories;
+use super::linear::Signals;
 use super::sequence::{Sequence, sequences};
 use super::{Hybrid, inputs};
 use crate::error::Result;
@@ -60,54 +61,20 @@ impl<'a> HybridRollout<'a> {
     }
 }
 
-/// The histories of some lanes, with room for all that is predicted, and the network that reads them.
+/// The histories of some lanes, and the network that reads them.
 struct Added<'a> {
     hybrid: &'a Hybrid,
-    linear: Option<&'a Linear>,
     session: Session<f32>,
-    history: usize,
-    /// By lane: scaled rows, the last of the first `history` being that of the start.
-    state: Vec<Vec<f32>>,
-    physics: Vec<Vec<f32>>,
-    /// By lane: rows of the linear history's inputs, the last of the first `lags` being that of the start.
-    signals: Vec<Vec<f64>>,
+    histories: Histories<'a, f32>,
 }
 
 impl<'a> Added<'a> {
     fn new(of: &'a HybridRollout<'_>, flight: usize, samples: &[usize]) -> Result<Self> {
-        let description = of.hybrid.description();
-        let (history, channels) = (description.config.history(), description.inputs.len());
         let mut session = Session::infer(of.hybrid.network.graph(), &[of.hybrid.network.output()], Threads(1))?;
         session.load(&of.hybrid.parameters)?;
-        let rows = history + of.rollout.horizon();
-        let measured = |&sample: &usize| {
-            let (mut state, mut physics) = (vec![0.0; rows * channels], vec![0.0; rows * 6]);
-            of.sequences[flight].history(sample, &mut state[..history * channels], &mut physics[..history * 6]);
-            (state, physics)
-        };
-        let (state, physics) = samples.iter().map(measured).unzip();
-        let linear = description.linear.as_ref();
-        let signals = |linear: &Linear| {
-            let (lags, signals) = (linear.config().lags, &of.signals[flight]);
-            let before = |sample: usize| (0..lags).rev().flat_map(move |lag| signals.row(sample, lag).iter().copied());
-            samples.iter().map(|&sample| before(sample).collect()).collect()
-        };
-        Ok(Self { hybrid: of.hybrid, linear, session, history, state, physics, signals: linear.map(signals).unwrap_or_default() })
-    }
-
-    /// What the linear history says, six numbers a lane; its inputs come after the network's.
-    fn filtered(&mut self, step: usize, inputs: &[Vec<f64>]) -> Option<Vec<PerChannel<f64>>> {
-        let linear = self.linear?;
-        let (count, lags) = (inputs.len(), linear.config().lags);
-        let mut features = vec![0.0; linear.config().features()];
-        let one = |(lane, rows): (usize, &mut Vec<f64>)| {
-            // The row of the start is there already, as it was measured.
-            rows.truncate((lags - 1 + step) * count);
-            rows.extend(inputs.iter().map(|input| input[lane]));
-            let last = lags - 1 + step;
-            linear.predict(|lag| &rows[(last - lag) * count..][..count], &mut features)
-        };
-        Some(self.signals.iter_mut().enumerate().map(one).collect())
+        let (sequence, signals) = (&of.sequences[flight], of.signals.get(flight));
+        let histories = Histories::new(of.hybrid.description(), sequence, signals, samples, of.rollout.horizon());
+        Ok(Self { hybrid: of.hybrid, session, histories })
     }
 }
 
@@ -120,31 +87,15 @@ impl Addition for Added<'_> {
         held: &mut PerChannel<Vec<f64>>,
     ) -> Result<()> {
         let description = self.hybrid.description();
-        let channels = description.inputs.len();
-        let of_linear = self.linear.map_or(0, |linear| linear.config().inputs.len());
-        let inputs: Vec<Vec<f64>> = (0..channels + of_linear).map(inputs).collect();
-        let filtered = self.filtered(step, &inputs[channels..]);
-        let row = self.history - 1 + step;
-        for (lane, (state, of_physics)) in self.state.iter_mut().zip(&mut self.physics).enumerate() {
-            for (channel, scale) in description.scaling.state.iter().enumerate() {
-                state[row * channels + channel] = scale.apply(inputs[channel][lane]) as f32;
-            }
-            for (channel, scale) in description.scaling.physics.pairs() {
-                let linear = filtered.as_ref().map_or(0.0, |filtered| filtered[lane][channel]);
-                of_physics[row * 6 + channel.index()] = scale.apply(physics[channel][lane] + linear) as f32;
-                held[channel][lane] = linear;
-            }
+        let of_linear = description.linear.as_ref().map_or(0, |linear| linear.config().inputs.len());
+        let inputs: Vec<Vec<f64>> = (0..description.inputs.len() + of_linear).map(inputs).collect();
+        for (lane, says) in self.histories.take(step, physics, &inputs).into_iter().enumerate() {
+            held.iter_mut().zip(says).for_each(|(held, says)| held[lane] = says);
         }
-        let first = row + 1 - self.history;
-        let (state, of_physics) = (&self.state, &self.physics);
-        let fill = |lane: usize, slabs: &mut [&mut [f32]]| {
-            if let [state_slab, physics_slab, ..] = slabs {
-                state_slab.copy_from_slice(&state[lane][first * channels..(row + 1) * channels]);
-                physics_slab.copy_from_slice(&of_physics[lane][first * 6..(row + 1) * 6]);
-            }
-        };
-        let (hybrid, replaces) = (self.hybrid, self.replaces());
-        self.session.predict(state.len(), &fill, &mut |lane, output| {
+        let Self { hybrid, session, histories } = self;
+        let replaces = !description.config.predicts_residual();
+        let fill = |lane: usize, slabs: &mut [&mut [f32]]| histories.fill(lane, step, slabs);
+        session.predict(histories.lanes(), &fill, &mut |lane, output| {
             for (held, learned) in held.iter_mut().zip(hybrid.learned(output)) {
                 held[lane] = if replaces { learned } else { held[lane] + learned };
             }

@@ -51,6 +51,7 @@ pub struct Network<T> {
     graph: Graph<T>,
     inits: Vec<Init>,
     output: Var,
+    target: Var,
     loss: Var,
 }
 
@@ -106,7 +107,7 @@ impl<T: Real> Network<T> {
             wanted = graph.apply(unit, &[target])?;
         }
         let loss = graph.apply(SquaredError { scale: rule.scale }, &[judged, wanted])?;
-        Ok(Self { architecture, graph, inits, output, loss })
+        Ok(Self { architecture, graph, inits, output, target, loss })
     }
 
     /// The architecture it was recorded from.
@@ -122,6 +123,11 @@ impl<T: Real> Network<T> {
     /// Predicted `[P, outputs]`, in physical units.
     pub const fn output(&self) -> Var {
         self.output
+    }
+
+    /// What the output is held against, `[P, outputs]`.
+    pub(crate) const fn target(&self) -> Var {
+        self.target
     }
 
     /// Loss of one sample.

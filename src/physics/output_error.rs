@@ -8,25 +8,14 @@
 use super::calibrate::{Estimate, estimate, parameter_bounds, usual_size};
 use super::correlation::Correlation;
 use super::model::Model;
-use super::rollout::{Rolled, Rollout, State, recorded_states, starts};
+use super::rollout::{HUBER, Measure, Rollout, size, starts};
 use crate::blocks::Blocks;
 use crate::error::{Error, Result};
-use crate::flight::attitude::rotation_vector;
 use crate::flight::{Flight, Span, Window};
 use crate::student_t::quantile_975;
 use nalgebra::{Cholesky, DMatrix, DVector};
 use std::collections::BTreeMap;
 
-/// Steps of a rollout at which its error counts: every tenth part of the horizon.
-const JUDGED: usize = 10;
-/// What is judged at each of them: position, velocity, attitude, rates, three components each.
-const GROUPS: usize = 4;
-const COMPONENTS: usize = 3 * GROUPS;
-/// Weights of the four. Attitude and rates come before position and velocity, which follow from them.
-const WEIGHTS: [f64; GROUPS] = [1.0, 1.0, 3.0, 3.0];
-/// From this share of the usual error on, an error counts by its size, below by its square: what is judged in the end are mean sizes, and a mean
-/// of squares would be made by the few rollouts that go far astray (Huber 1964).
-const HUBER: f64 = 0.1;
 /// Most rollouts from which numbers are fitted; of more starts every other, every third … is taken.
 const MOST_STARTS: usize = 2000;
 /// Weight that holds each number to where it starts, in units of its usual size: what no rollout shows stays.
@@ -93,7 +82,7 @@ pub fn output_error(
     let mut at = problem.own_values();
     let begun = at.clone();
     let mut errors = problem.errors(&at)?;
-    let before = problem.means(&errors);
+    let before = problem.measure.means(&errors);
     let mut cost = problem.cost(&errors, &at, &begun);
     let (mut damping, mut rounds, mut has_settled) = (DAMPING, 0, false);
     let mut slopes = problem.slopes(&at, &errors)?;
@@ -124,22 +113,6 @@ pub fn output_error(
     problem.finish(&Fit { at, errors, slopes, before, rounds, has_settled }, &begun)
 }
 
-/// The recorded states after each of some steps from each start, positions counted from the start.
-fn measured(flights: &[Flight], starts: &[Window], steps: &[usize]) -> Vec<State> {
-    let mut measured = Vec::with_capacity(starts.len() * steps.len());
-    for of_flight in starts.chunk_by(|left, right| left.flight == right.flight) {
-        let states = recorded_states(&flights[of_flight[0].flight]);
-        for start in of_flight {
-            let from = states[start.last].position;
-            measured.extend(steps.iter().map(|step| {
-                let state = states[start.last + step];
-                State { position: std::array::from_fn(|axis| state.position[axis] - from[axis]), ..state }
-            }));
-        }
-    }
-    measured
-}
-
 /// Where a fit ended.
 struct Fit {
     at: Vec<f64>,
@@ -158,14 +131,7 @@ struct Problem<'a> {
     fitted: Vec<usize>,
     /// About how large each of them is.
     sizes: Vec<f64>,
-    starts: Vec<Window>,
-    /// By start and judged step.
-    measured: Vec<State>,
-    steps: Vec<usize>,
-    /// By start: weight of it, so that classes count alike.
-    weights: Vec<f64>,
-    /// By start, judged step and group: one over the usual error.
-    scales: Vec<f64>,
+    measure: Measure,
     blocks: Blocks,
 }
 
@@ -188,77 +154,27 @@ impl<'a> Problem<'a> {
                 "no run of training samples holds a rollout of {horizon} steps; take a shorter horizon or longer flights"
             )));
         }
-        let mut steps: Vec<usize> = (1..=JUDGED).map(|part| (part * horizon).div_ceil(JUDGED)).collect();
-        steps.dedup();
-        let measured = measured(flights, &starts, &steps);
-        let mut classes: BTreeMap<&str, f64> = BTreeMap::new();
-        let class = |start: &Window| flights[start.flight].manoeuvre.as_str();
-        starts.iter().for_each(|start| *classes.entry(class(start)).or_default() += 1.0);
-        let weights = starts.iter().map(|start| 1.0 / (classes[class(start)] * classes.len() as f64)).collect();
-        let mut problem = Self {
-            measured,
+        Ok(Self {
             blocks: Blocks::new(flights, &starts),
             sizes: fitted.iter().map(|&place| usual_size(model, rollout.numbers()[place])).collect(),
+            measure: Measure::new(model, flights, starts, horizon)?,
             model,
             rollout,
             fitted,
-            starts,
-            steps,
-            weights,
-            scales: Vec::new(),
-        };
-        problem.scales = problem.usual_errors(flights)?;
-        Ok(problem)
-    }
-
-    /// One over the mean error with rates held, by start, judged step and group; the same for all starts of a class.
-    fn usual_errors(&self, flights: &[Flight]) -> Result<Vec<f64>> {
-        let held = Rollout::new(self.model, flights, self.rollout.horizon())?.with_rates_held();
-        let batches = held.roll(&self.starts, None, &|rolled| self.of_batch(rolled))?;
-        let errors: Vec<f64> = batches.into_iter().flatten().collect();
-        let by_start = self.steps.len() * GROUPS;
-        let mut classes: BTreeMap<&str, (f64, Vec<f64>)> = BTreeMap::new();
-        let class = |start: &Window| flights[start.flight].manoeuvre.as_str();
-        for (start, errors) in self.starts.iter().zip(errors.chunks(3 * by_start)) {
-            let (count, sums) = classes.entry(class(start)).or_insert_with(|| (0.0, vec![0.0; by_start]));
-            *count += 1.0;
-            sums.iter_mut().zip(errors.chunks(3)).for_each(|(sum, error)| *sum += size(error));
-        }
-        let of = |start: &Window| {
-            let (count, sums) = &classes[class(start)];
-            // Where nothing errs, nothing is to be gained.
-            sums.iter().map(|sum| if *sum > 0.0 { *count / *sum } else { 0.0 }).collect::<Vec<f64>>()
-        };
-        Ok(self.starts.iter().flat_map(of).collect())
+        })
     }
 
     fn own_values(&self) -> Vec<f64> {
         self.fitted.iter().map(|&place| self.rollout.own(place, 0)).collect()
     }
 
-    /// Errors of the lanes of a batch at the judged steps, twelve numbers each, in the units of the states.
-    fn of_batch(&self, rolled: &Rolled) -> Vec<f64> {
-        let mut errors = Vec::with_capacity(rolled.lanes() * self.steps.len() * COMPONENTS);
-        let first = self.starts.partition_point(|start| (start.flight, start.last) < (rolled.flight, rolled.starts[0]));
-        for lane in 0..rolled.lanes() {
-            let from = rolled.state(lane, 0).position;
-            for (index, &step) in self.steps.iter().enumerate() {
-                let measured = &self.measured[(first + lane) * self.steps.len() + index];
-                let state = rolled.state(lane, step);
-                let predicted = State { position: std::array::from_fn(|axis| state.position[axis] - from[axis]), ..state };
-                errors.extend(apart(measured, &predicted));
-            }
-        }
-        errors
-    }
-
     /// Errors in units of the usual ones, with some values of the numbers.
     fn errors(&self, values: &[f64]) -> Result<Vec<f64>> {
         let place: BTreeMap<usize, f64> = self.fitted.iter().copied().zip(values.iter().copied()).collect();
         let number = |number: usize, flight: usize| place.get(&number).copied().unwrap_or_else(|| self.rollout.own(number, flight));
-        let batches = self.rollout.roll(&self.starts, Some(&number), &|rolled| self.of_batch(rolled))?;
+        let batches = self.rollout.roll(self.measure.starts(), Some(&number), &|rolled| self.measure.of_batch(rolled))?;
         let mut errors: Vec<f64> = batches.into_iter().flatten().collect();
-        errors.chunks_mut(3).zip(&self.scales).for_each(|(error, scale)| error.iter_mut().for_each(|part| *part *= scale));
+        self.measure.scale(&mut errors);
         Ok(errors)
     }
 
@@ -292,32 +208,9 @@ impl<'a> Problem<'a> {
         (0..at.len()).map(moved).collect()
     }
 
-    /// Weight of each error vector, in the order of the errors.
-    fn vectors(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let steps = self.steps.len();
-        let of = move |(start, weight): (usize, &f64)| {
-            let weight = *weight / steps as f64;
-            (0..steps).flat_map(move |_| WEIGHTS.map(|of_group| (start, weight * of_group)))
-        };
-        self.weights.iter().enumerate().flat_map(of)
-    }
-
     fn cost(&self, errors: &[f64], at: &[f64], begun: &[f64]) -> f64 {
-        let of_errors: f64 = self.vectors().zip(errors.chunks(3)).map(|((_, weight), error)| weight * huber(size(error))).sum();
         let away = at.iter().zip(begun).zip(&self.sizes).map(|((at, begun), size)| ((at - begun) / size).powi(2));
-        of_errors + 0.5 * PRIOR * away.sum::<f64>()
-    }
-
-    /// Mean sizes of the errors by group, classes alike.
-    fn means(&self, errors: &[f64]) -> [f64; 4] {
-        let mut means = [0.0; GROUPS];
-        let steps = self.steps.len() as f64;
-        for (start, errors) in self.weights.iter().zip(errors.chunks(self.steps.len() * COMPONENTS)) {
-            for (vector, error) in errors.chunks(3).enumerate() {
-                means[vector % GROUPS] += start / steps * size(error);
-            }
-        }
-        means
+        self.measure.cost(errors) + 0.5 * PRIOR * away.sum::<f64>()
     }
 
     fn normal(&self, errors: &[f64], slopes: &[Vec<f64>], at: &[f64], begun: &[f64]) -> Normal {
@@ -329,7 +222,7 @@ impl<'a> Problem<'a> {
             gradient: DVector::zeros(count),
         };
         let mut along = vec![0.0; count];
-        for (vector, ((start, weight), error)) in self.vectors().zip(errors.chunks(3)).enumerate() {
+        for (vector, ((start, weight), error)) in self.measure.vectors().zip(errors.chunks(3)).enumerate() {
             let length = size(error);
             let weight = weight / length.max(HUBER);
             let place = 3 * vector..3 * vector + 3;
@@ -387,12 +280,12 @@ impl<'a> Problem<'a> {
         let result = OutputError {
             coefficients: in_order.into_iter().filter_map(|(effect, number)| estimate(&found, effect, number)).collect(),
             horizon: self.rollout.horizon(),
-            starts: self.starts.len(),
+            starts: self.measure.starts().len(),
             blocks,
             rounds: fit.rounds,
             has_settled: fit.has_settled,
             before: fit.before,
-            after: self.means(&fit.errors),
+            after: self.measure.means(&fit.errors),
         };
         Ok((found, result))
     }
@@ -455,29 +348,8 @@ impl std::fmt::Display for OutputError {
     }
 }
 
-/// ρ of an error's size.
-fn huber(size: f64) -> f64 {
-    if size > HUBER { size - 0.5 * HUBER } else { 0.5 * size * size / HUBER }
-}
-
-fn size(vector: &[f64]) -> f64 {
-    product(vector, vector).sqrt()
-}
-
 fn product(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(left, right)| left * right).sum()
-}
-
-/// What a predicted state has more than a measured one: position, velocity, the vector of the rotation that leads there, rates.
-fn apart(measured: &State, predicted: &State) -> [f64; COMPONENTS] {
-    let less = |a: [f64; 3], b: [f64; 3]| -> [f64; 3] { std::array::from_fn(|axis| b[axis] - a[axis]) };
-    let parts = [
-        less(measured.position, predicted.position),
-        less(measured.velocity, predicted.velocity),
-        rotation_vector(measured.attitude, predicted.attitude),
-        less(measured.rates, predicted.rates),
-    ];
-    std::array::from_fn(|index| parts[index / 3][index % 3])
 }
 
 #[cfg(test)]

@@ -68,7 +68,7 @@ pub struct ChannelText {
 /// Names of the accelerations in words, in the order of [`Column::TARGETS`].
 const CHANNELS: [&str; 6] = [
     "forward acceleration",
-    "sideward acceleration",
+    "sideways acceleration",
     "vertical acceleration",
     "roll acceleration",
     "pitch acceleration",

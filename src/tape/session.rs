@@ -317,6 +317,11 @@ impl<T: Real> Session<T> {
         &self.gradients
     }
 
+    /// The same, for whoever adds a part of the loss that is not on the tape before [`Session::adam`].
+    pub fn gradients_mut(&mut self) -> &mut [T] {
+        &mut self.gradients
+    }
+
     /// Loss of each sample of the last step, and of no other.
     pub fn losses(&self) -> &[f64] {
         &self.losses[..self.samples]

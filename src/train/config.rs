@@ -27,6 +27,9 @@ pub struct TrainConfig {
     /// A linear history between physics and network: ridge regression of what physics leaves over, fitted in closed form before
     /// the network. Default none, as in the paper.
     pub linear: Option<LinearConfig>,
+    /// A loss of predictions that run ahead, on top of that of single samples. Default none, as in the paper.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rollout: Option<RolloutConfig>,
     /// Passes over the training windows, at most 1 000 000. Default 100; the paper does not state its number.
     pub epochs: usize,
     /// Windows a step, at most 65 536. Default 32.
@@ -54,12 +57,52 @@ pub struct TrainConfig {
     pub checkpoint_s: f64,
 }
 
+/// Rollouts that train: the hybrid integrated forward from measured states, whose errors count, too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RolloutConfig {
+    /// Steps of a rollout, at most 10 000. Default 50.
+    pub horizon: usize,
+    /// Rollouts beside the windows of a step, at most 64. Default 8.
+    pub starts: usize,
+    /// Weight of their loss: with 1, an error of rollouts as large as that of the physics with body rates held counts as much as all of the residual
+    /// does in single samples. Above 0, at most 1000. Default 1.
+    pub weight: f64,
+}
+
+impl Default for RolloutConfig {
+    fn default() -> Self {
+        Self { horizon: 50, starts: 8, weight: 1.0 }
+    }
+}
+
+impl RolloutConfig {
+    /// Most steps.
+    pub const MOST_STEPS: usize = 10_000;
+    /// Most rollouts of a step.
+    pub const MOST_STARTS: usize = 64;
+    /// Largest weight.
+    pub const LARGEST_WEIGHT: f64 = 1000.0;
+
+    fn check(&self) -> Result<()> {
+        let counts = [("rollout.horizon", self.horizon, Self::MOST_STEPS), ("rollout.starts", self.starts, Self::MOST_STARTS)];
+        if let Some((field, value, most)) = counts.into_iter().find(|(_, value, most)| *value < 1 || value > most) {
+            return Err(fault(field, value, &format!("1 to {most}")));
+        }
+        if !(self.weight > 0.0 && self.weight <= Self::LARGEST_WEIGHT) {
+            return Err(fault("rollout.weight", self.weight, &format!("a weight above 0 and at most {}", Self::LARGEST_WEIGHT)));
+        }
+        Ok(())
+    }
+}
+
 impl Default for TrainConfig {
     fn default() -> Self {
         Self {
             network: Architecture::default(),
             inputs: crate::flight::Column::STATE.iter().map(|column| column.name().to_owned()).collect(),
             linear: None,
+            rollout: None,
             epochs: 100,
             batch: 32,
             peak_rate: 1e-3,
@@ -127,6 +170,11 @@ impl TrainConfig {
             }
         }
         self.linear.as_ref().map_or(Ok(()), LinearConfig::check)?;
+        self.rollout.as_ref().map_or(Ok(()), RolloutConfig::check)?;
+        if self.rollout.is_some() && self.gate_every > 0 {
+            let expected = "0 beside `[rollout]`: a gate is fitted to single samples and would undo what rollouts have taught";
+            return Err(fault("gate_every", self.gate_every, expected));
+        }
         Ok(self.network.check()?)
     }
 }
@@ -150,6 +198,13 @@ mod tests {
         let message = |config: TrainConfig| config.check().map_err(|error| error.to_string()).err().unwrap_or_default();
         assert!(message(TrainConfig { epochs: 0, ..Default::default() }).contains("`epochs` is 0"));
         assert!(message(TrainConfig { peak_rate: f64::NAN, ..Default::default() }).contains("`peak_rate` is NaN"));
+        let of = |rollout: RolloutConfig| message(TrainConfig { rollout: Some(rollout), ..Default::default() });
+        assert!(of(RolloutConfig { horizon: 0, ..Default::default() }).contains("`rollout.horizon` is 0, expected 1 to 10000"));
+        assert!(of(RolloutConfig { starts: 65, ..Default::default() }).contains("`rollout.starts` is 65, expected 1 to 64"));
+        assert!(of(RolloutConfig { weight: f64::INFINITY, ..Default::default() }).contains("`rollout.weight` is inf"));
+        assert_eq!(of(RolloutConfig::default()), "");
+        let gated = TrainConfig { rollout: Some(RolloutConfig::default()), gate_every: 5, ..Default::default() };
+        assert!(message(gated).contains("`gate_every` is 5, expected 0 beside `[rollout]`"));
         assert!(message(TrainConfig { inputs: vec!["vx".into()], ..Default::default() }).contains("state_channels"));
     }
 

@@ -2,11 +2,12 @@
 //! training part alone. No optimiser and no files here.
 
 use super::config::TrainConfig;
+use super::rollout_loss::{RolloutLoss, RolloutRule};
 use crate::blocks::Blocks;
 use crate::error::Result;
 use crate::flight::split::Split;
 use crate::flight::windows::windows;
-use crate::flight::{Flight, PerChannel, Window};
+use crate::flight::{Flight, PerChannel, Span, Window};
 use crate::hybrid::intervals::FEWEST_BLOCKS;
 use crate::hybrid::{Description, Hybrid, sequence};
 use crate::physics::Model;
@@ -25,6 +26,8 @@ pub struct Job {
     /// Windows kept from training that intervals are made of: those of the gate where there is one, else those of the validation part, else
     /// blocks of the training part.
     pub interval_windows: Vec<Window>,
+    /// Where rollouts may train: the training part, without what is kept from training.
+    pub rollout_spans: Vec<Span>,
     /// Windows of the split's validation part, as dense as those that train; empty if the split has none.
     pub validation: Vec<Window>,
 }
@@ -64,9 +67,31 @@ impl Job {
         let choose =
             |wanted: bool| all.iter().zip(&blocks).filter(move |(_, block)| is_kept(**block) == wanted).map(|(window, _)| *window);
         let (training, kept): (Vec<Window>, Vec<Window>) = (choose(false).collect(), choose(true).collect());
+        let rollout_spans = match kept.is_empty() {
+            true => spans.clone(),
+            false => between(&all, &blocks.iter().map(|block| is_kept(*block)).collect::<Vec<_>>(), config.network.history()),
+        };
         let interval_windows = if kept.is_empty() { validation.clone() } else { kept.clone() };
         let gate_windows = if for_gate { kept } else { Vec::new() };
-        Ok(Self { description, sequences, windows: training, gate_windows, interval_windows, validation })
+        Ok(Self { description, sequences, windows: training, gate_windows, interval_windows, rollout_spans, validation })
+    }
+
+    /// The rollouts of a configuration that has some: those that train, and those of the validation part, if the split has one.
+    ///
+    /// # Errors
+    /// As [`RolloutLoss::new`].
+    pub fn rollouts<'j>(
+        &'j self,
+        flights: &'j [Flight],
+        split: &Split,
+        config: &TrainConfig,
+        threads: Threads,
+    ) -> Result<Option<(RolloutLoss<'j, f32>, Option<RolloutLoss<'j, f32>>)>> {
+        let Some(rule) = RolloutRule::of(config) else { return Ok(None) };
+        let of = |spans: &[Span]| RolloutLoss::new(&self.description, flights, &self.sequences, spans, &rule, threads);
+        let training = of(&self.rollout_spans)?;
+        let validation = if split.validation.is_empty() { None } else { Some(of(&split.validation)?) };
+        Ok(Some((training, validation)))
     }
 
     /// The hybrid with these weights, its gate fitted where windows were kept for one.
@@ -80,4 +105,15 @@ impl Job {
         }
         Ok(hybrid)
     }
+}
+
+/// The runs of windows that are not kept, each with the history of its first one. Windows are in order.
+fn between(windows: &[Window], kept: &[bool], history: usize) -> Vec<Span> {
+    let all: Vec<(&Window, bool)> = windows.iter().zip(kept.iter().copied()).collect();
+    let runs = all.chunk_by(|(left, left_kept), (right, right_kept)| left.flight == right.flight && left_kept == right_kept);
+    let span = |run: &[(&Window, bool)]| {
+        let ((first, kept), (last, _)) = (run[0], run[run.len() - 1]);
+        (!kept).then_some(Span { flight: first.flight, start: first.last + 1 - history, end: last.last + 1 })
+    };
+    runs.filter_map(span).collect()
 }

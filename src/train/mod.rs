@@ -7,6 +7,7 @@ pub mod config;
 #[cfg(feature = "disk")]
 pub mod container;
 mod job;
+mod rollout_loss;
 #[cfg(feature = "disk")]
 pub mod run;
 pub mod schedule;
@@ -16,8 +17,9 @@ pub mod trainer;
 #[cfg(feature = "disk")]
 mod training;
 
-pub use config::TrainConfig;
+pub use config::{RolloutConfig, TrainConfig};
 pub use job::Job;
+pub use rollout_loss::{RolloutLoss, RolloutRule};
 #[cfg(feature = "disk")]
 pub use run::{Checkpointed, Outcome, Report, RunFolder};
 pub use trainer::{Best, EpochLoss, State, StepReport, Trainer};

@@ -1,7 +1,7 @@
 //! A training configuration as TOML: read over defaults, and written with a comment at each field. What the fields mean and may be is
 //! `config`'s.
 
-use super::config::TrainConfig;
+use super::config::{RolloutConfig, TrainConfig};
 use crate::error::{Error, Result};
 use crate::hybrid::linear::LinearConfig;
 use serde::Serialize;
@@ -15,7 +15,7 @@ const KIND: &str = "kind";
 const PHYTURE: &str = "phyture";
 
 /// Comments of the fields, in the order in which they are written.
-const FIELDS: [(&str, &str); 13] = [
+const FIELDS: [(&str, &str); 14] = [
     ("epochs", "Passes over the training windows; the paper does not state its number."),
     ("batch", "Windows a step."),
     ("stride", "Samples between training windows."),
@@ -32,6 +32,14 @@ const FIELDS: [(&str, &str); 13] = [
     ("checkpoint_s", "Seconds between checkpoints."),
     ("inputs", "What the network sees, as formulas of the log's columns; as many as network.state_channels. No acceleration."),
     ("linear", ""),
+    ("rollout", ""),
+];
+
+/// Comments of the fields of `[rollout]`.
+const OF_ROLLOUT: [(&str, &str); 3] = [
+    ("horizon", "Steps of a rollout."),
+    ("starts", "Rollouts beside the windows of a step."),
+    ("weight", "Of their loss: 1 makes an error as with body rates held count as much as all of the residual."),
 ];
 
 /// Comments of a network's fields that mean the same in all networks.
@@ -113,9 +121,12 @@ impl TrainConfig {
         );
         for (field, comment) in FIELDS {
             match table.remove(field) {
-                Some(Value::Table(linear)) => table_text(&mut text, field, &linear, &|_| None),
+                Some(Value::Table(own)) => table_text(&mut text, field, &own, &|key| {
+                    OF_ROLLOUT.iter().find(|(known, _)| field == "rollout" && *known == key).map(|(_, comment)| *comment)
+                }),
                 Some(value) => line(&mut text, field, &value, Some(comment)),
-                None => no_linear_history(&mut text)?,
+                None if field == "rollout" => as_comment(&mut text, field, NO_ROLLOUT, &RolloutConfig::default())?,
+                None => as_comment(&mut text, field, NO_LINEAR, &LinearConfig::default())?,
             }
         }
         if let Some(Value::Table(mut network)) = table.remove(NETWORK) {
@@ -180,10 +191,14 @@ fn line(text: &mut String, field: &str, value: &Value, comment: Option<&str>) {
     let _ = writeln!(text, "{comment}{field} = {value}");
 }
 
-/// What a linear history would look like, as a comment.
-fn no_linear_history(text: &mut String) -> Result<()> {
-    text.push_str("\n# A linear history between physics and network: ridge regression of what physics leaves over.\n# [linear]\n");
-    for (field, value) in table(&LinearConfig::default())? {
+const NO_LINEAR: &str = "A linear history between physics and network: ridge regression of what physics leaves over.";
+const NO_ROLLOUT: &str = "A loss of predictions that run ahead, on top of that of single samples.";
+
+/// What a table would look like that is not there, as a comment.
+fn as_comment(text: &mut String, name: &str, what: &str, defaults: &impl Serialize) -> Result<()> {
+    // Writing to a text cannot fail.
+    let _ = write!(text, "\n# {what}\n# [{name}]\n");
+    for (field, value) in table(defaults)? {
         let _ = writeln!(text, "# {field} = {value}");
     }
     Ok(())
@@ -211,13 +226,15 @@ mod tests {
         inputs[3] = "sin(roll) * (vx > 1e-9)".into();
         for network in networks.into_iter().chain(variants) {
             for linear in [None, Some(LinearConfig { lags: 3, inputs: vec!["lag(u1, 0.1)".into()] })] {
+                let rollout = linear.is_some().then_some(RolloutConfig { horizon: 20, starts: 3, weight: 1.0 / 3.0 });
                 let config = TrainConfig {
                     network: network.clone(),
                     inputs: inputs.clone(),
+                    gate_every: if rollout.is_some() { 0 } else { 5 },
                     linear,
+                    rollout,
                     peak_rate: 1.0 / 3.0,
                     standardise_loss: true,
-                    gate_every: 5,
                     interval_every: 7,
                     keep_best: true,
                     seed: i64::MAX as u64,

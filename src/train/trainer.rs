@@ -1,6 +1,7 @@
 //! The optimiser loop, one step at a time: order of windows, loss and gradients, Adam. No files, no clock.
 
 use super::config::TrainConfig;
+use super::rollout_loss::RolloutLoss;
 use super::schedule::Schedule;
 use crate::error::{Error, Result};
 use crate::flight::Window;
@@ -57,8 +58,12 @@ pub struct StepReport {
     pub step: u64,
     /// Epoch of the step, from 0.
     pub epoch: usize,
-    /// Mean over the batch of the squared 2-norm over the channels, (m/s²)² and (rad/s²)² summed (paper eq. 13).
+    /// Mean over the batch of the squared 2-norm over the channels, (m/s²)² and (rad/s²)² summed (paper eq. 13), and the loss of rollouts where
+    /// there is one.
     pub loss: f64,
+    /// The part that rollouts have in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub of_rollouts: Option<f64>,
     /// Learning rate of the step.
     pub rate: f64,
     /// Euclidean norm of the gradient. Logged, not clipped.
@@ -76,6 +81,9 @@ pub struct Trainer<'a> {
     windows: &'a [Window],
     /// Windows that nothing is learned from.
     validation: &'a [Window],
+    rollouts: Option<RolloutLoss<'a, f32>>,
+    /// Rollouts that nothing is learned from.
+    validation_rollouts: Option<RolloutLoss<'a, f32>>,
     session: Session<f32>,
     /// For losses without dropout; made when the first is asked for.
     judge: Option<Session<f32>>,
@@ -134,6 +142,8 @@ impl<'a> Trainer<'a> {
             sequences,
             windows,
             validation: &[],
+            rollouts: None,
+            validation_rollouts: None,
             session,
             judge: None,
             threads,
@@ -148,6 +158,13 @@ impl<'a> Trainer<'a> {
     #[must_use]
     pub fn with_validation(mut self, windows: &'a [Window]) -> Self {
         self.validation = windows;
+        self
+    }
+
+    /// The same run with rollouts that it learns from beside the windows, and others to judge it by.
+    #[must_use]
+    pub fn with_rollouts(mut self, training: RolloutLoss<'a, f32>, validation: Option<RolloutLoss<'a, f32>>) -> Self {
+        (self.rollouts, self.validation_rollouts) = (Some(training), validation);
         self
     }
 
@@ -198,12 +215,14 @@ impl<'a> Trainer<'a> {
         }
     }
 
-    /// Mean loss of the present weights on the training windows, without dropout; the unit is that of [`StepReport::loss`].
+    /// Mean loss of the present weights on the training windows, without dropout, and on rollouts where there are some; the unit is that of
+    /// [`StepReport::loss`].
     ///
     /// # Errors
     /// [`Error::Undetermined`] if it is not finite.
     pub fn training_loss(&mut self) -> Result<f64> {
-        self.loss_on(self.windows)
+        let of_rollouts = self.rollouts.as_mut().map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
+        Ok(self.loss_on(self.windows)? + of_rollouts.unwrap_or(0.0))
     }
 
     /// The same on the validation windows; `None` if there are none.
@@ -211,7 +230,11 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// As [`Trainer::training_loss`].
     pub fn validation_loss(&mut self) -> Result<Option<f64>> {
-        if self.validation.is_empty() { Ok(None) } else { self.loss_on(self.validation).map(Some) }
+        if self.validation.is_empty() {
+            return Ok(None);
+        }
+        let of_rollouts = self.validation_rollouts.as_mut().map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
+        Ok(Some(self.loss_on(self.validation)? + of_rollouts.unwrap_or(0.0)))
     }
 
     fn loss_on(&mut self, windows: &[Window]) -> Result<f64> {
@@ -254,7 +277,11 @@ impl<'a> Trainer<'a> {
         let (sequences, windows) = (self.sequences, self.windows);
         let fill = |sample: usize, inputs: &mut [&mut [f32]]| fill_window(sequences, windows[chosen[sample] as usize], inputs);
         let dropout = self.config.network.is_random().then_some(DropoutKey { seed: self.config.seed, step: done });
-        let loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
+        let mut loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
+        let gradient = self.session.gradients_mut();
+        let of_rollouts =
+            self.rollouts.as_mut().map(|rollouts| rollouts.step(&self.state.parameters, done, gradient)).transpose()?;
+        loss += of_rollouts.unwrap_or(0.0);
         let gradient_norm = norm(self.session.gradients());
         if !(loss.is_finite() && gradient_norm.is_finite()) {
             return Err(Error::Undetermined(format!(
@@ -270,7 +297,7 @@ impl<'a> Trainer<'a> {
         self.session.settle(parameters);
         self.state.step += 1;
         self.state.loss_sum += loss;
-        Ok(Some(StepReport { step: done + 1, epoch, loss, rate, gradient_norm }))
+        Ok(Some(StepReport { step: done + 1, epoch, loss, of_rollouts, rate, gradient_norm }))
     }
 }
 

@@ -114,6 +114,9 @@ impl Training<'_> {
         if with_losses || config.keep_best {
             trainer = trainer.with_validation(&job.validation);
         }
+        if let Some((training, validation)) = job.rollouts(flights, split, config, threads)? {
+            trainer = trainer.with_rollouts(training, validation);
+        }
         let begun = Begun {
             parameters: network.graph().parameter_count(),
             windows: job.windows.len(),

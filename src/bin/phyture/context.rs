@@ -23,6 +23,11 @@ const MODEL_FILE: &str = "model.toml";
 /// The place of what was given in vain.
 const COMMAND_LINE: &str = "command line";
 
+/// What was typed before the name of the command: cargo tells a program that it has started.
+pub fn typed() -> &'static str {
+    if std::env::var_os("CARGO_MANIFEST_DIR").is_some() { "cargo phyture" } else { "phyture" }
+}
+
 /// The options of every command, and the ways of speaking that follow from them.
 pub struct Context<'a> {
     /// As given.

@@ -216,7 +216,10 @@ fn coefficient(term: &str, axis: &str, estimate: Option<Estimate>) -> Finding {
         );
     } else {
         finding.verdict = Severity::Ok;
-        finding.message = format!("{what} enters as it should");
+        finding.message = match low <= 1.0 && high >= 1.0 {
+            true => format!("{what} enters as it should"),
+            false => format!("{what} enters about as it should: what is not modelled yet takes part"),
+        };
     }
     finding
 }

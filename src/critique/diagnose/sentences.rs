@@ -238,9 +238,9 @@ pub fn failure(failure: &Failure) -> Option<String> {
         .collect();
     let list = listed(&list);
     let how_much = match total {
-        total if total >= 0.9 => "Nearly all the error is",
-        total if total >= 0.6 => "Most of the error is",
-        _ => "The largest part of the error is",
+        total if total >= 0.9 => "Of what is left nearly all is",
+        total if total >= 0.6 => "Of what is left most is",
+        _ => "Of what is left the largest part is",
     };
     let mut on: Vec<&str> = Vec::new();
     for name in std::iter::once(first).chain(rest).flat_map(|channel| &channel.depends_on) {
@@ -495,13 +495,14 @@ mod tests {
         };
         assert_eq!(
             failure(&both).unwrap_or_default(),
-            "Nearly all the error is in wx_dot (error 45 % of the channel's variance) and wy_dot (error 38 % of the channel's variance); it \
+            "Of what is left nearly all is in wx_dot (error 45 % of the channel's variance) and wy_dot (error 38 % of the channel's variance); it \
              depends on u1, u2."
         );
         let one = Failure { on: "searched".into(), channels: vec![channel("vz_dot", 0.4, &[])] };
         let said = failure(&one).unwrap_or_default();
         assert!(
-            said.starts_with("The largest part of the error is in vz_dot") && said.ends_with("no measured variable tells of it.")
+            said.starts_with("Of what is left the largest part is in vz_dot")
+                && said.ends_with("no measured variable tells of it.")
         );
         assert_eq!(failure(&Failure { on: String::new(), channels: Vec::new() }), None);
     }

@@ -9,13 +9,18 @@
 //! the threads of the pool that it is called in, with the same bits on any number. What errors mean, nothing here knows.
 
 mod batch;
+mod errors;
 mod motion;
 mod program;
+mod walk;
 
 pub(crate) use batch::Addition;
 pub use batch::{MOST_RATE_RAD_S, MOST_SPEED_M_S, Rolled};
+pub(crate) use errors::{HUBER, Measure, size};
+pub(crate) use motion::{Motion, NUMBERS};
 pub use motion::{State, has_position, recorded_states};
 pub(crate) use program::Program;
+pub(crate) use walk::{OnFlight, Walk, state_slopes};
 
 use super::model::Model;
 use crate::error::{Error, Result};
@@ -204,11 +209,13 @@ impl<'a> Rollout<'a> {
         let flight = &self.flights[index];
         let samples: Vec<usize> = starts.iter().map(|start| start.last).collect();
         let angles = self.program.reads_angles() || further.is_some_and(|further| further.program.reads_angles());
+        let addition = further.map(|further| (further.addition)(index, &samples)).transpose()?;
         let batch = Batch {
             flight,
             model: run.model.lanes(flight, batch, &samples)?,
             further: run.further.as_ref().map(|further| further.lanes(flight, batch, &samples)).transpose()?,
-            addition: further.map(|further| (further.addition)(index, &samples)).transpose()?,
+            replaces: addition.as_ref().map(|addition| addition.replaces()),
+            addition,
             starts: samples,
             angles,
             hold_rates: self.hold_rates,

@@ -54,7 +54,7 @@ pub fn has_position(flight: &Flight) -> bool {
 }
 
 /// Columns of a [`Motion`]: position, quaternion, velocity in body axes, rates.
-const NUMBERS: usize = 13;
+pub const NUMBERS: usize = 13;
 const POSITION: usize = 0;
 const ATTITUDE: usize = 3;
 const VELOCITY: usize = 7;
@@ -126,6 +126,26 @@ impl Motion {
         let index = column as usize;
         let place = if index < Column::Vx as usize { POSITION + index } else { VELOCITY + index - Column::Vx as usize };
         &self.columns[place]
+    }
+
+    /// All lanes so many times, one copy behind the other.
+    pub fn repeated(&self, copies: usize) -> Self {
+        Self { columns: std::array::from_fn(|number| self.columns[number].repeat(copies)) }
+    }
+
+    /// Some lanes.
+    pub fn part(&self, lanes: std::ops::Range<usize>) -> Self {
+        Self { columns: std::array::from_fn(|number| self.columns[number][lanes.clone()].to_vec()) }
+    }
+
+    /// One of the [`NUMBERS`], by lane.
+    pub fn number(&self, number: usize) -> &[f64] {
+        &self.columns[number]
+    }
+
+    /// One of the [`NUMBERS`], by lane, to be changed.
+    pub fn number_mut(&mut self, number: usize) -> &mut [f64] {
+        &mut self.columns[number]
     }
 
     /// Takes over one lane of another motion.

@@ -128,6 +128,11 @@ impl Prepared {
         self.machine.block()
     }
 
+    /// Whether values depend on states before the moment.
+    pub fn remembers(&self) -> bool {
+        self.machine.remembers()
+    }
+
     /// Takes measured samples.
     fn warm(&self, machine: &mut Machine, flight: &Flight, samples: Range<usize>) {
         let mut derived: Vec<Vec<f64>> = vec![Vec::new(); self.sources.len()];
@@ -232,6 +237,11 @@ impl LaneProgram<'_> {
             When::Sample => machine.advance_lanes(lanes, motion.lanes(), &input),
             When::Ahead(part) => machine.look_ahead(lanes, part, motion.lanes(), &input),
         }
+    }
+
+    /// Number of formulas.
+    pub fn roots(&self) -> usize {
+        self.machine.roots()
     }
 
     /// Values of a formula, one a lane, in front.

@@ -41,7 +41,7 @@ fn said(row: &RangeRow) -> String {
 }
 
 fn panel(effect: &str, rows: &[RangeRow]) -> Panel {
-    let names = rows.iter().map(|row| row.name.chars().count().min(NAME)).max().unwrap_or(0) as f64 * CHARACTER + 10.0;
+    let names = rows.iter().map(|row| row.name.chars().count().min(NAME)).max().unwrap_or(0) as f64 * CHARACTER + 18.0;
     let numbers = rows.iter().map(|row| said(row).chars().count()).max().unwrap_or(0) as f64 * CHARACTER + 12.0;
     let mut body = heading(effect, "");
     let mut data = Vec::new();

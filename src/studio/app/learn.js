@@ -94,7 +94,7 @@ function control(app, job, into) {
   const now = app.steps.steps[app.steps.at];
   const other =
     job.diagnosis && job.state !== now.id
-      ? h('small', { class: 'quiet' }, `found for the state “${job.state_did}”, which is not the present one`)
+      ? h('small', { class: 'quiet' }, `what is said here is of the model before: “${job.state_did}”`)
       : null;
   return h(
     'div',
@@ -167,10 +167,10 @@ function findings(app, job, has) {
   return h(
     'div',
     { id: 'findings' },
-    h('div', { class: 'verdict' }, h('p', {}, prose(found.summary)), all),
     steps.length > open.length
       ? h('p', { class: 'fall', id: 'added' }, `${steps.length - open.length} of ${steps.length} in the model${open.length ? `, ${open.length} left` : ': all that was found'}.`)
       : null,
+    h('div', { class: 'verdict' }, h('p', {}, steps.length > open.length ? h('b', {}, 'Before anything was added: ') : null, prose(found.summary)), all),
     steps.map((step) => effect(app, found, step, has.has(step.effect))),
     (found.unknown ?? []).map((one) => unknown(app, one)),
     found.notes.length
@@ -266,7 +266,7 @@ function effect(app, found, step, isIn) {
             go({ view: 'model' });
           },
         },
-        'to the model',
+        'open in Model',
       ),
       add,
     ),
@@ -288,7 +288,7 @@ function effect(app, found, step, isIn) {
         'small',
         { class: 'quiet' },
         worth
-          ? 'of the squared error on unseen flights would come back if it alone were taken out of all that was found'
+          ? 'of the squared error on unseen flights would come back if it alone were taken out of all that was found; added by itself it brings less'
           : 'of the squared error on held-out blocks removed',
       ),
     ),

@@ -45,6 +45,7 @@ export async function show(app, into) {
       toggle('Rows', kinds, by, (value) => slide({ by: /** @type {'manoeuvre' | 'regime'} */ (value) })),
       h('span', { class: 'gap' }),
       h('small', { class: 'quiet' }, 'click a cell: its worst ten seconds'),
+      h('button', { type: 'button', class: 'main', id: 'to-learn', onclick: () => go({ view: 'learn' }) }, 'Which physics is missing?'),
     ),
     h(
       'div',

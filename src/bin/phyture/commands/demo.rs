@@ -7,12 +7,13 @@
 use super::diagnose;
 use super::train::Told;
 use super::{CHECK_FAILED, calibrate, simulate::starting_model};
-use crate::context::{Context, interruption};
+use crate::context::{Context, interruption, typed};
 use crate::pages::Figures;
 use phyture::Result;
-use phyture::critique::Comparison;
 use phyture::critique::check::check;
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
+use phyture::critique::digits::significant;
+use phyture::critique::{ChannelValues, Comparison};
 use phyture::flight::split::{Protocol, Split};
 use phyture::flight::{DataSet, write};
 use phyture::hybrid::Hybrid;
@@ -148,6 +149,17 @@ fn trained(context: &Context, settings: &Settings, model: &Model, name: &str, in
     Told { training, resume: false, interrupted }.hybrid(context)
 }
 
+/// The mean error over the channels of each step of the story, in one sentence.
+fn in_short(comparison: &Comparison) -> String {
+    let mean = |values: &ChannelValues| values.mean.map(|mean| significant(mean, 3));
+    let of = |name: &str| comparison.models.iter().find(|model| model.name == name).and_then(|model| mean(&model.rmse));
+    let steps =
+        [("baseline", "as calibrated"), ("amended", "with the named physics"), ("amended + network", "with a network on top")];
+    let told: Vec<String> = steps.iter().filter_map(|(name, says)| Some(format!("{} {says}", of(name)?))).collect();
+    let floor = comparison.floor.as_ref().and_then(mean).map(|floor| format!("; {floor} is the floor")).unwrap_or_default();
+    format!("Mean error on flights that nothing saw: {}{floor}", told.join(", "))
+}
+
 /// Tells the story and writes data, models, network and page into `out`.
 pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
@@ -167,6 +179,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     if report.fault {
         return Ok(ExitCode::from(CHECK_FAILED));
     }
+    context.say("What is hidden shows here, too: a lag looks like a delay, aerobatics with much missing like a moved trim. The demo goes on as it is.");
 
     context.say("\n3. The paper's baseline, calibrated on the flights that are not locked");
     let locked: Vec<String> = LOCKED.map(str::to_owned).into();
@@ -229,8 +242,9 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     outlet.write(context, &diagnose_page(&told)?)?;
     folder.close()?;
     let (report, seconds) = (report_path, begun.elapsed().as_secs_f64());
-    context.say(format!("done in {seconds:.0} s"));
-    context.say(format!("the same flights in a browser: phyture studio {0}/flights -m {0}/model.toml", out.display()));
+    context.say(format!("\nDone in {seconds:.0} s. {}", in_short(&judged.comparison)));
+    context.say(format!("the page to read:               {}", report.display()));
+    context.say(format!("the same flights in a browser:  {1} studio {0}/flights -m {0}/model.toml", out.display(), typed()));
     context.json(&Output { rounds, together, comparison: judged.comparison, report, seconds })?;
     Ok(ExitCode::SUCCESS)
 }
