@@ -12,7 +12,7 @@ use phyture::nn::safetensors::{Numbers, SafeTensors, Tensor};
 use phyture::physics::{Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
-use phyture::train::{Outcome, RunFolder, State, TrainConfig, Trainer};
+use phyture::train::{Outcome, RolloutConfig, RunFolder, State, TrainConfig, Trainer};
 use phyture::{Error, Result};
 
 /// Any number; it tells one set of training data from another.
@@ -152,6 +152,60 @@ fn the_best_epoch_is_kept_whatever_comes_after_it_and_wherever_the_run_was_stopp
     trainer.take_best();
     assert_eq!(bits(&trainer.state().parameters), bits(&best.parameters));
     assert_eq!(trainer.validation_loss()?, Some(best.loss));
+    Ok(())
+}
+
+#[test]
+fn rollouts_that_train_fall_on_flights_that_nothing_was_learned_from_and_a_stopped_run_goes_on_bit_for_bit() -> Result<()> {
+    let set = simulate(&Simulation { minutes: 4.0, seed: 6, ..Simulation::default() }.hide("dihedral_speedstab", 2.0)?)?;
+    let split = Split::new(&set.flights, &[], &Protocol::Segments, 1)?;
+    let (model, _) = calibrate(&paper(), &set.flights, &split.training)?;
+    let network = PhyTureConfig {
+        history: 16,
+        d_model: 8,
+        heads: 2,
+        levels: 2,
+        stacks: 1,
+        moving_average: 5,
+        dropout: 0.0,
+        state_channels: 10,
+        ..PhyTureConfig::default()
+    };
+    let inputs = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"].map(str::to_owned).into();
+    let config = TrainConfig {
+        network: network.into(),
+        inputs,
+        rollout: Some(RolloutConfig { horizon: 20, starts: 6, weight: 3.0 }),
+        standardise_loss: true,
+        peak_rate: 5e-3,
+        epochs: 8,
+        stride: 40,
+        seed: 5,
+        ..TrainConfig::default()
+    };
+    let job = phyture::train::Job::new(&set.flights, &split, &model, &config)?;
+    let network = job.description.network(true)?;
+    let run = |folder: &RunFolder, state: Option<State>, threads: usize, stop: Option<u64>| -> Result<(Outcome, State)> {
+        let rollouts = job.rollouts(&set.flights, &split, &config, Threads(threads))?.expect("it has some");
+        let trainer = Trainer::new(&config, &network, &job.sequences, &job.windows, state, Threads(threads))?;
+        let mut trainer = trainer.with_validation(&job.validation).with_rollouts(rollouts);
+        let outcome = folder.train(&config, DATA, &mut trainer, &mut |report| stop != Some(report.step.step))?;
+        Ok((outcome, trainer.into_state()))
+    };
+    let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
+    let (_, whole) = run(&RunFolder::create(place.path().join("whole"))?, None, 1, None)?;
+    let parts = RunFolder::create(place.path().join("parts"))?;
+    let (stopped, _) = run(&parts, None, 2, Some(whole.step / 2))?;
+    assert_eq!(stopped, Outcome::Stopped);
+    let (_, resumed) = run(&parts, Some(parts.resume(&config, DATA)?), 2, None)?;
+    assert_eq!(bits(&resumed.parameters), bits(&whole.parameters));
+    assert_eq!(resumed.curve, whole.curve);
+    let mut judge = job
+        .rollouts(&set.flights, &split, &config, Threads(2))?
+        .and_then(|rollouts| rollouts.validation)
+        .expect("a validation part");
+    let losses = [judge.judge(&network.initial(config.seed))?, judge.judge(&whole.parameters)?];
+    assert!(losses[1] < 0.9 * losses[0], "{losses:?}");
     Ok(())
 }
 

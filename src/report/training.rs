@@ -4,7 +4,7 @@
 use super::figures::{LineData, log_lines};
 use super::page::{Cell, DATA_NOTE, Page, Part, Section, Table, data_notes};
 use crate::critique::digits::{DIGITS, significant};
-use crate::train::{EpochLoss, TrainConfig};
+use crate::train::{EpochLoss, RolloutConfig, TrainConfig};
 
 /// What a training run came to.
 pub struct TrainingReport<'a> {
@@ -35,7 +35,7 @@ pub fn training_page(report: &TrainingReport<'_>) -> Page {
     };
     let kept = of_epoch(epoch.saturating_sub(1)).unwrap_or_default();
     let what = if config.keep_best { "the best on the validation part" } else { "the last one" };
-    let summary = vec![
+    let mut summary = vec![
         format!("{}: the weights are those of epoch {epoch} of {}, {what}: {kept}.", config.network.name(), curve.len()),
         format!(
             "{parameters} parameters, {} windows that train and {} that validate. A loss is the mean of the squared errors, summed over the channels, \
@@ -43,6 +43,13 @@ pub fn training_page(report: &TrainingReport<'_>) -> Page {
             windows[0], windows[1]
         ),
     ];
+    let rollouts = config.rollout.as_ref().map(|rollout| {
+        let RolloutConfig { horizon, starts, weight } = rollout;
+        format!(
+            "To it comes, with a weight of {weight}, that of {starts} rollouts of {horizon} steps beside the windows of each step."
+        )
+    });
+    summary.extend(rollouts);
     let x: Vec<f64> = (1..=curve.len()).map(|epoch| epoch as f64).collect();
     let line = |name: &str, of: &dyn Fn(&EpochLoss) -> f64| LineData {
         name: name.into(),

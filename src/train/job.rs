@@ -2,7 +2,7 @@
 //! training part alone. No optimiser and no files here.
 
 use super::config::TrainConfig;
-use super::rollout_loss::{RolloutLoss, RolloutRule};
+use super::rollout_loss::{RolloutLoss, RolloutRule, Rollouts};
 use crate::blocks::Blocks;
 use crate::error::Result;
 use crate::flight::split::Split;
@@ -86,12 +86,12 @@ impl Job {
         split: &Split,
         config: &TrainConfig,
         threads: Threads,
-    ) -> Result<Option<(RolloutLoss<'j, f32>, Option<RolloutLoss<'j, f32>>)>> {
+    ) -> Result<Option<Rollouts<'j>>> {
         let Some(rule) = RolloutRule::of(config) else { return Ok(None) };
         let of = |spans: &[Span]| RolloutLoss::new(&self.description, flights, &self.sequences, spans, &rule, threads);
         let training = of(&self.rollout_spans)?;
         let validation = if split.validation.is_empty() { None } else { Some(of(&split.validation)?) };
-        Ok(Some((training, validation)))
+        Ok(Some(Rollouts { training, validation }))
     }
 
     /// The hybrid with these weights, its gate fitted where windows were kept for one.

@@ -19,7 +19,7 @@ mod training;
 
 pub use config::{RolloutConfig, TrainConfig};
 pub use job::Job;
-pub use rollout_loss::{RolloutLoss, RolloutRule};
+pub use rollout_loss::{RolloutLoss, RolloutRule, Rollouts};
 #[cfg(feature = "disk")]
 pub use run::{Checkpointed, Outcome, Report, RunFolder};
 pub use trainer::{Best, EpochLoss, State, StepReport, Trainer};

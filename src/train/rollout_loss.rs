@@ -24,6 +24,7 @@ use crate::tape::{Session, Threads};
 use phyture_kernels::Real;
 use phyture_kernels::random::permutation;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Most rollouts that are looked at where all are judged; of more every other, every third … is taken.
 const MOST_JUDGED: usize = 256;
@@ -66,6 +67,14 @@ pub struct RolloutLoss<'a, T> {
     order: Option<(u64, Vec<u32>)>,
     says: Session<T>,
     pulls: Session<T>,
+}
+
+/// The rollouts of a training run.
+pub struct Rollouts<'a> {
+    /// Those that it learns from, beside the windows.
+    pub training: RolloutLoss<'a, f32>,
+    /// Others to judge it by; none where the split has no validation part.
+    pub validation: Option<RolloutLoss<'a, f32>>,
 }
 
 /// What no weight changes.
@@ -190,8 +199,8 @@ impl<'a> Ground<'a> {
         let further = Program::of_formulas(&formulas)?;
         let mut on = BTreeMap::new();
         for flight in starts.iter().map(|start| start.flight) {
-            if !on.contains_key(&flight) {
-                on.insert(flight, rollout.on_flight(flight, &further)?);
+            if let Entry::Vacant(place) = on.entry(flight) {
+                place.insert(rollout.on_flight(flight, &further)?);
             }
         }
         let signals = linear.map(|linear| flights.iter().map(|flight| Signals::new(flight, linear)).collect::<Result<_>>());

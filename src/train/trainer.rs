@@ -1,7 +1,7 @@
 //! The optimiser loop, one step at a time: order of windows, loss and gradients, Adam. No files, no clock.
 
 use super::config::TrainConfig;
-use super::rollout_loss::RolloutLoss;
+use super::rollout_loss::Rollouts;
 use super::schedule::Schedule;
 use crate::error::{Error, Result};
 use crate::flight::Window;
@@ -81,9 +81,7 @@ pub struct Trainer<'a> {
     windows: &'a [Window],
     /// Windows that nothing is learned from.
     validation: &'a [Window],
-    rollouts: Option<RolloutLoss<'a, f32>>,
-    /// Rollouts that nothing is learned from.
-    validation_rollouts: Option<RolloutLoss<'a, f32>>,
+    rollouts: Option<Rollouts<'a>>,
     session: Session<f32>,
     /// For losses without dropout; made when the first is asked for.
     judge: Option<Session<f32>>,
@@ -143,7 +141,6 @@ impl<'a> Trainer<'a> {
             windows,
             validation: &[],
             rollouts: None,
-            validation_rollouts: None,
             session,
             judge: None,
             threads,
@@ -163,8 +160,8 @@ impl<'a> Trainer<'a> {
 
     /// The same run with rollouts that it learns from beside the windows, and others to judge it by.
     #[must_use]
-    pub fn with_rollouts(mut self, training: RolloutLoss<'a, f32>, validation: Option<RolloutLoss<'a, f32>>) -> Self {
-        (self.rollouts, self.validation_rollouts) = (Some(training), validation);
+    pub fn with_rollouts(mut self, rollouts: Rollouts<'a>) -> Self {
+        self.rollouts = Some(rollouts);
         self
     }
 
@@ -221,7 +218,8 @@ impl<'a> Trainer<'a> {
     /// # Errors
     /// [`Error::Undetermined`] if it is not finite.
     pub fn training_loss(&mut self) -> Result<f64> {
-        let of_rollouts = self.rollouts.as_mut().map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
+        let rollouts = self.rollouts.as_mut().map(|rollouts| &mut rollouts.training);
+        let of_rollouts = rollouts.map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
         Ok(self.loss_on(self.windows)? + of_rollouts.unwrap_or(0.0))
     }
 
@@ -233,7 +231,8 @@ impl<'a> Trainer<'a> {
         if self.validation.is_empty() {
             return Ok(None);
         }
-        let of_rollouts = self.validation_rollouts.as_mut().map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
+        let rollouts = self.rollouts.as_mut().and_then(|rollouts| rollouts.validation.as_mut());
+        let of_rollouts = rollouts.map(|rollouts| rollouts.judge(&self.state.parameters)).transpose()?;
         Ok(Some(self.loss_on(self.validation)? + of_rollouts.unwrap_or(0.0)))
     }
 
@@ -279,8 +278,8 @@ impl<'a> Trainer<'a> {
         let dropout = self.config.network.is_random().then_some(DropoutKey { seed: self.config.seed, step: done });
         let mut loss = self.session.step(&self.state.parameters, chosen.len(), dropout, &fill)?;
         let gradient = self.session.gradients_mut();
-        let of_rollouts =
-            self.rollouts.as_mut().map(|rollouts| rollouts.step(&self.state.parameters, done, gradient)).transpose()?;
+        let rollouts = self.rollouts.as_mut().map(|rollouts| &mut rollouts.training);
+        let of_rollouts = rollouts.map(|rollouts| rollouts.step(&self.state.parameters, done, gradient)).transpose()?;
         loss += of_rollouts.unwrap_or(0.0);
         let gradient_norm = norm(self.session.gradients());
         if !(loss.is_finite() && gradient_norm.is_finite()) {

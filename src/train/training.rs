@@ -39,6 +39,8 @@ pub struct Begun {
     pub windows: usize,
     /// Windows that validate.
     pub validation_windows: usize,
+    /// Rollouts that train beside them; 0 without.
+    pub rollouts: usize,
     /// Steps in all.
     pub steps: u64,
     /// Steps that are done already.
@@ -53,7 +55,7 @@ pub enum Event<'e> {
     Step(&'e Report),
 }
 
-/// Mean of the squared errors, summed over the channels, (m/s²)² + (rad/s²)², without dropout.
+/// Mean of the squared errors, summed over the channels, (m/s²)² + (rad/s²)², without dropout, and the loss of rollouts where these train, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Losses {
     /// On the windows that trained the network.
@@ -114,13 +116,16 @@ impl Training<'_> {
         if with_losses || config.keep_best {
             trainer = trainer.with_validation(&job.validation);
         }
-        if let Some((training, validation)) = job.rollouts(flights, split, config, threads)? {
-            trainer = trainer.with_rollouts(training, validation);
+        let rollouts = job.rollouts(flights, split, config, threads)?;
+        let starts = rollouts.as_ref().map_or(0, |rollouts| rollouts.training.starts());
+        if let Some(rollouts) = rollouts {
+            trainer = trainer.with_rollouts(rollouts);
         }
         let begun = Begun {
             parameters: network.graph().parameter_count(),
             windows: job.windows.len(),
             validation_windows: job.validation.len(),
+            rollouts: starts,
             steps: trainer.steps(),
             done: trainer.state().step,
         };

@@ -73,7 +73,7 @@ pub struct TrainedNetwork {
     /// Steps in all.
     pub steps: u64,
     /// Of the network as it is written, on the windows that trained it, without dropout: mean of the squared errors, summed over the
-    /// channels, (m/s²)² + (rad/s²)².
+    /// channels, (m/s²)² + (rad/s²)²; where rollouts train, too, their loss is in it.
     pub training_loss: f64,
     /// The same on the validation part, which it was not trained on; none if the split has no validation part.
     pub validation_loss: Option<f64>,

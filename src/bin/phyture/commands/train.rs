@@ -173,13 +173,17 @@ impl Told<'_> {
 }
 
 fn say_begun(context: &Context, config: &TrainConfig, begun: &Begun) {
+    let rollouts = config.rollout.as_ref().map_or_else(String::new, |rollout| {
+        format!(" and {} of {} rollouts of {} steps", rollout.starts.min(begun.rollouts), begun.rollouts, rollout.horizon)
+    });
     context.say(format!(
-        "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows in {} epochs; {}",
+        "\n{} parameters; {} windows of {} samples, {} steps of up to {} windows{} in {} epochs; {}",
         begun.parameters,
         begun.windows,
         config.network.history(),
         begun.steps,
         config.batch,
+        rollouts,
         config.epochs,
         match begun.validation_windows {
             0 => "this split has no validation part".to_owned(),
