@@ -66,13 +66,13 @@ pub struct RolloutConfig {
     /// Rollouts beside the windows of a step, at most 64. Default 8.
     pub starts: usize,
     /// Weight of their loss: with 1, an error of rollouts as large as that of the physics with body rates held counts as much as all of the residual
-    /// does in single samples. Above 0, at most 1000. Default 1.
+    /// does in single samples. Above 0, at most 1000. Default 10.
     pub weight: f64,
 }
 
 impl Default for RolloutConfig {
     fn default() -> Self {
-        Self { horizon: 50, starts: 8, weight: 1.0 }
+        Self { horizon: 50, starts: 8, weight: 10.0 }
     }
 }
 

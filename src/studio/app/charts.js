@@ -256,7 +256,7 @@ export function waterfall(channel, steps, chosen, choose) {
       h(
         'em',
         { class: change < -0.0005 ? 'fall' : change > 0.0005 ? 'rise' : 'quiet' },
-        change === 0 ? '' : `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}`,
+        Math.abs(change) < 0.0005 ? '' : `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}`,
       ),
     ),
     s(

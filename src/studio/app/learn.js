@@ -350,7 +350,7 @@ function unknown(app, one) {
       `Measured variables predict ${percent(one.r2)} of what is left, most of all ${one.depends_on
         .slice(0, 3)
         .map((on) => on.variable)
-        .join(', ')}. ${one.shape}`,
+        .join(', ')}: ${one.shape}`,
     ),
     one.suggested_formula ? h('pre', {}, one.suggested_formula) : null,
   );

@@ -16,15 +16,16 @@ const STICKS = { u1: 'lateral', u2: 'longitudinal', u3: 'tail', u4: 'collective'
 const empty = (why) => h('p', { class: 'quiet' }, `${why}.`);
 
 /**
- * The rules of a region, none of which is broken at the end of a line.
+ * The rules of a region, none of which is broken at the end of a line, and what stays with the last one.
  * @param {string} rule
+ * @param {HTMLElement | null} behind
  */
-function rules(rule) {
+function rules(rule, behind) {
   const parts = rule.split(', ');
   return h(
     'code',
     {},
-    parts.flatMap((part, index) => [h('span', {}, index < parts.length - 1 ? `${part},` : part), ' ']),
+    parts.flatMap((part, index) => [index < parts.length - 1 ? h('span', {}, `${part},`) : h('span', {}, part, ' ', behind), ' ']),
   );
 }
 
@@ -55,7 +56,7 @@ export function regions(channel, found) {
     return h(
       'tr',
       { 'data-rule': one.rule },
-      h('th', { scope: 'row' }, one === whole ? one.rule : rules(one.rule), one.worst ? visit(one.worst, one.rule) : null),
+      h('th', { scope: 'row' }, one === whole ? one.rule : rules(one.rule, one.worst ? visit(one.worst, one.rule) : null)),
       h('td', { class: 'fill' }, h('div', { class: 'track' }, bar)),
       h('td', {}, number(one.rmse), one.ci95 ? h('small', { class: 'quiet' }, ` [${interval(one.ci95)}]`) : null),
       h('td', { class: dense ? 'rise' : '' }, percent(one.share_of_error)),
