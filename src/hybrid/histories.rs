@@ -28,9 +28,9 @@ struct Lane<T> {
 #[derive(Clone, Debug)]
 pub(crate) struct HistorySlopes {
     /// By scaled rows of the network's inputs, `[steps, channels]`.
-    pub state: Vec<f64>,
+    state: Vec<f64>,
     /// By scaled rows of the accelerations before the network, `[steps, 6]`.
-    pub physics: Vec<f64>,
+    physics: Vec<f64>,
     /// By rows of the linear history's inputs, `[steps, inputs]`.
     signals: Vec<f64>,
 }

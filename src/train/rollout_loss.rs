@@ -61,6 +61,21 @@ impl RolloutRule {
 /// The loss is `weight · L · C`: C is the cost of the rollouts, 1 where they err as the physics does with body rates held
 /// (`calibrate --output-error` makes the same cost small), L the one-step loss of a network that says nothing. So with a weight of 1 a rollout
 /// error as large as that counts as much as all of the residual.
+///
+/// ```
+/// use phyture::flight::{Flight, split::Split};
+/// use phyture::physics::Model;
+/// use phyture::tape::Threads;
+/// use phyture::train::{Job, RolloutConfig, RolloutLoss, RolloutRule, TrainConfig};
+/// # fn judge(flights: &[Flight], split: &Split, model: &Model, weights: &[f32]) -> phyture::Result<()> {
+/// let config = TrainConfig { rollout: Some(RolloutConfig::default()), ..TrainConfig::in_minutes() };
+/// let job = Job::new(flights, split, model, &config)?;
+/// let rule = RolloutRule::of(&config).expect("it has rollouts");
+/// let mut loss = RolloutLoss::<f32>::new(&job.description, flights, &job.sequences, &split.test, &rule, Threads(0))?;
+/// println!("{} rollouts: {:.3}", loss.starts(), loss.judge(weights)?);
+/// # Ok(())
+/// # }
+/// ```
 pub struct RolloutLoss<'a, T> {
     ground: Ground<'a>,
     /// Order of the starts in a pass over them.

@@ -228,7 +228,7 @@ function score() {
         title: `${of.name}, root mean square error on ${app.steps.judged_on}`,
         onclick: () => slide({ channel: index }),
       },
-      h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}`),
+      h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}${fell ? `, was ${number(before)}` : ''}`),
       h('span', { class: 'rmse' }, number(after), h('small', {}, ` ${of.unit}`)),
       h(
         'span',

@@ -37,6 +37,16 @@ export async function show(app, into) {
     ['manoeuvre', 'Manoeuvre'],
     ['regime', 'Regime'],
   ]);
+  // What is missing: asked at once, where nothing has been asked yet, and shown in Learn.
+  const diagnose = async () => {
+    try {
+      const job = await ask('job');
+      if (!job.diagnosis && job.progress === 'idle') await ask('diagnose');
+      go({ view: 'learn' });
+    } catch (error) {
+      app.failed(error);
+    }
+  };
   into.replaceChildren(
     h(
       'div',
@@ -45,7 +55,7 @@ export async function show(app, into) {
       toggle('Rows', kinds, by, (value) => slide({ by: /** @type {'manoeuvre' | 'regime'} */ (value) })),
       h('span', { class: 'gap' }),
       h('small', { class: 'quiet' }, 'click a cell: its worst ten seconds'),
-      h('button', { type: 'button', class: 'main', id: 'to-learn', onclick: () => go({ view: 'learn' }) }, 'Which physics is missing?'),
+      h('button', { type: 'button', class: 'main', id: 'to-learn', onclick: diagnose }, 'Diagnose'),
     ),
     h(
       'div',
