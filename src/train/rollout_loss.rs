@@ -541,11 +541,13 @@ mod tests {
                 let moved: Vec<f64> = at.iter().zip(&way).map(|(at, way)| at + by * way).collect();
                 loss.step(&moved, step, &mut vec![0.0; at.len()])
             };
-            const BY: f64 = 1e-6;
-            let expected = (there(BY)? - there(-BY)?) / (2.0 * BY);
+            let mut difference = |by: f64| -> Result<f64> { Ok((there(by)? - there(-by)?) / (2.0 * by)) };
+            let (expected, closer) = (difference(1e-6)?, difference(3e-7)?);
             let found: f64 = gradient.iter().zip(&way).map(|(gradient, way)| gradient * way).sum();
             let size = gradient.iter().map(|part| part * part).sum::<f64>().sqrt();
             prop_assert!(size > 1e-3, "nothing to check");
+            // Where two steps disagree one of the many rectifiers has its kink between the points, and another point is drawn.
+            prop_assume!((expected - closer).abs() < APPROXIMATE * size);
             prop_assert!((found - expected).abs() < APPROXIMATE * size, "{} for {}, of {}", found, expected, size);
         }
     }
