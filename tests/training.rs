@@ -34,6 +34,20 @@ fn paper() -> Model {
     Model::paper("truth", 4.58, [0.18, 0.34, 0.28], 0.8)
 }
 
+/// A Phy-Ture of 16 samples of history that trains in seconds.
+fn small(inputs: usize) -> PhyTureConfig {
+    PhyTureConfig {
+        history: 16,
+        d_model: 8,
+        heads: 2,
+        levels: 2,
+        stacks: 1,
+        moving_average: 5,
+        state_channels: inputs,
+        ..PhyTureConfig::default()
+    }
+}
+
 fn job() -> Result<Job> {
     job_of(simulated()?, &paper(), TrainConfig::default().inputs, LinearConfig { lags: 3, ..LinearConfig::default() })
 }
@@ -41,16 +55,7 @@ fn job() -> Result<Job> {
 fn job_of(set: DataSet, model: &Model, inputs: Vec<String>, linear: LinearConfig) -> Result<Job> {
     let split = Split::new(&set.flights, &[], &Protocol::Segments, 1)?;
     let (model, _) = calibrate(model, &set.flights, &split.training)?;
-    let network = PhyTureConfig {
-        history: 16,
-        d_model: 8,
-        heads: 2,
-        levels: 2,
-        stacks: 1,
-        moving_average: 5,
-        state_channels: inputs.len(),
-        ..PhyTureConfig::default()
-    };
+    let network = small(inputs.len());
     let config = TrainConfig {
         network: network.into(),
         linear: Some(linear.clone()),
@@ -160,17 +165,7 @@ fn rollouts_that_train_fall_on_flights_that_nothing_was_learned_from_and_a_stopp
     let set = simulate(&Simulation { minutes: 4.0, seed: 6, ..Simulation::default() }.hide("dihedral_speedstab", 2.0)?)?;
     let split = Split::new(&set.flights, &[], &Protocol::Segments, 1)?;
     let (model, _) = calibrate(&paper(), &set.flights, &split.training)?;
-    let network = PhyTureConfig {
-        history: 16,
-        d_model: 8,
-        heads: 2,
-        levels: 2,
-        stacks: 1,
-        moving_average: 5,
-        dropout: 0.0,
-        state_channels: 10,
-        ..PhyTureConfig::default()
-    };
+    let network = PhyTureConfig { dropout: 0.0, ..small(10) };
     let inputs = ["vx", "vy", "vz", "wx", "wy", "wz", "u1", "u2", "u3", "u4"].map(str::to_owned).into();
     let config = TrainConfig {
         network: network.into(),

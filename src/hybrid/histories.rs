@@ -1,11 +1,35 @@
 //! The histories of rollouts: what network and linear history read, measured up to the start of each lane and predicted from there on. What is
 //! made of them is elsewhere.
 
-use super::Description;
 use super::linear::{Linear, Signals};
 use super::sequence::Sequence;
-use crate::flight::PerChannel;
+use super::{Description, inputs};
+use crate::error::Result;
+use crate::flight::{Flight, PerChannel};
+use crate::physics::rollout::Program;
 use phyture_kernels::Real;
+
+/// What is read along some flights, beside the model.
+pub(crate) struct Read {
+    /// The network's inputs, then those of the linear history.
+    pub program: Program,
+    /// By flight, where there is a linear history: its inputs as they were recorded.
+    pub signals: Vec<Signals>,
+}
+
+impl Read {
+    /// What a hybrid reads.
+    ///
+    /// # Errors
+    /// As [`inputs::parse`] and [`Signals::new`].
+    pub fn new(description: &Description, flights: &[Flight]) -> Result<Self> {
+        let linear = description.linear.as_ref().map(|linear| linear.config());
+        let mut formulas = inputs::parse(&description.inputs)?;
+        formulas.extend(inputs::parse(linear.map_or(&[], |linear| &linear.inputs))?);
+        let signals = linear.map(|linear| flights.iter().map(|flight| Signals::new(flight, linear)).collect::<Result<_>>());
+        Ok(Self { program: Program::of_formulas(&formulas)?, signals: signals.transpose()?.unwrap_or_default() })
+    }
+}
 
 /// Rows of some lanes of one flight, with room for a whole rollout.
 pub(crate) struct Histories<'a, T> {

@@ -2,14 +2,13 @@
 //! step begins and held over it. The history behind a rollout is measured up to its start and predicted from there on. How a model is
 //! integrated is in `physics::rollout`.
 
-use super::histories::Histories;
-use super::linear::Signals;
+use super::Hybrid;
+use super::histories::{Histories, Read};
 use super::sequence::{Sequence, sequences};
-use super::{Hybrid, inputs};
 use crate::error::Result;
 use crate::flight::{Flight, PerChannel, Window};
 use crate::physics::Rollout;
-use crate::physics::rollout::{Addition, Each, Further, Program};
+use crate::physics::rollout::{Addition, Each, Further};
 use crate::tape::{Session, Threads};
 
 /// Lanes of a batch: their histories stay small, and a session's set-up is little beside them.
@@ -19,11 +18,8 @@ const LANES: usize = 64;
 pub struct HybridRollout<'a> {
     hybrid: &'a Hybrid,
     rollout: Rollout<'a>,
-    /// The network's inputs, then those of the linear history.
-    program: Program,
+    read: Read,
     sequences: Vec<Sequence>,
-    /// By flight, where there is a linear history.
-    signals: Vec<Signals>,
 }
 
 impl<'a> HybridRollout<'a> {
@@ -35,17 +31,7 @@ impl<'a> HybridRollout<'a> {
         let description = hybrid.description();
         flights.iter().try_for_each(|flight| description.check_step(flight))?;
         let rollout = Rollout::new(&description.model, flights, horizon)?;
-        let linear = description.linear.as_ref().map(|linear| linear.config());
-        let mut formulas = inputs::parse(&description.inputs)?;
-        formulas.extend(inputs::parse(linear.map_or(&[], |linear| &linear.inputs))?);
-        let signals = linear.map(|linear| flights.iter().map(|flight| Signals::new(flight, linear)).collect::<Result<_>>());
-        Ok(Self {
-            hybrid,
-            rollout,
-            program: Program::of_formulas(&formulas)?,
-            sequences: sequences(flights, description)?,
-            signals: signals.transpose()?.unwrap_or_default(),
-        })
+        Ok(Self { hybrid, rollout, read: Read::new(description, flights)?, sequences: sequences(flights, description)? })
     }
 
     /// As [`Rollout::roll`]. The networks of batches work side by side.
@@ -56,7 +42,7 @@ impl<'a> HybridRollout<'a> {
         self.hybrid.check_windows(self.rollout.flights(), starts)?;
         let addition =
             |flight: usize, samples: &[usize]| Ok(Box::new(Added::new(self, flight, samples)?) as Box<dyn Addition + '_>);
-        let further = Further { program: &self.program, lanes: LANES, addition: &addition };
+        let further = Further { program: &self.read.program, lanes: LANES, addition: &addition };
         self.rollout.roll_with(starts, None, Some(&further), each)
     }
 }
@@ -72,7 +58,7 @@ impl<'a> Added<'a> {
     fn new(of: &'a HybridRollout<'_>, flight: usize, samples: &[usize]) -> Result<Self> {
         let mut session = Session::infer(of.hybrid.network.graph(), &[of.hybrid.network.output()], Threads(1))?;
         session.load(&of.hybrid.parameters)?;
-        let (sequence, signals) = (&of.sequences[flight], of.signals.get(flight));
+        let (sequence, signals) = (&of.sequences[flight], of.read.signals.get(flight));
         let histories = Histories::new(of.hybrid.description(), sequence, signals, samples, of.rollout.horizon());
         Ok(Self { hybrid: of.hybrid, session, histories })
     }

@@ -3,6 +3,7 @@
 //! Everything random is a function of the seed and of where in the run it is drawn, so a run that was interrupted and resumed is
 //! bit for bit the run that was not, on any number of threads.
 
+mod adjoint;
 pub mod config;
 #[cfg(feature = "disk")]
 pub mod container;

@@ -124,8 +124,7 @@ impl Batch<'_> {
 
     /// What is added over the step that begins here.
     fn hold_addition(&mut self, step: usize, motion: &Motion, seen: &Seen, held: &mut PerChannel<Vec<f64>>) -> Result<()> {
-        let Some(addition) = &mut self.addition else { return Ok(()) };
-        let Some(further) = &mut self.further else { return Ok(()) };
+        let (Some(addition), Some(further)) = (&mut self.addition, &mut self.further) else { return Ok(()) };
         further.hold(&self.starts, step);
         further.evaluate(When::Sample, motion, seen);
         let (lanes, model) = (self.starts.len(), &self.model);

@@ -1,13 +1,13 @@
 //! Lanes of one flight that go a step at a time, with whatever is added over a step given from outside, and the derivatives of a step: by
 //! the state where it begins and by what is added. Central differences of the integration itself, in f64, so that they hold for every formula.
-//! What remembers a state has derivatives over many steps, which are not here: such models are refused. What the derivatives are for, nothing here
+//! What remembers a state has derivatives over many steps, which are not here ([`OnFlight::remembers`]). What the derivatives are for, nothing here
 //! knows.
 
 use super::Rollout;
 use super::batch::{Batch, MOST_RATE_RAD_S, MOST_SPEED_M_S};
 use super::motion::{Motion, NUMBERS, Seen};
 use super::program::{Prepared, When, check_lanes};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::flight::{Channel, PerChannel};
 
 /// Half the width of the central differences, in m, m/s, rad/s, parts of a unit quaternion, m/s² and rad/s²: truncation and rounding are both
@@ -23,31 +23,23 @@ pub(crate) struct OnFlight {
     further: Prepared,
 }
 
+impl OnFlight {
+    /// Whether the model, and whether the formulas beside it, remember states, so that a step alone does not have their derivatives.
+    pub fn remembers(&self) -> [bool; 2] {
+        [self.model.remembers(), self.further.remembers()]
+    }
+}
+
 impl<'a> Rollout<'a> {
     /// Makes ready for walks on a flight, by its index, with the model's own numbers; `further` are formulas beside the model's.
     ///
     /// # Errors
-    /// [`Error::Config`] where the model, or a formula, remembers a state.
+    /// As [`Rollout::roll`].
     pub(crate) fn on_flight(&self, index: usize, further: &super::Program) -> Result<OnFlight> {
         let flight = &self.flights[index];
         let place = |symbol| self.program.numbers.iter().position(|(_, own)| *own == symbol);
         let model = self.program.on(flight, flight.len(), &[], &|symbol| Some(self.own(place(symbol)?, index)))?;
         let further = further.on(flight, flight.len(), &[], &|_| None)?;
-        for (what, prepared) in [("the model", &model), ("an input of network or linear history", &further)] {
-            if prepared.remembers() {
-                return Err(Error::Config {
-                    place: "training configuration".into(),
-                    field: "rollout".into(),
-                    found: format!(
-                        "rollouts of a hybrid of which {what} remembers states (`lag`, `delay`, `rate` or `slew` of one)"
-                    ),
-                    expected:
-                        "formulas of the states of the moment, and of whatever controls did before: a loss of rollouts has no \
-                               derivative through what remembers a state"
-                            .into(),
-                });
-            }
-        }
         Ok(OnFlight { model, further })
     }
 
