@@ -8,14 +8,15 @@
 //! `[keys, heads·d_k]`; head h is columns h·d_k … (h+1)·d_k. The forward pass goes over blocks of keys with an online softmax and keeps
 //! only ℓ, `[queries, heads]`, for the gradients, which are in `backward`.
 //!
-//! Scores lie as `[keys, queries]`: what is done to a score is done to a register of queries.
+//! Scores lie as `[keys, queries]`, a tile's width of queries at a time: what is done to a score is done to a register of queries, and the sum over
+//! keys, too, has a query in each lane.
 //!
 //! Mask element of head h, query i, key j: row h·queries + i, column j.
 
 use crate::dropout::{Keep, Mask, MaskLanes};
-use crate::elementary::power_of_two;
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
-use crate::tile::{self, Store};
+use crate::tile::{self, Pair, Store, load, store};
+use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
 mod backward;
@@ -23,25 +24,18 @@ mod backward;
 pub(crate) use backward::Backward;
 pub use backward::{Gradients, backward};
 
-/// Queries of a block: one lane each. A multiple of every level's tile in both directions.
-const QUERIES: usize = 96;
+/// Where o may be cut for [`forward_rows`]: at multiples of this many queries, every query has the same neighbours as uncut.
+pub const CUT: usize = tile::WIDEST;
 
-/// Where o may be cut for [`forward_rows`]: at multiples of this many queries, every query is in the same block as uncut.
-pub const CUT: usize = QUERIES;
-
-/// Keys of a block: on x86-64 a multiple of every tile's rows. A block of scores, at most 96 x 72 numbers, stays in the first-level cache.
-const KEYS: usize = 72;
-
-/// Queries a block really has at a level whose tile is `NR` wide: short blocks waste less of a history of 1000.
-const fn block_of_queries<const NR: usize>() -> usize {
-    if NR > 16 { QUERIES } else { QUERIES / 2 }
-}
+/// Keys of a block of scores; even, and a multiple of every level's tile rows. A block has one tile's width of lanes: at most 9 KiB in f32, so
+/// that two of them stay in the first-level cache.
+const BLOCK: usize = 72;
 
 /// Scratch, in numbers, that [`forward`] and [`backward()`] need.
 pub fn scratch_len(heads: usize, queries: usize, keys: usize, head_size: usize) -> usize {
     let _ = (heads, queries);
     let wide = head_size.next_multiple_of(tile::WIDEST);
-    3 * keys * wide + 2 * head_size * QUERIES + 3 * QUERIES * wide + 2 * KEYS * QUERIES + 3 * QUERIES
+    tile::WIDEST * (2 * BLOCK + 3 * head_size + 2 * wide) + 2 * keys * (wide + head_size)
 }
 
 /// What attention is computed from, and how.
@@ -101,75 +95,64 @@ fn take<'a, T>(scratch: &mut &'a mut [T], len: usize) -> &'a mut [T] {
     taken
 }
 
-/// Copies the rows of a head into rows of `width` numbers, filled up with zeros, times `factor`.
+/// xᵀ `[cols, rows]` times `factor`, in lines that are `width` numbers apart.
 #[inline(always)]
-fn pad<T: Real>(x: Rows<'_, T>, factor: T, width: usize, padded: &mut [T]) {
-    for (i, line) in padded.chunks_exact_mut(width).enumerate() {
-        line.fill(T::ZERO);
-        if i < x.rows() {
-            line.iter_mut().zip(x.row(i)).for_each(|(y, x)| *y = factor * *x);
-        }
-    }
-}
-
-/// Panels of xᵀ for a block of rows, one row a lane, times `factor`; lanes beyond the last row are zero.
-#[inline(always)]
-fn lanes<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, panels: &mut [T]) {
-    let size = x.cols();
-    for (panel, first) in panels.chunks_exact_mut(size * NR).zip((0..).step_by(NR)) {
-        for lane in 0..NR {
-            let lines = panel.as_chunks_mut::<NR>().0.iter_mut();
-            if first + lane < x.rows() {
-                lines.zip(x.row(first + lane)).for_each(|(line, x)| line[lane] = factor * *x);
-            } else {
-                lines.for_each(|line| line[lane] = T::ZERO);
+fn turn<T: Real>(x: Rows<'_, T>, factor: T, lines: &mut [T], width: usize) {
+    /// Rows and columns of a block: what is read and written at once is a few numbers next to each other, not one.
+    const SIDE: usize = 4;
+    let (rows, cols) = (x.rows() / SIDE * SIDE, x.cols() / SIDE * SIDE);
+    for i in (0..rows).step_by(SIDE) {
+        let block = [x.row(i), x.row(i + 1), x.row(i + 2), x.row(i + 3)];
+        for c in (0..cols).step_by(SIDE) {
+            // Else the compiler would write whole columns number by number, with instructions that are slow on every processor.
+            core::hint::black_box(());
+            for j in c..c + SIDE {
+                let line = &mut lines[j * width + i..][..SIDE];
+                for k in 0..SIDE {
+                    line[k] = factor * block[k][j];
+                }
             }
         }
     }
-}
-
-/// Packs a block of rows `[≤ block, size]` as a right operand of depth `block` in panels of `columns`, times `factor`; missing rows are zero.
-#[inline(always)]
-fn panels<T: Real>(x: Rows<'_, T>, factor: T, block: usize, columns: usize, panels: &mut [T]) {
-    for (panel, c) in panels.chunks_exact_mut(block * columns).zip((0..).step_by(columns)) {
-        pad(x.columns(c, columns.min(x.cols() - c)), factor, columns, panel);
-    }
-}
-
-/// c {=, +=} rows·panels.
-struct Product<'a, T> {
-    rows: Rows<'a, T>,
-    panels: &'a [T],
-    c: RowsMut<'a, T>,
-    write: Write,
-}
-
-impl<T: Real> Tiled<T> for Product<'_, T> {
-    #[inline(always)]
-    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let n = self.c.cols();
-        tile::rows::<T, I, _, _, MR, NR>(&self.rows, n, self.panels, &mut Store { c: self.c, bias: None, write: self.write });
-    }
-}
-
-/// c += sᵀ·b for a block s `[keys, queries]`, with b `[all keys, width]` in panels, from line `key` on.
-struct TransposedProduct<'a, T> {
-    s: Rows<'a, T>,
-    panels: &'a [T],
-    keys: usize,
-    key: usize,
-    c: RowsMut<'a, T>,
-}
-
-impl<T: Real> Tiled<T> for TransposedProduct<'_, T> {
-    #[inline(always)]
-    fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let s = self.s;
-        let mut sink = Store { c: self.c, bias: None, write: Write::Add };
-        for (panel, j) in self.panels.chunks_exact(self.keys * NR).zip((0..).step_by(NR)) {
-            let panel = &panel.as_chunks::<NR>().0[self.key..self.key + s.rows()];
-            tile::columns::<T, I, _, MR, NR>((|p| s.row(p), s.cols()), panel, (j, NR), &mut sink);
+    for i in 0..x.rows() {
+        let first = if i < rows { cols } else { 0 };
+        for (c, x) in x.row(i).iter().enumerate().skip(first) {
+            lines[c * width + i] = factor * *x;
         }
+    }
+}
+
+/// xᵀ times `factor` for up to NR rows x, one row a lane; lanes beyond the last row are zero.
+#[inline(always)]
+fn lanes<T: Real, const NR: usize>(x: Rows<'_, T>, factor: T, lines: &mut [[T; NR]]) {
+    let lines = lines.as_flattened_mut();
+    lines.fill(T::ZERO);
+    turn(x, factor, lines, NR);
+}
+
+/// block `[rows, NR]` = leftᵀ·lanes for rows `first…` of what was turned into `left` `[size, width]`, and lanes `[size, NR]`.
+#[inline(always)]
+fn scores<T: Real, I: Isa, const MR: usize, const NR: usize>(
+    (left, width, first): (&[T], usize, usize),
+    lanes: &[[T; NR]],
+    block: &mut [[T; NR]],
+) {
+    let rows = block.len();
+    let mut sink = Store { c: RowsMut::packed(block.as_flattened_mut(), rows, NR), bias: None, write: Write::Set };
+    tile::columns::<T, I, _, MR, NR>((|p| &left[p * width + first..][..rows], rows), lanes, (0, NR), &mut sink);
+}
+
+/// sums `[size, NR]` += xᵀ·block for x `[rows, size]` and a block `[rows, NR]`.
+#[inline(always)]
+fn add_transposed<T: Real, I: Isa, const MR: usize, const NR: usize>(x: Rows<'_, T>, block: &[[T; NR]], sums: &mut [[T; NR]]) {
+    /// Divides the usual sizes of a head, which a tile of 12 rows does not; and 16 sums in flight are enough.
+    const SHORT: usize = 8;
+    let size = x.cols();
+    let mut sink = Store { c: RowsMut::packed(sums.as_flattened_mut(), size, NR), bias: None, write: Write::Add };
+    if MR > SHORT {
+        tile::columns::<T, I, _, SHORT, NR>((|p| x.row(p), size), block, (0, NR), &mut sink);
+    } else {
+        tile::columns::<T, I, _, MR, NR>((|p| x.row(p), size), block, (0, NR), &mut sink);
     }
 }
 
@@ -217,47 +200,37 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
         let Shape { heads, queries, keys, size } = self.shape;
-        let (most, columns) = (block_of_queries::<NR>(), tile::panel_width::<NR>(size));
-        let wide = size.next_multiple_of(columns);
         let mut scratch = self.scratch;
-        let values = take(&mut scratch, keys * wide);
-        let query_lanes = take(&mut scratch, size * most);
-        let sums = take(&mut scratch, most * wide);
-        let scores = take(&mut scratch, KEYS * most);
-        let [largest, total, factor] = [(); 3].map(|()| take(&mut scratch, most));
+        let [query_lanes, sums] = [(); 2].map(|()| take(&mut scratch, size * NR).as_chunks_mut::<NR>().0);
+        let block = take(&mut scratch, BLOCK * NR).as_chunks_mut::<NR>().0;
+        let (output, turned_keys) = (take(&mut scratch, NR * size), take(&mut scratch, size * keys));
         let keep_scale = T::of(self.dropout.map_or(1.0, Mask::scale));
         let stop = self.first + self.o.rows();
         for h in 0..heads {
-            let (q, k) = (self.q.columns(h * size, size), self.k.columns(h * size, size));
-            panels(self.v.columns(h * size, size), T::ONE, keys, columns, values);
-            for first in (self.first..stop).step_by(most) {
-                let end = stop.min(first + most);
-                let block = (end - first).next_multiple_of(NR);
-                let query_lanes = &mut query_lanes[..size * block];
-                lanes::<T, NR>(q.range(first, end), self.shape.score_scale(), query_lanes);
-                let mask = self.dropout.map(|mask| MaskLanes::<QUERIES>::new(mask, h * queries + first));
-                let [largest, total, factor] = [&mut largest[..block], &mut total[..block], &mut factor[..block]];
-                largest.fill(T::NEG_INFINITY);
-                total.fill(T::ZERO);
-                sums.fill(T::ZERO);
-                for key in (0..keys).step_by(KEYS) {
-                    let key_end = keys.min(key + KEYS);
-                    let scores = &mut scores[..(key_end - key) * block];
-                    let rows = k.range(key, key_end);
-                    let c = RowsMut::packed(scores, key_end - key, block);
-                    Product { rows, panels: query_lanes, c, write: Write::Set }.run::<I, MR, NR>();
-                    softmax_block::<T, I, NR>(block, key, mask.as_ref(), scores, largest, total, factor);
-                    for (row, factor) in sums.chunks_exact_mut(wide).zip(factor.iter()) {
-                        row.iter_mut().for_each(|x| *x *= *factor);
+            let [q, k, v] = [self.q, self.k, self.v].map(|x| x.columns(h * size, size));
+            turn(k, T::ONE, turned_keys, keys);
+            for first in (self.first..stop).step_by(NR) {
+                let end = stop.min(first + NR);
+                lanes(q.range(first, end), self.shape.score_scale(), query_lanes);
+                let mask = self.dropout.map(|mask| MaskLanes::<NR>::new(mask, h * queries + first));
+                let (mut largest, mut total) = ([T::NEG_INFINITY; NR], [T::ZERO; NR]);
+                sums.as_flattened_mut().fill(T::ZERO);
+                for key in (0..keys).step_by(BLOCK) {
+                    let key_end = keys.min(key + BLOCK);
+                    let block = &mut block[..key_end - key];
+                    scores::<T, I, MR, NR>((turned_keys, keys, key), query_lanes, block);
+                    let factor = softmax_block::<T, I, NR>(key, mask.as_ref(), block, &mut largest, &mut total);
+                    for sums in sums.iter_mut() {
+                        let [a, b] = load::<T, I, NR>(sums);
+                        store::<T, I, NR>([a.mul(factor[0]), b.mul(factor[1])], sums);
                     }
-                    let s = Rows::packed(scores, key_end - key, block);
-                    let c = RowsMut::packed(sums, block, wide);
-                    tile::run_for::<T, I, MR, NR>(size, TransposedProduct { s, panels: values, keys, key, c });
+                    add_transposed::<T, I, MR, NR>(v.range(key, key_end), block, sums);
                 }
+                turn(Rows::packed(sums.as_flattened(), size, NR), T::ONE, output, size);
                 for (lane, i) in (first - self.first..end - self.first).enumerate() {
-                    let target = &mut self.o.row_mut(i)[h * size..][..size];
                     let normalise = keep_scale / total[lane];
-                    target.iter_mut().zip(&sums[lane * wide..]).for_each(|(o, x)| *o = *x * normalise);
+                    let target = &mut self.o.row_mut(i)[h * size..][..size];
+                    target.iter_mut().zip(&output[lane * size..]).for_each(|(o, sum)| *o = *sum * normalise);
                     self.log_sum_exp[i * heads + h] = largest[lane] + total[lane].ln() * T::LOG2_E;
                 }
             }
@@ -265,75 +238,82 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     }
 }
 
-/// One step of the online softmax over a block of scores `[keys, queries]`, from key `first_key`, which is even. Scores become
-/// m∘2^(s − largest) with the new largest score of each query and the dropout mask m; `total`, of 2^(s − largest), and what else was
-/// summed so far is to be multiplied with `factor` = 2^(old − new).
+/// One step of the online softmax over a block of scores `[keys, NR]`, from key `first_key`, which is even. Scores become
+/// m∘2^(s − largest) with the new largest score of each query and the dropout mask m. What was summed so far, `total` of 2^(s − largest)
+/// apart, is to be multiplied with what is given back, 2^(old − new).
 #[inline(always)]
 fn softmax_block<T: Real, I: Isa, const NR: usize>(
-    block: usize,
     first_key: usize,
-    mask: Option<&MaskLanes<QUERIES>>,
-    scores: &mut [T],
-    largest: &mut [T],
-    total: &mut [T],
-    factor: &mut [T],
-) {
-    let chunks = largest.as_chunks_mut::<NR>().0.iter_mut().zip(total.as_chunks_mut::<NR>().0).zip(factor.as_chunks_mut::<NR>().0);
-    for (chunk, ((largest, total), factor)) in chunks.enumerate() {
-        let m = largest_of_block(block, chunk, scores, *largest);
-        for ((factor, old), new) in factor.iter_mut().zip(*largest).zip(m) {
-            *factor = power_of_two::<T, I>(old - new);
-        }
-        let mut sum = [T::ZERO; NR];
-        for (rows, key) in scores.chunks_mut(2 * block).zip((first_key..).step_by(2)) {
-            let keeps = mask.map(|mask| mask.chunk::<NR>(chunk).pair(key));
-            let (first, second) = pair_of_rows::<T, NR>(rows, block, chunk);
-            *first = softmax_row::<T, I, NR>(*first, &m, &mut sum, keeps.as_ref().map(|keeps| &keeps[0]));
-            if let Some(second) = second {
-                *second = softmax_row::<T, I, NR>(*second, &m, &mut sum, keeps.as_ref().map(|keeps| &keeps[1]));
+    mask: Option<&MaskLanes<NR>>,
+    scores: &mut [[T; NR]],
+    largest: &mut [T; NR],
+    total: &mut [T; NR],
+) -> Pair<T, I> {
+    let old = load::<T, I, NR>(largest);
+    *largest = largest_of_block(scores, *largest);
+    let m = load::<T, I, NR>(largest);
+    let mut sum = load::<T, I, NR>(&[T::ZERO; NR]);
+    // Loops, not closures: what is not inlined would be compiled without the level's instructions.
+    if let Some(mask) = mask {
+        for (pair, key) in scores.chunks_mut(2).zip((first_key..).step_by(2)) {
+            let keeps = mask.pair(key);
+            for (scores, keep) in pair.iter_mut().zip(&keeps) {
+                softmax_row::<T, I, NR>(scores, m, &mut sum, Some(keep));
             }
         }
-        for ((total, factor), sum) in total.iter_mut().zip(factor).zip(sum) {
-            *total = *total * *factor + sum;
-        }
-        *largest = m;
-    }
-}
-
-/// Chunk `chunk` of the first row of a block, and of the second if there is one.
-#[inline(always)]
-fn pair_of_rows<T, const NR: usize>(rows: &mut [T], block: usize, chunk: usize) -> (&mut [T; NR], Option<&mut [T; NR]>) {
-    let (first, second) = rows.split_at_mut(block);
-    (&mut first.as_chunks_mut::<NR>().0[chunk], second.as_chunks_mut::<NR>().0.get_mut(chunk))
-}
-
-/// One key of [`softmax_block`]. By value: nothing else can point to these numbers, which stay in registers.
-#[inline(always)]
-fn softmax_row<T: Real, I: Isa, const NR: usize>(s: [T; NR], m: &[T; NR], sum: &mut [T; NR], keep: Option<&Keep<NR>>) -> [T; NR] {
-    let mut p = s;
-    for (p, m) in p.iter_mut().zip(m) {
-        *p = power_of_two::<T, I>(*p - *m);
-    }
-    for (sum, p) in sum.iter_mut().zip(&p) {
-        *sum += *p;
-    }
-    if let Some(keep) = keep { keep.of(p) } else { p }
-}
-
-/// The largest score of each query of a chunk, `so_far` included. Odd and even keys apart: a maximum takes several cycles, and in one
-/// chain each would wait for the last.
-#[inline(always)]
-fn largest_of_block<T: Real, const NR: usize>(block: usize, chunk: usize, scores: &[T], so_far: [T; NR]) -> [T; NR] {
-    let (mut even, mut odd) = (so_far, so_far);
-    for rows in scores.chunks(2 * block) {
-        let (first, second) = rows.split_at(block);
-        larger(&mut even, &first.as_chunks::<NR>().0[chunk]);
-        if let Some(second) = second.as_chunks::<NR>().0.get(chunk) {
-            larger(&mut odd, second);
+    } else {
+        for scores in scores {
+            softmax_row::<T, I, NR>(scores, m, &mut sum, None);
         }
     }
-    larger(&mut even, &odd);
-    even
+    let so_far = load::<T, I, NR>(total);
+    let mut factor = old;
+    for i in 0..2 {
+        factor[i] = old[i].sub(m[i]).power_of_two();
+        sum[i] = so_far[i].mul_add(factor[i], sum[i]);
+    }
+    store::<T, I, NR>(sum, total);
+    factor
+}
+
+/// One key of [`softmax_block`].
+#[inline(always)]
+fn softmax_row<T: Real, I: Isa, const NR: usize>(
+    scores: &mut [T; NR],
+    m: Pair<T, I>,
+    sum: &mut Pair<T, I>,
+    keep: Option<&Keep<NR>>,
+) {
+    let mut p = load::<T, I, NR>(scores);
+    for i in 0..2 {
+        p[i] = p[i].sub(m[i]).power_of_two();
+        sum[i] = sum[i].add(p[i]);
+    }
+    if let Some(keep) = keep {
+        p = keep.of::<T, I>(p);
+    }
+    store::<T, I, NR>(p, scores);
+}
+
+/// The largest score of each query, `so_far` included. Every fourth key together: a maximum takes four cycles, and in one chain each would
+/// wait for the last.
+#[inline(always)]
+fn largest_of_block<T: Real, const NR: usize>(scores: &[[T; NR]], so_far: [T; NR]) -> [T; NR] {
+    let mut largest = [so_far; 4];
+    let (fours, rest) = scores.as_chunks::<4>();
+    for four in fours {
+        for i in 0..4 {
+            larger(&mut largest[i], &four[i]);
+        }
+    }
+    for row in rest {
+        larger(&mut largest[0], row);
+    }
+    let [mut a, b, mut c, d] = largest;
+    larger(&mut a, &b);
+    larger(&mut c, &d);
+    larger(&mut a, &c);
+    a
 }
 
 /// m = max(m, x), lane by lane.

@@ -11,6 +11,8 @@
 use crate::instruction_set::{InstructionSet, Isa, Kernel};
 use crate::random::{Stream, word};
 use crate::strided::same_shape;
+use crate::tile::Pair;
+use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
 /// A mask over a matrix of any shape: a rule, not a buffer.
@@ -71,27 +73,11 @@ impl<const N: usize> MaskLanes<N> {
         lanes
     }
 
-    /// Lanes `chunk·NR…`, as arrays of NR.
-    #[inline(always)]
-    pub(crate) fn chunk<const NR: usize>(&self, chunk: usize) -> MaskChunk<'_, NR> {
-        MaskChunk { low: &self.low.as_chunks::<NR>().0[chunk], high: &self.high.as_chunks::<NR>().0[chunk], bound: self.bound }
-    }
-}
-
-/// NR rows of a mask, one row a lane.
-#[derive(Clone, Copy)]
-pub(crate) struct MaskChunk<'a, const NR: usize> {
-    low: &'a [u32; NR],
-    high: &'a [u32; NR],
-    bound: i32,
-}
-
-impl<const NR: usize> MaskChunk<'_, NR> {
     /// For an even column and the next one, the words that decide about each lane.
     #[inline(always)]
-    pub(crate) fn pair(self, even_column: usize) -> [Keep<NR>; 2] {
-        let mut halves = [[0; NR]; 2];
-        for ((to, low), high) in halves[1].iter_mut().zip(self.low).zip(self.high) {
+    pub(crate) fn pair(&self, even_column: usize) -> [Keep<N>; 2] {
+        let mut halves = [[0; N]; 2];
+        for ((to, low), high) in halves[1].iter_mut().zip(&self.low).zip(&self.high) {
             *to = word(*low, *high, even_column as u32 >> 1) as i32;
         }
         let [even, odd] = &mut halves;
@@ -100,7 +86,8 @@ impl<const NR: usize> MaskChunk<'_, NR> {
     }
 }
 
-/// What is kept of one column of a mask, one row a lane.
+/// What is kept of N elements of a mask, one a lane.
+#[repr(align(64))]
 pub(crate) struct Keep<const NR: usize> {
     words: [i32; NR],
     bound: i32,
@@ -109,12 +96,12 @@ pub(crate) struct Keep<const NR: usize> {
 impl<const NR: usize> Keep<NR> {
     /// x where it is kept, 0 where it is dropped.
     #[inline(always)]
-    pub(crate) fn of<T: Real>(&self, x: [T; NR]) -> [T; NR] {
-        let mut kept = x;
-        for (x, word) in kept.iter_mut().zip(&self.words) {
-            *x = if *word >= self.bound { *x } else { T::ZERO };
-        }
-        kept
+    pub(crate) fn of<T: Real, I: Isa>(&self, x: Pair<T, I>) -> Pair<T, I> {
+        let lanes = I::Vector::<T>::LANES;
+        assert!(NR == 2 * lanes, "a pair of registers has as many lanes as there are words");
+        let words = self.words.as_ptr();
+        // SAFETY: there are words for two registers.
+        unsafe { [x[0].where_at_least(words, self.bound), x[1].where_at_least(words.add(lanes), self.bound)] }
     }
 }
 
@@ -197,9 +184,9 @@ mod tests {
         fn lanes_are_the_rows(row in 0_usize..10_000, column in 0_usize..10_000, seed: u64) {
             let mask = Mask::new(Stream::new(seed, 0, 0, 0), 0.5);
             let (lanes, even) = (MaskLanes::<8>::new(mask, row), 2 * (column / 2));
-            let chunk = lanes.chunk::<8>(0);
-            for (column, keep) in (even..).zip(chunk.pair(even)) {
-                assert_eq!(keep.of([1.0_f64; 8]).map(|kept| kept == 1.0).to_vec(), (row..row + 8).map(|i| mask.keeps(i, column)).collect::<Vec<_>>());
+            for (column, keep) in (even..).zip(lanes.pair(even)) {
+                let kept = keep.words.map(|word| word >= keep.bound);
+                assert_eq!(kept.to_vec(), (row..row + 8).map(|i| mask.keeps(i, column)).collect::<Vec<_>>());
             }
         }
 

@@ -321,6 +321,35 @@ pub(crate) fn rows<T: Real, I: Isa, L: LeftRows<T>, S: Sink<T>, const MR: usize,
     }
 }
 
+/// sink ← left·panel for the first rows of an array, as many as the sink has: rows at a fixed distance need one pointer for a whole tile, where
+/// [`rows`] needs one each. The array has a multiple of MR rows, so that the last tile finds numbers to read; a panel's columns belong to columns `j…`.
+#[inline(always)]
+pub(crate) fn array_rows<T: Real, I: Isa, const L: usize, const MR: usize, const NR: usize>(
+    left: &[[T; L]],
+    panel: &[[T; NR]],
+    j: usize,
+    sink: &mut Store<'_, T>,
+) {
+    let (count, width) = (sink.c.rows(), NR.min(sink.c.cols() - j));
+    assert!(left.len().is_multiple_of(MR) && left.len() >= count && panel.len() == L, "a tile reaches beyond the array");
+    for (tile, first) in left.as_chunks::<MR>().0.iter().zip((0..count).step_by(MR)) {
+        let mut acc = [[I::Vector::splat(T::ZERO); 2]; MR];
+        for (p, line) in panel.iter().enumerate().take(L) {
+            let b = load::<T, I, NR>(line);
+            for i in 0..MR {
+                accumulate::<T, I, NR>(&mut acc[i], tile[i][p], b);
+            }
+        }
+        if width == NR && first + MR <= count {
+            store_rows!(acc, |i, sums| sink.store_whole::<I, NR>(first + i, j, sums));
+        } else {
+            for (i, sums) in spill::<T, I, MR, NR>(acc).iter().enumerate().take(count - first) {
+                sink.store::<I>(first + i, j, &sums[..width]);
+            }
+        }
+    }
+}
+
 /// Packs columns `j…` of b as one panel, filled up with zeros.
 #[inline(always)]
 pub(crate) fn pack_panel<T: Real, const NR: usize>(b: &Rows<'_, T>, j: usize, panel: &mut [[T; NR]]) {
