@@ -96,7 +96,11 @@ impl<T: Real> Plan<T> {
         let (forward, forward_packed) = steps.list(&orders.forward, Direction::Forward);
         let (mut backward, backward_packed) = steps.list(&orders.backward, Direction::Backward);
         let kept = steps.keep(&orders.backward, &mut backward, &mut large_weights);
-        let is_micro_batched = forward.iter().any(|step| step.micro_batched);
+        let takes_some = forward.iter().any(|step| step.micro_batched);
+        // Where the weights are more than what a sample holds, reading them from memory is what a step of training waits for; samples that
+        // take turns at an operation find them in the cache.
+        let waits = forward.iter().any(|step| step.op.coupling().is_some());
+        let takes_turns = loss.is_some() && !waits && layout.slab_len < graph.parameter_count();
         Ok(Self {
             stretches: [&forward, &backward].map(|steps| stretches(steps)),
             forward,
@@ -106,7 +110,7 @@ impl<T: Real> Plan<T> {
             input_gradients: layout.input_gradients(graph),
             loss: loss.map(|loss| (layout.value(loss.0).start, layout.gradient(loss.0).start)),
             slab_len: layout.slab_len,
-            micro_batch: if is_micro_batched { MICRO_BATCH } else { 1 },
+            micro_batch: if takes_some || takes_turns { MICRO_BATCH } else { 1 },
             packed_len: [forward_packed, backward_packed],
             parameter_len: graph.parameter_count(),
             unreached: steps.unreached(),

@@ -1,7 +1,7 @@
 //! Replaying a plan: one sample at a time, one worker a core, the same bits on any number of threads.
 //!
-//! The batch is the outermost loop, or, where weights are large, some samples go through the plan side by side, so that a weight comes
-//! from memory once for all of them. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
+//! The batch is the outermost loop, or, where a weight is large or all weights are more than what a sample holds, some samples go through the
+//! plan side by side, so that a weight comes from memory once for all of them. Samples go to a fixed number of shards by index; a shard is worked off in order and has a
 //! gradient slab of its own; shards are summed in order. Where there are fewer samples than threads, large operations work on pieces
 //! of their rows, which have the bits of the whole. So neither the number of threads nor their timing can change a bit.
 //! In the steady state (no more samples than in an earlier call) nothing is allocated, in plans that couple samples neither.
@@ -551,18 +551,50 @@ mod tests {
         .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
     }
 
+    /// Two maps whose weights, none of them large, are more than all that a sample holds; the first is used twice.
+    fn little_beside_the_weights<T: Real>() -> Result<(Graph<T>, Var, Var)> {
+        let mut graph = Graph::<T>::new();
+        let (x, target) = (graph.input_with_gradient("x", &[2, 64])?, graph.input("target", &[2, 40])?);
+        let (weight, last) = (graph.parameter("weight", &[64, 64])?, graph.parameter("last", &[40, 64])?);
+        let first = graph.apply(Linear, &[x, weight])?;
+        let dropped = graph.apply(Dropout { rate: 0.3 }, &[first])?;
+        let second = graph.apply(Linear, &[dropped, weight])?;
+        let output = graph.apply(Linear, &[second, last])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[output, target])?;
+        Ok((graph, loss, output))
+    }
+
+    #[test]
+    fn samples_take_turns_where_the_weights_are_more_than_a_sample() -> Result<()> {
+        let (graph, loss, output) = little_beside_the_weights::<f64>()?;
+        let train = Plan::train(&graph, loss, &[output])?;
+        assert!(train.micro_batch == MICRO_BATCH && train.large_weights.is_empty());
+        assert_eq!(Plan::infer(&graph, &[output])?.micro_batch, 1, "a prediction is of one sample, and its memory counts");
+        let (graph, loss, _) = shared_weight::<f64>()?;
+        assert_eq!(Plan::train(&graph, loss, &[])?.micro_batch, 1, "these weights are less than a sample");
+        let (graph, loss, _) = little_beside_the_weights::<f64>()?;
+        let parameters = parameters(graph.parameter_count());
+        gradcheck::graph(
+            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 11, dropout: KEY, fill: &fill },
+            &|_| false,
+            3,
+        )
+        .map_err(|disagreement| Error::Shape { operation: "gradcheck", message: disagreement.to_string() })
+    }
+
     #[test]
     fn micro_batches_give_the_same_bits_on_any_number_of_threads() -> Result<()> {
-        let (graph, loss, output) = large_weights::<f32>()?;
-        let parameters = parameters(graph.parameter_count());
-        for samples in [2, SHARDS * MICRO_BATCH + 3] {
-            let mut found = Vec::new();
-            for threads in [1, 2, 5] {
-                let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
-                let loss = session.step(&parameters, samples, KEY, &fill)?;
-                found.push((loss.to_bits(), bits(session.gradients()), bits(session.output(0, samples - 1)?)));
+        for (graph, loss, output) in [large_weights::<f32>()?, little_beside_the_weights()?] {
+            let parameters = parameters(graph.parameter_count());
+            for samples in [2, SHARDS * MICRO_BATCH + 3] {
+                let mut found = Vec::new();
+                for threads in [1, 2, 5] {
+                    let mut session = Session::train(&graph, loss, &[output], Threads(threads))?;
+                    let loss = session.step(&parameters, samples, KEY, &fill)?;
+                    found.push((loss.to_bits(), bits(session.gradients()), bits(session.output(0, samples - 1)?)));
+                }
+                assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
             }
-            assert!(found.iter().all(|other| *other == found[0]), "{samples} samples");
         }
         Ok(())
     }
