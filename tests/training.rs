@@ -137,10 +137,19 @@ fn a_resumed_run_is_the_uninterrupted_one_bit_for_bit_on_any_number_of_threads()
 fn the_best_epoch_is_kept_whatever_comes_after_it_and_wherever_the_run_was_stopped() -> Result<()> {
     let mut job = job()?;
     job.config.keep_best = true;
-    // So fast that a later epoch undoes what an earlier one learned.
+    // So fast that a later epoch may undo what an earlier one learned; with which seed it does is a matter of the last bits.
     (job.config.peak_rate, job.config.epochs) = (0.3, 6);
     let place = tempfile::tempdir().map_err(Error::io("temporary folder"))?;
-    let (_, whole) = train(&job, &RunFolder::create(place.path().join("whole"))?, None, 1, None)?;
+    let mut ended_badly = None;
+    for seed in 1..=20 {
+        job.config.seed = seed;
+        let (_, whole) = train(&job, &RunFolder::create(place.path().join(format!("whole {seed}")))?, None, 1, None)?;
+        if whole.best.as_ref().is_some_and(|best| best.epoch < 5) {
+            ended_badly = Some(whole);
+            break;
+        }
+    }
+    let whole = ended_badly.expect("one of twenty trainings as fast as this ends worse than it was");
     let parts = RunFolder::create(place.path().join("parts"))?;
     train(&job, &parts, None, 2, Some(whole.step / 2 + 1))?;
     let (_, resumed) = train(&job, &parts, Some(parts.resume(&job.config, DATA)?), 2, None)?;
@@ -149,7 +158,6 @@ fn the_best_epoch_is_kept_whatever_comes_after_it_and_wherever_the_run_was_stopp
     let best = whole.best.clone().ok_or(Error::Undetermined("no best epoch".into()))?;
     let least = losses.iter().copied().fold(f64::INFINITY, f64::min);
     assert_eq!((losses.len(), losses[best.epoch], best.loss), (6, least, least), "{losses:?}");
-    assert_ne!(best.epoch, 5, "this training was to end badly: {losses:?}");
     let network = job.description.network(false)?;
     let sequences = sequence::sequences(&job.set.flights, &job.description)?;
     let trainer = Trainer::new(&job.config, &network, &sequences, &job.windows, Some(whole), Threads(2))?;
