@@ -267,7 +267,8 @@ impl Model {
         Ok(velocity)
     }
 
-    /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample.
+    /// The model for one sample at a time, `step_s` seconds apart; equals [`Model::predict`] sample for sample. It knows no flight: numbers that belong
+    /// to single flights are those of [`Model::of_unknown_flights`].
     ///
     /// # Errors
     /// As [`Model::predict`], where it does not depend on a flight.

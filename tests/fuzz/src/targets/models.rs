@@ -55,7 +55,8 @@ pub fn model(bytes: &[u8]) -> bool {
     let own = vec![0.5; stream.extra_inputs().len()];
     let flight = flight();
     let streamed: Vec<_> = (0..3).map(|sample| stream.push_with(&flight.state(sample), &own)).collect();
-    let Ok(predicted) = model.predict(flight) else { return true };
+    // A stream knows no flight, so it has none of the numbers that belong to one.
+    let Ok(predicted) = model.of_unknown_flights().predict(flight) else { return true };
     for (sample, streamed) in streamed.into_iter().enumerate().filter(|_| own.is_empty()) {
         let Ok(streamed) = streamed else { continue };
         let batch = predicted.values().iter().map(|column| column[sample]).collect::<Vec<_>>();
