@@ -7,7 +7,7 @@ mod flights;
 use flights::random;
 use phyture::flight::{Channel, Column, Flight, GRAVITY_M_S2, PerChannel};
 use phyture::formula::Formula;
-use phyture::physics::{Effect, Model, Swap, catalogue, typical};
+use phyture::physics::{Effect, Model, Rotor, Swap, Turning, catalogue, typical};
 use phyture::{Error, Result};
 use std::io::Write;
 use std::path::Path;
@@ -70,7 +70,22 @@ fn helicopter() -> Model {
     let values = [-0.35, -0.4, -1.42, -20.0, -0.51, -9.0, -8.0, -5.5, 70.0, 60.0, 50.0, -1.23, -0.21, 0.14];
     let coefficients = model.effects.iter_mut().flat_map(|effect| &mut effect.coefficients);
     coefficients.zip(values).for_each(|(coefficient, value)| coefficient.value = value);
+    model.rotors = rotors();
     model
+}
+
+/// Two rotors whose speeds follow the controls, one behind a lag, one tilted: what sums over rotors has something to sum.
+fn rotors() -> Vec<Rotor> {
+    let rotor = |speed: &str, y: f64, axis: [f64; 3], turns: Turning| Rotor {
+        speed: Formula::parse(speed).expect("a formula"),
+        position_m: [0.02, y, -0.05],
+        axis,
+        turns,
+    };
+    vec![
+        rotor("lag(400 + 100*u4, 0.03)", 0.2, [0.0, 0.0, -1.0], Turning::Clockwise),
+        rotor("400 + 90*u4 - 10*u1", -0.2, [0.1, 0.0, -1.0], Turning::Counterclockwise),
+    ]
 }
 
 /// One number a sample and channel.

@@ -8,6 +8,7 @@ use super::catalogue;
 use super::columns::{Columns, Wanted};
 use super::compose::Free;
 use super::correlation::Correlation;
+use super::digits::printer;
 use super::effect::Effect;
 use super::evaluate::{composed_for, standard_names};
 use super::layout::Layout;
@@ -99,8 +100,9 @@ impl std::fmt::Display for Calibration {
         writeln!(f, "{:<20} {:<8} {:>12}   {:<27} unit", "effect", "name", "value", "95 % interval")?;
         for estimate in &self.coefficients {
             let Estimate { effect, name, value, ci95, unit, bounds, by_flight } = estimate;
+            let shown = printer(5, ci95.iter().flatten().copied().chain([*value]));
             let interval = match (ci95, by_flight) {
-                (Some([low, high]), _) => format!("[{low:>11.5}, {high:>11.5}]"),
+                (Some([low, high]), _) => format!("[{:>11}, {:>11}]", shown(*low), shown(*high)),
                 (None, Some(flights)) => {
                     let (low, high) = flights
                         .values()
@@ -109,7 +111,7 @@ impl std::fmt::Display for Calibration {
                 }
                 (None, None) => String::new(),
             };
-            write!(f, "{effect:<20} {name:<8} {value:>12.5}   {interval:<27} {unit}")?;
+            write!(f, "{effect:<20} {name:<8} {:>12}   {interval:<27} {unit}", shown(*value))?;
             let doubt = self.signs.iter().find(|doubt| doubt.effect == *effect && doubt.name == *name);
             match (bounds, doubt.map(|doubt| doubt.finding)) {
                 (Some([low, high]), _) if estimate.is_implausible() => {

@@ -6,6 +6,7 @@
 use super::catalogue;
 use super::effect::{Coefficient, Effect, Swap};
 use super::model::Model;
+use super::rotors::{Part, Rotors, Total};
 use super::signal::{Plain, SIGNALS, Stage, changeable, signal_named, stage_of};
 use crate::error::Result;
 use crate::flight::{Channel, Column, PerChannel};
@@ -184,6 +185,11 @@ impl Chain<'_> {
                 formula.check_names(&known).map_err(|error| effect.name_error(error))?;
             }
         }
+        if self.effects().any(|(_, effect)| effect.reads_rotors()) {
+            let known: Vec<&str> =
+                super::standard_names().into_iter().chain(extra.iter().copied()).chain(Model::CONSTANTS).collect();
+            self.model.rotors.iter().try_for_each(|rotor| rotor.speed.check_names(&known))?;
+        }
         Ok(())
     }
 
@@ -300,9 +306,45 @@ impl Chain<'_> {
             }
             Plain::OfAir => self.of_air(reader, name),
             Plain::One => Some(self.composer.graph.number(1.0)),
+            Plain::OverRotors(total, part) => Some(self.over_rotors(reader, total, part)),
             Plain::Terms(..) => unreachable!("the rotor's signals are made before anything reads them"),
             Plain::Predicted(channel) => Some(self.predicted.expect("read after all else is summed")[channel]),
         }
+    }
+
+    /// A component of a sum over the rotors.
+    fn over_rotors(&mut self, reader: Option<usize>, total: Total, part: Part) -> Node {
+        let model = self.model;
+        let speeds: Vec<Node> = model.rotors.iter().map(|rotor| self.rotor_speed(&rotor.speed)).collect();
+        let air = self.air(reader);
+        let rates = ["wx", "wy", "wz"].map(|name| self.signal(reader, name).expect("a signal of the table"));
+        Rotors { rotors: &model.rotors, speeds: &speeds, air, rates }.total(&mut self.composer.graph, total, part)
+    }
+
+    /// Speed of a rotor. What is recorded of the rotors acts late by the delay of the controls, as these do.
+    fn rotor_speed(&mut self, speed: &Formula) -> Node {
+        let mut names: HashMap<&str, Node> = HashMap::new();
+        for name in speed.names() {
+            let node = match (self.model.constant(name), self.signal(None, name)) {
+                (Some(value), _) => self.composer.graph.number(value),
+                (None, Some(signal)) => signal,
+                (None, None) => self.recorded(name),
+            };
+            names.insert(name, node);
+        }
+        self.composer.graph.add(speed, &mut |_, name| Ok(names.get(name).copied())).expect("checked with the model")
+    }
+
+    /// A further column of the log, delayed as the controls are; derived quantities are of the motion.
+    fn recorded(&mut self, name: &str) -> Node {
+        let seconds = self.model.data.control_delay_s;
+        let graph = &mut self.composer.graph;
+        let column = graph.input(name);
+        if seconds == 0.0 || super::standard_names().contains(&name) {
+            return column;
+        }
+        let seconds = graph.number(seconds);
+        graph.delayed(column, seconds)
     }
 
     /// Velocity against the air.

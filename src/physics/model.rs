@@ -5,6 +5,7 @@ use super::baseline;
 use super::correlation::Correlation;
 use super::definition::Vehicle;
 use super::effect::Effect;
+use super::rotors::{MOST_ROTORS, Rotor};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::split::Protocol;
@@ -66,6 +67,9 @@ pub struct Model {
     /// What kind of aircraft it is: which effects of the catalogue make sense.
     #[serde(default)]
     pub vehicle: Vehicle,
+    /// The rotors one by one, for effects that sum over them; none for a helicopter's main and tail rotor, which the signals stand for.
+    #[serde(default)]
+    pub rotors: Vec<Rotor>,
     /// Which of these numbers nobody gave: they are then those of the paper's aircraft.
     #[serde(default)]
     pub assumed: Assumed,
@@ -95,6 +99,7 @@ impl Model {
             inertia,
             rotor_radius_m,
             vehicle: Vehicle::default(),
+            rotors: Vec::new(),
             assumed: Assumed::default(),
             effects: baseline::definitions().iter().map(|definition| definition.effect(mass_kg, rotor_radius_m)).collect(),
             correlations: Vec::new(),
@@ -188,6 +193,18 @@ impl Model {
         let delay_s = self.data.control_delay_s;
         if !(0.0..=1.0).contains(&delay_s) {
             return fault("data.control_delay_s", delay_s.to_string(), "0 to 1 s; a model cannot act before its control");
+        }
+        if self.rotors.len() > MOST_ROTORS {
+            return fault("rotor", format!("{} rotors", self.rotors.len()), &format!("at most {MOST_ROTORS}"));
+        }
+        for (index, rotor) in self.rotors.iter().enumerate() {
+            if let Some((key, found, expected)) = rotor.fault(&|name| self.constant(name)) {
+                return fault(&format!("rotor {}, {key}", index + 1), found, &expected);
+            }
+        }
+        if let Some(effect) = self.effects.iter().find(|effect| self.rotors.is_empty() && effect.enabled && effect.reads_rotors()) {
+            let found = format!("nothing, and effect `{}` sums over rotors", effect.name);
+            return fault("rotor", found, "a table `[[rotor]]` for each: speed (rad/s, a formula of columns), position_m, turns");
         }
         for (index, effect) in self.effects.iter().enumerate() {
             effect.check(place)?;

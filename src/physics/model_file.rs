@@ -7,12 +7,14 @@ use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::evaluate::standard_names;
 use super::model::{Entry, Model, ModelData};
+use super::rotors::{Rotor, Turning};
 use super::signal::{SIGNALS, changeable, signal_named};
 use super::toml_section::{Section, line_of, number};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::Channel;
 use crate::flight::split::Protocol;
+use crate::formula::Formula;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -24,6 +26,9 @@ use toml::de::{DeTable, DeValue};
 const NOMINAL_MASS_KG: f64 = 4.58;
 const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
+
+/// Where a rotor pushes to that lifts, in body axes.
+const UP: [f64; 3] = [0.0, 0.0, -1.0];
 
 /// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power
 /// and damps less, and the induced flow settles sooner the more air passes; since 4 a falling mass changes accelerations, not forces.
@@ -136,7 +141,7 @@ impl Model {
             Error::File { path: path.into(), message: format!("line {line}: {}; a model file is TOML", error.message()) }
         })?;
         let file = Section { path, text, name: "", table: parsed.get_ref() };
-        file.allow(&["model", "data", "effect", "correlation", "provenance"])?;
+        file.allow(&["model", "rotor", "data", "effect", "correlation", "provenance"])?;
         let model = file.section("model", "model")?.ok_or_else(|| file.fault("model", "no such table", "a table `[model]`"))?;
         model.allow(&["format", "name", "mass_kg", "inertia", "rotor_radius_m", "vehicle", "baseline"])?;
         let format = read_format(&model)?;
@@ -163,6 +168,7 @@ impl Model {
             inertia,
             rotor_radius_m,
             vehicle,
+            rotors: file.sections("rotor", "rotor")?.iter().map(read_rotor).collect::<Result<_>>()?,
             assumed,
             effects,
             correlations: file.sections("correlation", "correlation")?.iter().map(read_correlation).collect::<Result<_>>()?,
@@ -204,6 +210,7 @@ impl Model {
         number(self.assumed.inertia, "inertia", format!("[{ix:?}, {iy:?}, {iz:?}]"));
         number(self.assumed.rotor_radius, "rotor_radius_m", format!("{:?}", self.rotor_radius_m));
         let _ = writeln!(text, "vehicle = {}", quoted(self.vehicle.name()));
+        self.rotors.iter().for_each(|rotor| write_rotor(&mut text, rotor));
         let locked: Vec<String> = self.data.locked.iter().map(|name| quoted(name)).collect();
         let _ = writeln!(text, "\n[data]\ncontrol_delay_s = {:?}\nlocked = [{}]", self.data.control_delay_s, locked.join(", "));
         let _ = writeln!(text, "split = {}", quoted(&self.data.split.to_string()));
@@ -251,6 +258,36 @@ fn read_vehicle(model: &Section<'_>) -> Result<Vehicle> {
         let names = Vehicle::ALL.map(Vehicle::name);
         model.fault("vehicle", format!("`{name}`{}", did_you_mean(name, names)), format!("one of `{}`", names.join("`, `")))
     })
+}
+
+fn read_rotor(section: &Section<'_>) -> Result<Rotor> {
+    section.allow(&["speed", "position_m", "axis", "turns"])?;
+    let text = section
+        .text("speed")?
+        .ok_or_else(|| section.fault("speed", "nothing", "`speed = \"…\"`, rad/s, a formula of columns of the log"))?;
+    let speed = Formula::parse(text).map_err(|error| located(section, "speed", "rotor", error))?;
+    let turns = section
+        .text("turns")?
+        .ok_or_else(|| section.fault("turns", "nothing", "`turns = \"clockwise\"` or `\"counterclockwise\"`, seen from above"))?;
+    let names = Turning::ALL.map(Turning::name);
+    let turns = Turning::ALL.into_iter().find(|turning| turning.name() == turns).ok_or_else(|| {
+        let found = format!("`{turns}`{}", did_you_mean(turns, names));
+        section.fault("turns", found, format!("one of `{}`, seen from above", names.join("`, `")))
+    })?;
+    let position_m = section.numbers("position_m")?.ok_or_else(|| {
+        section.fault("position_m", "nothing", "`position_m = [forward, starboard, down]` from the centre of mass")
+    })?;
+    Ok(Rotor { speed, position_m, axis: section.numbers("axis")?.unwrap_or(UP), turns })
+}
+
+fn write_rotor(text: &mut String, rotor: &Rotor) {
+    let Rotor { speed, position_m, axis, turns } = rotor;
+    // Writing to a String does not fail.
+    let _ = writeln!(text, "\n[[rotor]]\nspeed = {}\nposition_m = {position_m:?}", quoted(&speed.to_string()));
+    if *axis != UP {
+        let _ = writeln!(text, "axis = {axis:?}");
+    }
+    let _ = writeln!(text, "turns = {}", quoted(turns.name()));
 }
 
 fn read_data(file: &Section<'_>) -> Result<ModelData> {
@@ -317,7 +354,9 @@ fn read_effect(section: &Section<'_>, mass_kg: f64, rotor_radius_m: f64) -> Resu
     read_flights(section, &mut effect)?;
     effect.enabled = section.flag("enabled")?.unwrap_or(true);
     effect.added_by = section.text("added_by")?.map(str::to_owned);
-    effect.check(&section.path.display().to_string()).map_err(|error| located(section, &effect.name, error))?;
+    effect
+        .check(&section.path.display().to_string())
+        .map_err(|error| located(section, "formula", &format!("effect `{}`", effect.name), error))?;
     Ok(effect)
 }
 
@@ -343,7 +382,7 @@ fn read_formula(section: &Section<'_>) -> Result<Effect> {
             return Err(section.fault("changes", "beside `channel`", expected));
         }
     };
-    let mut effect = made.map_err(|error| located(section, name, error))?;
+    let mut effect = made.map_err(|error| located(section, "formula", &format!("effect `{name}`"), error))?;
     if let (Some(unit), Some(coefficient)) = (section.text("unit")?, effect.coefficient_mut(FORMULA_COEFFICIENT)) {
         coefficient.unit = unit.into();
     }
@@ -458,11 +497,11 @@ fn channel_named(section: &Section<'_>, channel: &str) -> Result<Channel> {
 }
 
 /// Puts file and line before a formula error.
-fn located(section: &Section<'_>, effect: &str, error: Error) -> Error {
+fn located(section: &Section<'_>, key: &str, owner: &str, error: Error) -> Error {
     let Error::Formula { message, formula, at } = error else { return error };
-    match section.fault("formula", "", "") {
+    match section.fault(key, "", "") {
         Error::Config { place, .. } => {
-            let own = format!("effect `{effect}`: ");
+            let own = format!("{owner}: ");
             let message = message.strip_prefix(&own).unwrap_or(&message);
             Error::Formula { message: format!("{place}, {own}{message}"), formula, at }
         }

@@ -2,6 +2,7 @@
 //! laid beside them. Signs that depend on how somebody counts a stick are not among them.
 
 use super::catalogue;
+use super::digits::printer;
 use super::effect::{Coefficient, Effect};
 use super::model::Model;
 use super::sign::Sign;
@@ -58,9 +59,10 @@ pub struct SignDoubt {
 impl fmt::Display for SignDoubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { effect, name, value, unit, .. } = self;
-        let ci95 = self.ci95.map(|[low, high]| format!(" [{low:.4}, {high:.4}]")).unwrap_or_default();
+        let shown = printer(4, self.ci95.iter().flatten().copied().chain([*value]));
+        let ci95 = self.ci95.map(|[low, high]| format!(" [{}, {}]", shown(low), shown(high))).unwrap_or_default();
         let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-        write!(f, "`{effect}` {name} = {value:.4}{ci95}{unit}: {}", self.words())
+        write!(f, "`{effect}` {name} = {}{ci95}{unit}: {}", shown(*value), self.words())
     }
 }
 

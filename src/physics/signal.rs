@@ -2,6 +2,7 @@
 //! how a model is put together from them is in `compose`.
 
 use super::effect::Effect;
+use super::rotors::{Part, Total};
 use crate::flight::{Channel, Column};
 
 /// How far along the way from the sticks to the accelerations a signal lies: a formula that changes one may read those of its own stage
@@ -33,6 +34,8 @@ pub enum Plain {
     Terms(&'static [&'static str], Channel),
     /// 1.
     One,
+    /// A component of a sum over the model's rotors.
+    OverRotors(Total, Part),
     /// The predicted acceleration of this index, of all effects up to the one that reads it.
     Predicted(Channel),
 }
@@ -62,7 +65,7 @@ const MOMENT: &[&str] = &["control_moment"];
 
 /// All signals, in the order of the stages. Recorded quantities that are not listed may be changed, too; they are of the stage of the motion.
 #[rustfmt::skip]
-pub const SIGNALS: [Signal; 35] = [
+pub const SIGNALS: [Signal; 59] = [
     signal("stick_1", "1", Stage::Control, Plain::Quantity("u1"), "lateral cyclic as recorded"),
     signal("stick_2", "1", Stage::Control, Plain::Quantity("u2"), "longitudinal cyclic as recorded"),
     signal("stick_3", "1", Stage::Control, Plain::Quantity("u3"), "tail as recorded"),
@@ -91,6 +94,30 @@ pub const SIGNALS: [Signal; 35] = [
     signal("rotor_pitch", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, Channel::WyDot), "pitch that the tilted disc makes"),
     signal("tail_thrust", "rad/s²", Stage::Rotor, Plain::Terms(MOMENT, Channel::WzDot), "thrust of the tail rotor, as the yaw that it makes"),
     signal("rotor_speed", "1", Stage::Rotor, Plain::One, "speed of the main rotor over its nominal one"),
+    signal("rotors_thrust_x", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::Along(0)), "speed squared of the rotors along their thrust: along the nose"),
+    signal("rotors_thrust_y", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::Along(1)), "speed squared of the rotors along their thrust: to starboard"),
+    signal("rotors_thrust_z", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::Along(2)), "speed squared of the rotors along their thrust: along body down"),
+    signal("rotors_thrust_mx", "m rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::About(0)), "its moment in roll, of rotors_thrust"),
+    signal("rotors_thrust_my", "m rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::About(1)), "its moment in pitch, of rotors_thrust"),
+    signal("rotors_thrust_mz", "m rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Thrust, Part::About(2)), "its moment in yaw, of rotors_thrust"),
+    signal("rotors_inflow_x", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::Along(0)), "what air along the rotors' axes takes from their thrust, by speed and velocity: along the nose"),
+    signal("rotors_inflow_y", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::Along(1)), "what air along the rotors' axes takes from their thrust, by speed and velocity: to starboard"),
+    signal("rotors_inflow_z", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::Along(2)), "what air along the rotors' axes takes from their thrust, by speed and velocity: along body down"),
+    signal("rotors_inflow_mx", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::About(0)), "its moment in roll, of rotors_inflow"),
+    signal("rotors_inflow_my", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::About(1)), "its moment in pitch, of rotors_inflow"),
+    signal("rotors_inflow_mz", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Inflow, Part::About(2)), "its moment in yaw, of rotors_inflow"),
+    signal("rotors_drag_x", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::Along(0)), "what air across the rotors drags, by speed and velocity: along the nose"),
+    signal("rotors_drag_y", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::Along(1)), "what air across the rotors drags, by speed and velocity: to starboard"),
+    signal("rotors_drag_z", "m rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::Along(2)), "what air across the rotors drags, by speed and velocity: along body down"),
+    signal("rotors_drag_mx", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::About(0)), "its moment in roll, of rotors_drag"),
+    signal("rotors_drag_my", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::About(1)), "its moment in pitch, of rotors_drag"),
+    signal("rotors_drag_mz", "m² rad/s²", Stage::Rotor, Plain::OverRotors(Total::Drag, Part::About(2)), "its moment in yaw, of rotors_drag"),
+    signal("rotors_torque_x", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Torque, Part::Along(0)), "torque of the air on the rotors, by speed squared: along the nose"),
+    signal("rotors_torque_y", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Torque, Part::Along(1)), "torque of the air on the rotors, by speed squared: to starboard"),
+    signal("rotors_torque_z", "rad²/s²", Stage::Rotor, Plain::OverRotors(Total::Torque, Part::Along(2)), "torque of the air on the rotors, by speed squared: along body down"),
+    signal("rotors_spin_x", "rad/s", Stage::Rotor, Plain::OverRotors(Total::Spin, Part::Along(0)), "angular momentum of the rotors over their moment of inertia: along the nose"),
+    signal("rotors_spin_y", "rad/s", Stage::Rotor, Plain::OverRotors(Total::Spin, Part::Along(1)), "angular momentum of the rotors over their moment of inertia: to starboard"),
+    signal("rotors_spin_z", "rad/s", Stage::Rotor, Plain::OverRotors(Total::Spin, Part::Along(2)), "angular momentum of the rotors over their moment of inertia: along body down"),
     signal("predicted_vx", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VxDot), "predicted acceleration along the nose"),
     signal("predicted_vy", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VyDot), "predicted acceleration to starboard"),
     signal("predicted_vz", "m/s²", Stage::Outcome, Plain::Predicted(Channel::VzDot), "predicted acceleration along body down"),
@@ -114,7 +141,9 @@ pub(super) fn stage_of(name: &str) -> Stage {
 /// other signals.
 pub(super) fn changeable(name: &str) -> bool {
     match signal_named(name) {
-        Some(signal) => !name.starts_with("stick_") && !matches!(signal.plain, Plain::OfAir | Plain::Predicted(_)),
+        Some(signal) => {
+            !name.starts_with("stick_") && !matches!(signal.plain, Plain::OfAir | Plain::OverRotors(..) | Plain::Predicted(_))
+        }
         None => Column::from_name(name).is_none_or(|column| !Column::TARGETS.contains(&column)),
     }
 }
@@ -124,6 +153,11 @@ impl Effect {
     pub fn reads(&self) -> Vec<&'static Signal> {
         let names: Vec<&str> = self.formulas().flat_map(|formula| formula.names()).collect();
         SIGNALS.iter().filter(|signal| names.contains(&signal.name)).collect()
+    }
+
+    /// Whether it reads a sum over the model's rotors, which are then to be listed.
+    pub fn reads_rotors(&self) -> bool {
+        self.reads().iter().any(|signal| matches!(signal.plain, Plain::OverRotors(..)))
     }
 
     /// The signals that it changes, in the order of [`SIGNALS`].
@@ -147,7 +181,7 @@ mod tests {
                 Plain::Terms(effects, _) => {
                     assert!(effects.iter().all(|kind| catalogue::definition(kind).is_some()))
                 }
-                Plain::OfAir | Plain::One | Plain::Predicted(_) => {}
+                Plain::OfAir | Plain::One | Plain::OverRotors(..) | Plain::Predicted(_) => {}
             }
         }
     }

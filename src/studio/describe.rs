@@ -192,7 +192,9 @@ impl Studio {
         let state = self.state(state)?;
         let State { model, calibration, id, .. } = &*state;
         let is_addable = |definition: &&crate::physics::Definition| {
-            definition.notes.is_some_and(|notes| notes.vehicles.contains(&model.vehicle)) && model.effect(definition.kind).is_none()
+            definition.notes.is_some_and(|notes| notes.vehicles.contains(&model.vehicle))
+                && model.effect(definition.kind).is_none()
+                && !(model.rotors.is_empty() && definition.effect(model.mass_kg, model.rotor_radius_m).reads_rotors())
         };
         let addable = catalogue::definitions().filter(is_addable);
         Ok(ModelText {

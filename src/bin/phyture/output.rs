@@ -104,6 +104,8 @@ pub struct Progress {
     quiet: bool,
     begun: Instant,
     told: Instant,
+    /// When and where the first report came: what was done before, in an earlier run perhaps, tells nothing of the pace.
+    first: Option<(Instant, u64)>,
     what: String,
 }
 
@@ -126,22 +128,34 @@ impl Progress {
         bar.set_position(done);
         bar.reset_eta();
         let now = Instant::now();
-        Self { bar, plain, quiet, begun: now, told: now, what: what.to_owned() }
+        Self { bar, plain, quiet, begun: now, told: now, first: None, what: what.to_owned() }
     }
 
     /// Moves to `position` with a short message (loss, rate).
     pub fn at(&mut self, position: u64, message: impl FnOnce() -> String) {
+        let news = self.first.is_none();
+        let (since, from) = *self.first.get_or_insert_with(|| (Instant::now(), position));
         if !self.plain {
             self.bar.set_message(message());
             self.bar.set_position(position);
+            if news {
+                self.bar.reset_eta();
+            }
         } else if !self.quiet && self.told.elapsed() >= PLAIN_INTERVAL {
             self.told = Instant::now();
             self.bar.set_position(position);
             let (length, gone) = (self.bar.length().unwrap_or(position), self.begun.elapsed().as_secs_f64());
-            let left = gone / position.max(1) as f64 * length.saturating_sub(position) as f64;
-            eprintln!("{} {position}/{length}  {}  {gone:.0} s gone, about {left:.0} s left", self.what, message());
+            let left = seconds_left(since.elapsed().as_secs_f64(), [from, position, length]);
+            let left = left.map_or(String::new(), |left| format!(", about {left:.0} s left"));
+            eprintln!("{} {position}/{length}  {}  {gone:.0} s gone{left}", self.what, message());
         }
     }
+}
+
+/// Time for the rest, s, if it goes on as it went in the seconds since a first position: at a position of a length. None before anything was done.
+fn seconds_left(seconds: f64, [from, position, length]: [u64; 3]) -> Option<f64> {
+    let done = position.checked_sub(from).filter(|done| *done > 0)?;
+    Some(seconds / done as f64 * length.saturating_sub(position) as f64)
 }
 
 impl Drop for Progress {
@@ -152,11 +166,19 @@ impl Drop for Progress {
 
 #[cfg(test)]
 mod tests {
-    use super::printable;
+    use super::{printable, seconds_left};
 
     #[test]
     fn what_commands_a_terminal_is_shown_and_the_rest_is_kept() {
         assert_eq!(printable("v\u{307}, m/s\u{b2}\tok\n"), "v\u{307}, m/s\u{b2}\tok\n");
         assert_eq!(printable("a\u{1b}[2J\u{9b}1m\u{202e}b\r\u{7}"), "a\\u{1b}[2J\\u{9b}1m\\u{202e}b\\u{d}\\u{7}");
+    }
+
+    #[test]
+    fn the_time_left_is_that_of_the_work_done_here() {
+        assert_eq!(seconds_left(10.0, [900, 950, 1000]), Some(10.0));
+        assert_eq!(seconds_left(10.0, [0, 250, 1000]), Some(30.0));
+        assert_eq!(seconds_left(10.0, [0, 1000, 1000]), Some(0.0));
+        assert_eq!(seconds_left(10.0, [950, 950, 1000]), None);
     }
 }

@@ -43,6 +43,9 @@ pub(super) fn candidates(model: &Model, flights: &[Flight]) -> Vec<Candidate> {
             return None;
         }
         let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
+        if effect.reads_rotors() && model.rotors.is_empty() {
+            return None;
+        }
         effect.added_by = Some(FOUND.into());
         let variants = grid(definition, &effect);
         Some((Some(definition), effect, variants))

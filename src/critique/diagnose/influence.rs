@@ -7,6 +7,7 @@ use super::engine::Engine;
 use super::gains::by_flight_of;
 use super::report::Influence;
 use crate::flight::Flight;
+use crate::physics::digits::printer;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -38,7 +39,7 @@ pub(super) fn decisive_flight(engine: &Engine<'_>, gains: &[f64]) -> Option<Stri
 impl fmt::Display for Influence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.without {
-            Some(value) => write!(f, "without flight `{}` {value:.4}", self.flight),
+            Some(value) => write!(f, "without flight `{}` {}", self.flight, printer(4, [value])(value)),
             None => write!(f, "not determined without flight `{}`", self.flight),
         }
     }

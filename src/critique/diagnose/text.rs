@@ -9,6 +9,7 @@ use crate::critique::channels::ChannelValues;
 use crate::critique::table::OWN_FROM_FIRST_HALF;
 use crate::critique::wrap::{clipped, wrapped};
 use crate::flight::{Channel, PerChannel};
+use crate::physics::digits::printer;
 use std::collections::BTreeMap;
 use std::fmt;
 
@@ -25,7 +26,8 @@ fn unit_text(unit: &str) -> String {
 /// A coefficient with interval, unit and what there is to say of its sign. At length with what is usual, a remark after the other; in short
 /// with what is usual where the number lies outside, in brackets.
 fn number_text(number: &Number, long: bool) -> String {
-    let ci = number.ci95.map(|[low, high]| format!(" [{low:.4}, {high:.4}]")).unwrap_or_default();
+    let shown = printer(4, number.ci95.iter().flatten().copied().chain([number.value]));
+    let ci = number.ci95.map(|[low, high]| format!(" [{}, {}]", shown(low), shown(high))).unwrap_or_default();
     let outside = |[low, high]: [f64; 2]| !(low..=high).contains(&number.value);
     let usual = match number.expected {
         Some([low, high]) if long => Some(format!("usual {low} to {high}")),
@@ -36,7 +38,7 @@ fn number_text(number: &Number, long: bool) -> String {
     let remark = Some(number_remark(number).trim_start_matches("; ").to_owned()).filter(|remark| !remark.is_empty());
     let influence = number.influence.as_ref().map(ToString::to_string);
     let remarks: Vec<String> = [usual, spread, remark, influence].into_iter().flatten().collect();
-    let value = format!("{} = {:.4}{ci}{}", number.name, number.value, unit_text(&number.unit));
+    let value = format!("{} = {}{ci}{}", number.name, shown(number.value), unit_text(&number.unit));
     match remarks.join("; ") {
         remarks if remarks.is_empty() => value,
         remarks if long => format!("{value}; {remarks}"),

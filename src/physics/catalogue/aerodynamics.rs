@@ -23,7 +23,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "speeds from hover to well above 5 m/s",
-            confusable_with: &["wind", "speed_damping", "climb_inflow", "transl_lift", "vortex_ring"],
+            confusable_with: &["wind", "speed_damping", "climb_inflow", "transl_lift", "vortex_ring", "rotor_drag"],
             would_tell_apart: "straight flight at 4, 8 and 12 m/s, forwards and sideways",
             fault_of_log: Some(
                 "a velocity in another unit or scale in some of the flights: the position would then move otherwise than it says",
@@ -168,7 +168,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "accelerations from hover, forwards and sideways",
-            confusable_with: &["wind", "cg_offset"],
+            confusable_with: &["wind", "cg_offset", "rotor_drag"],
             would_tell_apart: "trimmed flight at several speeds in all four directions",
             fault_of_log: None,
             source: "flapping by advance ratio: Gavrilets, da1/dmu; L_v -5.5, M_u 2.75: Walker & Tischler 2021; of multirotors: Hoffmann et al., AIAA 2007-6461",
@@ -193,7 +193,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "rates in hover and above 8 m/s",
-            confusable_with: &["quad_drag", "tail_rotor_inflow"],
+            confusable_with: &["quad_drag", "tail_rotor_inflow", "rotor_inflow"],
             would_tell_apart: "doublets on each stick in hover, at 5 and at 12 m/s",
             fault_of_log: None,
             source: "lifting surface at an arm: damping in proportion to V; Padfield ch. 4",

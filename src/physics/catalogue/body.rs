@@ -37,7 +37,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "turning about two axes at once, beyond 2 rad/s",
-            confusable_with: &["rate_cross"],
+            confusable_with: &["rate_cross", "rotor_gyro"],
             would_tell_apart: "rolls and flips during a pirouette, and the same without it",
             fault_of_log: None,
             source: "Euler's equation: Stevens & Lewis, Aircraft Control and Simulation, 2nd ed., sec. 1.4",

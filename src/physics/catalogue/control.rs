@@ -242,7 +242,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: HELICOPTER,
             excitation: "rolls without pitch and flips without roll",
-            confusable_with: &["ctrl_cross", "inertia_cross", "cyclic_lag"],
+            confusable_with: &["ctrl_cross", "inertia_cross", "cyclic_lag", "rotor_gyro"],
             would_tell_apart: "coasting after a roll or flip input with the cyclic centred",
             fault_of_log: Some(
                 "a rate sensor that is turned about the vertical axis: the attitude would then turn otherwise than the rates say",

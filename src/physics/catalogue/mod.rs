@@ -14,6 +14,7 @@ mod body;
 mod control;
 mod measurement;
 mod rotor;
+mod rotors;
 mod thrust;
 
 use super::baseline;
@@ -32,6 +33,7 @@ pub fn definitions() -> impl Iterator<Item = &'static Definition> {
         aerodynamics::DEFINITIONS,
         thrust::DEFINITIONS,
         rotor::DEFINITIONS,
+        rotors::DEFINITIONS,
         body::DEFINITIONS,
         measurement::DEFINITIONS,
     ];

@@ -3,6 +3,7 @@
 use super::super::{Model, SIGNALS, standard_names};
 use super::*;
 use crate::flight::{Channel, Column, Flight, PerChannel, Targets};
+use crate::physics::rotors::tests::four;
 use crate::physics::{Columns, Effect, Origin, Wanted};
 use crate::{Error, Result};
 use proptest::prelude::*;
@@ -30,6 +31,7 @@ pub(super) fn effect(kind: &str, values: &[f64]) -> Result<Effect> {
 /// The helicopter with every effect of the catalogue at some size.
 fn with_everything() -> Model {
     let mut model = helicopter();
+    model.rotors = four().expect("speeds parse");
     for (index, definition) in definitions().enumerate() {
         let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
         for (place, coefficient) in effect.coefficients.iter_mut().enumerate() {
@@ -54,7 +56,7 @@ fn blanked(model: &mut Model) {
 fn the_table_is_complete() {
     let table = "quad_drag vel_cross inertia_cross ctrl_cross flap_tilt tail_side_force collective_torque heave_torque transl_lift \
         climb_inflow inflow_lag vortex_ring ground_effect rate_cross cyclic_lag ctrl_delay servo_rate_limit tail_lag collective_lag \
-        rotor_droop rotor_acceleration stall_saturation ctrl_nonlin weathercock dihedral_speedstab speed_damping tail_rotor_inflow wind imu_lever \
+        rotor_droop rotor_acceleration rotor_inflow rotor_drag rotor_gyro stall_saturation ctrl_nonlin weathercock dihedral_speedstab speed_damping tail_rotor_inflow wind imu_lever \
         cg_offset tilt_misalign sensor_bias sync mass_drift added_mass";
     let expected: BTreeSet<&str> = table.split_whitespace().collect();
     assert_eq!(definitions().map(|definition| definition.kind).collect::<BTreeSet<_>>(), expected);
@@ -188,6 +190,7 @@ pub(in super::super) fn motion(seed: u64, samples: usize) -> Result<Flight> {
 /// The helicopter with some effects of the catalogue at about their usual sizes.
 fn with_some(chosen: &[bool], size: f64) -> Model {
     let mut model = helicopter();
+    model.rotors = four().expect("speeds parse");
     for (definition, _) in definitions().zip(chosen).filter(|(_, chosen)| **chosen) {
         let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
         for (coefficient, known) in effect.coefficients.iter_mut().zip(definition.coefficients) {

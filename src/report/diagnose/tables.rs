@@ -11,7 +11,7 @@ use crate::critique::diagnose::{CandidateReport, Influence, Locked, Status, Step
 use crate::critique::digits::{Kind, significant};
 use crate::error::{Error, Result};
 use crate::flight::{Channel, Span};
-use crate::physics::catalogue;
+use crate::physics::{Vehicle, catalogue};
 use std::collections::BTreeMap;
 
 fn columns(names: &[(&str, &str)]) -> Vec<(String, String)> {
@@ -257,7 +257,8 @@ pub(super) fn not_named(report: &DiagnoseReport<'_>) -> Vec<Part> {
         ("the flights must contain", ""),
         ("the flight that would tell", ""),
     ];
-    let rows = candidates.iter().map(|candidate| row(candidate)).collect();
+    let vehicle = report.before.vehicle;
+    let rows = candidates.iter().map(|candidate| row(candidate, vehicle)).collect();
     let mut parts =
         vec![Part::Table(Table { caption: "Effects that were tried and not named".into(), columns: columns(&names), rows })];
     if let Some(method) = &diagnosis.method {
@@ -278,13 +279,16 @@ pub(super) fn not_named(report: &DiagnoseReport<'_>) -> Vec<Part> {
     ]
 }
 
-fn row(candidate: &CandidateReport) -> Vec<Cell> {
+fn row(candidate: &CandidateReport, vehicle: Vehicle) -> Vec<Cell> {
     let known = catalogue::definition(&candidate.effect);
     let dash = || "–".to_owned();
     let about = |text: fn(&crate::physics::Notes) -> &str| {
         notes(&candidate.effect).map(text).filter(|text| !text.is_empty()).map_or_else(dash, str::to_owned)
     };
-    let alike = notes(&candidate.effect).map(|notes| notes.confusable_with.join(", ")).filter(|text| !text.is_empty());
+    let flies = |other: &&str| notes(other).is_some_and(|notes| notes.vehicles.contains(&vehicle));
+    let alike =
+        notes(&candidate.effect).map(|notes| notes.confusable_with.iter().copied().filter(flies).collect::<Vec<_>>().join(", "));
+    let alike = alike.filter(|text| !text.is_empty());
     let cells = [
         candidate.effect.clone(),
         candidate.status.words().to_owned(),

@@ -3,8 +3,9 @@
 use super::logs::BETWEEN;
 use super::{Folder, flight, networks};
 use phyture::flight::{Column, write};
+use phyture::formula::Formula;
 use phyture::nn::Architecture;
-use phyture::physics::{Effect, Model, catalogue};
+use phyture::physics::{Effect, Model, Rotor, Turning, catalogue};
 use phyture::train::TrainConfig;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -85,6 +86,12 @@ fn model_files() -> Vec<Vec<u8>> {
     let others: Vec<Effect> =
         catalogue::definitions().filter(|other| !known.contains(&other.kind)).map(|other| other.effect(4.58, 0.8)).collect();
     whole.effects.extend(others);
+    whole.rotors = vec![Rotor {
+        speed: Formula::parse("lag(300 + 50 * u4, 0.03)").expect("a formula"),
+        position_m: [0.1, -0.1, 0.0],
+        axis: [0.0, 0.1, -1.0],
+        turns: Turning::Clockwise,
+    }];
     [baseline, whole].iter().filter_map(|model| model.to_toml().ok()).map(String::into_bytes).collect()
 }
 
