@@ -19,7 +19,7 @@ use crate::hybrid::linear::LinearConfig;
 use crate::nn::Init;
 use crate::physics::{Model, calibrate};
 use crate::tape::Threads;
-use crate::train::{Begun, Ended, Event, RunFolder, State, TrainConfig, Trained, Training};
+use crate::train::{Begun, Ended, Event, RunFolder, State, TrainConfig, Trained, Training, diverges_in};
 use phyture_kernels::random::Stream;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -82,6 +82,40 @@ struct Ground<'g> {
 
 /// What the training of a run is told and answers: share of its steps done; `false` stops it.
 pub type GoOn<'a> = &'a mut dyn FnMut(f64) -> bool;
+
+/// What becomes of a training that diverges.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Divergence {
+    /// It goes on to its end: there is nothing else to take.
+    Borne,
+    /// It stops, and one at a slower rate is taken.
+    Stops,
+}
+
+/// One training at a rate, in a folder of this name.
+type AtRate<'a, T> = dyn FnMut(f64, &str, Divergence) -> Result<Option<T>> + 'a;
+
+/// The training at the chosen one of `rates`, or at the fastest of the slower ones at which it does not diverge, and the rate; at `plain` where none was
+/// chosen. The slowest is taken however it goes.
+fn at_slower<T>(rates: &[f64], chosen: Option<f64>, plain: f64, at: &mut AtRate<'_, T>) -> Result<(T, f64)> {
+    let mut left: Vec<f64> = match chosen {
+        Some(chosen) => rates.iter().copied().filter(|rate| *rate <= chosen).collect(),
+        None => vec![plain],
+    };
+    left.sort_by(|one, other| other.total_cmp(one));
+    for (index, rate) in left.iter().enumerate() {
+        let divergence = if index + 1 < left.len() { Divergence::Stops } else { Divergence::Borne };
+        let name = if index == 0 { String::new() } else { format!("slower-{index}") };
+        match at(*rate, &name, divergence) {
+            Ok(Some(trained)) => return Ok((trained, *rate)),
+            Ok(None) => {}
+            // Not even numbers come out.
+            Err(Error::Undetermined(_)) if divergence == Divergence::Stops => {}
+            Err(other) => return Err(other),
+        }
+    }
+    unreachable!("the last training does not stop")
+}
 
 impl<'a> Experiment<'a> {
     /// The runs of `plan` on these flights; models that the loop amends are kept in the folder `amended`, which exists.
@@ -246,8 +280,9 @@ impl<'a> Experiment<'a> {
             let tried = TrainConfig { peak_rate, epochs, keep_best: true, ..config.clone() };
             let part = |share: f64| (index as f64 + share) * epochs as f64 / whole;
             let name = format!("rate-{index}");
-            match self.trained(ground, &tried, &name, &mut |share| go_on(part(share))) {
-                Ok(trained) => {
+            match self.trained(ground, &tried, &name, Divergence::Borne, &mut |share| go_on(part(share))) {
+                Ok(None) => {}
+                Ok(Some(trained)) => {
                     let loss = trained.curve.iter().filter_map(|epoch| epoch.validation).fold(f64::INFINITY, f64::min);
                     best = best.filter(|(_, least)| *least <= loss).or(Some((peak_rate, loss)));
                 }
@@ -256,19 +291,30 @@ impl<'a> Experiment<'a> {
                 Err(other) => return Err(other),
             }
         }
-        outcome.peak_rate = best.map(|(rate, _)| rate);
-        let config = TrainConfig { peak_rate: outcome.peak_rate.unwrap_or(config.peak_rate), ..config };
         let before = (rates.len() * epochs) as f64;
         let part = |share: f64| (before + share * config.epochs as f64) / whole;
-        let Trained { hybrid, begun, curve, epoch, .. } = self.trained(ground, &config, "", &mut |share| go_on(part(share)))?;
+        let mut at = |peak_rate: f64, name: &str, divergence: Divergence| {
+            let config = TrainConfig { peak_rate, ..config.clone() };
+            self.trained(ground, &config, name, divergence, &mut |share| go_on(part(share)))
+        };
+        let (trained, rate) = at_slower(rates, best.map(|(rate, _)| rate), config.peak_rate, &mut at)?;
+        outcome.peak_rate = best.map(|_| rate);
+        let Trained { hybrid, begun, curve, epoch, .. } = trained;
         let Begun { parameters, windows, steps, .. } = begun;
         (outcome.parameters, outcome.training_windows, outcome.steps) = (parameters, windows, steps);
         (outcome.curve, outcome.epoch) = (curve, epoch + 1);
         Ok(hybrid)
     }
 
-    /// One training, in a folder of its own below the run's. One that has come to its end is not done again.
-    fn trained(&self, ground: &Ground<'_>, config: &TrainConfig, name: &str, go_on: GoOn<'_>) -> Result<Trained> {
+    /// One training, in a folder of its own below the run's. One that has come to its end is not done again. None if it diverged, where it is to stop then.
+    fn trained(
+        &self,
+        ground: &Ground<'_>,
+        config: &TrainConfig,
+        name: &str,
+        divergence: Divergence,
+        go_on: GoOn<'_>,
+    ) -> Result<Option<Trained>> {
         let Ground { run, flights, model, split, working } = *ground;
         let working = if name.is_empty() { working.to_path_buf() } else { working.join(name) };
         let folder = RunFolder::create(&working)?;
@@ -278,17 +324,27 @@ impl<'a> Experiment<'a> {
         let state = self.resumed(run, config, data, &folder, ground.working)?;
         let training = Training { flights, split, model, config, data, folder: &folder, with_losses: false, threads: self.threads };
         let mut steps = 1;
+        let mut losses: Vec<f64> = state.iter().flat_map(|state| &state.curve).map(|epoch| epoch.training).collect();
+        let stops = |losses: &[f64]| divergence == Divergence::Stops && diverges_in(losses.iter().copied()).is_some();
+        if stops(&losses) {
+            return Ok(None);
+        }
         let ended = training.run(state, &mut |event| {
             Ok(match event {
                 Event::Begins(begun) => {
                     steps = begun.steps.max(1);
                     true
                 }
-                Event::Step(report) => go_on(report.step.step as f64 / steps as f64),
+                Event::Step(report) => {
+                    losses.extend(report.epoch_ended.iter().map(|epoch| epoch.training));
+                    !stops(&losses) && go_on(report.step.step as f64 / steps as f64)
+                }
             })
         })?;
         match ended {
-            Ended::Trained(trained) => Ok(*trained),
+            Ended::Trained(_) if stops(&losses) => Ok(None),
+            Ended::Trained(trained) => Ok(Some(*trained)),
+            Ended::Stopped { .. } if stops(&losses) => Ok(None),
             Ended::Stopped { done, steps } => {
                 Err(Error::Interrupted { saved: format!("the run `{run}` goes on from step {done} of {steps}") })
             }
@@ -401,4 +457,42 @@ fn physics_at(model: &Model, flights: &[Flight], windows: &[Window]) -> Result<V
     let columns = flights.iter().map(|flight| model.predict(flight)).collect::<Result<Vec<_>>>()?;
     let at = |window: &Window| PerChannel::from_fn(|channel| columns[window.flight][channel][window.last]);
     Ok(windows.iter().map(at).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn where_it_diverges_the_next_slower_rate_is_taken_and_the_slowest_however_it_goes() -> Result<()> {
+        type Seen = Vec<(f64, String, bool)>;
+        let tried = |chosen: Option<f64>, fastest_that_holds: f64| -> Result<(f64, Seen)> {
+            let mut seen = Vec::new();
+            let mut at = |rate: f64, name: &str, divergence: Divergence| {
+                seen.push((rate, name.to_owned(), divergence == Divergence::Stops));
+                let holds = rate <= fastest_that_holds || divergence == Divergence::Borne;
+                Ok(holds.then_some(()))
+            };
+            let ((), rate) = at_slower(&[3e-4, 3e-3, 1e-3], chosen, 5e-3, &mut at)?;
+            Ok((rate, seen))
+        };
+        let (rate, seen) = tried(Some(3e-3), 3e-3)?;
+        assert!(rate == 3e-3 && seen == [(3e-3, String::new(), true)], "{seen:?}");
+        let (rate, seen) = tried(Some(3e-3), 1e-3)?;
+        assert!(rate == 1e-3 && seen.len() == 2 && seen[1].1 == "slower-1", "{seen:?}");
+        let (rate, seen) = tried(Some(3e-3), 0.0)?;
+        assert!(rate == 3e-4 && !seen[2].2, "{seen:?}");
+        let (rate, seen) = tried(Some(1e-3), 1.0)?;
+        assert!(rate == 1e-3 && seen.len() == 1, "{seen:?}");
+        let (rate, seen) = tried(None, 0.0)?;
+        assert!(rate == 5e-3 && seen == [(5e-3, String::new(), false)], "{seen:?}");
+        // An error that says that numbers ran away counts; others end the run.
+        let mut failing = |rate: f64, _: &str, _: Divergence| {
+            if rate > 1e-3 { Err(Error::Undetermined("not finite".into())) } else { Ok(Some(())) }
+        };
+        assert_eq!(at_slower(&[1e-3, 3e-3], Some(3e-3), 0.0, &mut failing)?.1, 1e-3);
+        let mut stopped = |_: f64, _: &str, _: Divergence| Err::<Option<()>, _>(Error::Interrupted { saved: "it".into() });
+        assert!(matches!(at_slower(&[1e-3, 3e-3], Some(3e-3), 0.0, &mut stopped), Err(Error::Interrupted { .. })));
+        Ok(())
+    }
 }

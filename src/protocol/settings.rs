@@ -160,7 +160,7 @@ impl Settings {
             (rates, epochs) => {
                 let rates: Vec<String> = rates.iter().map(f64::to_string).collect();
                 format!(
-                    "; each network's learning rate is the best of {} on the validation part after {epochs} epochs",
+                    "; each network's learning rate is the best of {} on the validation part after {epochs} epochs, or the next slower one where training diverges",
                     rates.join(", ")
                 )
             }

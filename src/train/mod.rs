@@ -23,6 +23,6 @@ pub use job::Job;
 pub use rollout_loss::{RolloutLoss, RolloutRule, Rollouts};
 #[cfg(feature = "disk")]
 pub use run::{Checkpointed, Outcome, Report, RunFolder};
-pub use trainer::{Best, EpochLoss, State, StepReport, Trainer};
+pub use trainer::{Best, EpochLoss, State, StepReport, Trainer, diverges_in};
 #[cfg(feature = "disk")]
 pub use training::{Begun, Ended, Event, Losses, Trained, Training};

@@ -40,6 +40,28 @@ pub struct EpochLoss {
     pub validation: Option<f64>,
 }
 
+/// Where an epoch's training loss is more than so many times the least of those before it, the learning rate is too fast. Losses of epochs, means over
+/// many steps, do not rise so by chance.
+const DIVERGED: f64 = 2.0;
+
+/// The first epoch, from 0, whose training loss shows that training diverges: more than twice the least of the epochs before, or no number.
+///
+/// # Examples
+/// ```
+/// use phyture::train::diverges_in;
+///
+/// assert_eq!(diverges_in([19.0, 5.0, 2.8, 5.5, 2.7]), None);
+/// assert_eq!(diverges_in([19.0, 5.0, 2.8, 5.7, 2.7]), Some(3));
+/// ```
+pub fn diverges_in(training: impl IntoIterator<Item = f64>) -> Option<usize> {
+    let mut least = f64::INFINITY;
+    training.into_iter().position(|loss| {
+        let rises = loss.is_nan() || loss > DIVERGED * least;
+        least = least.min(loss);
+        rises
+    })
+}
+
 /// The weights of an epoch.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Best {

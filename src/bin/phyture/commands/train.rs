@@ -2,7 +2,7 @@
 
 use crate::arguments::{Data, Division, count};
 use crate::context::{Context, interruption};
-use crate::output::Progress;
+use crate::output::{Progress, warn};
 use crate::pages::Pages;
 use phyture::critique::digits::significant;
 use phyture::critique::wrap::wrapped;
@@ -10,7 +10,7 @@ use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
 use phyture::report::{TrainingReport, training_page};
-use phyture::train::{Begun, Event, RunFolder, TrainConfig, Training};
+use phyture::train::{Begun, Event, RunFolder, TrainConfig, Training, diverges_in};
 use phyture::workflow::{Epoch, Run, TrainedNetwork, provenance, train, training_digest};
 use phyture::{Error, Result};
 use std::path::PathBuf;
@@ -230,4 +230,11 @@ fn say_trained(context: &Context, Run { hybrid, gate_windows, network }: &Run) {
         network.curve.len(),
         network.training_loss
     ));
+    if let Some(epoch) = diverges_in(network.curve.iter().map(|losses| losses.training)) {
+        warn(&format!(
+            "in epoch {} the training loss went up to more than twice the least before: the learning rate is too fast; set a `peak_rate` of a third in the \
+             training configuration and train again",
+            epoch + 1
+        ));
+    }
 }
