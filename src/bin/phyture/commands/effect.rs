@@ -94,11 +94,13 @@ fn signals(context: &Context) -> Result<ExitCode> {
         let changes = |effect: &&Effect| effect.changes().iter().any(|changed| changed.name == signal.name);
         effects.iter().filter(changes).map(|effect| effect.kind.as_str()).collect()
     };
-    context.print(format!("{:<12}  {:<6}  {:<60}  changed by", "signal", "unit", "what it is"));
+    let width = |text: fn(&Signal) -> &str| SIGNALS.iter().map(|signal| text(signal).chars().count()).max().unwrap_or_default();
+    let (names, units, meanings) = (width(|signal| signal.name), width(|signal| signal.unit), width(|signal| signal.meaning));
+    context.print(format!("{:<names$}  {:<units$}  {:<meanings$}  changed by", "signal", "unit", "what it is"));
     for signal in &SIGNALS {
         let changers = changers(signal);
         let by = if changers.is_empty() { "-".into() } else { changers.join(" ") };
-        context.print(format!("{:<12}  {:<6}  {:<60}  {by}", signal.name, signal.unit, signal.meaning));
+        context.print(format!("{:<names$}  {:<units$}  {:<meanings$}  {by}", signal.name, signal.unit, signal.meaning));
     }
     context.print(concat!(
         "\na formula of your own changes a signal like this, in a model file:\n\n",
@@ -198,7 +200,9 @@ fn text(definition: &Definition) -> String {
             line(0, format!("Fault of a log    {fault}"));
         }
         line(0, format!("Source            {}", notes.source));
-        line(0, format!("Vehicles          {}", vehicles.join(", ")));
+        let rotors =
+            if definition.effect(1.0, 1.0).reads_rotors() { ", whose model file lists its rotors as [[rotor]]" } else { "" };
+        line(0, format!("Vehicles          {}{rotors}", vehicles.join(", ")));
         if !notes.searched {
             line(0, "Listed only: a search leaves it out".into());
         }
