@@ -27,6 +27,8 @@ mod model;
 mod model_file;
 mod output_error;
 pub mod rollout;
+#[cfg(feature = "files")]
+mod rotor_file;
 mod rotors;
 mod sign;
 mod sign_doubt;

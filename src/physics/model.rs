@@ -202,7 +202,7 @@ impl Model {
                 return fault(&format!("rotor {}, {key}", index + 1), found, &expected);
             }
         }
-        if let Some(effect) = self.effects.iter().find(|effect| self.rotors.is_empty() && effect.enabled && effect.reads_rotors()) {
+        if let Some(effect) = self.effects.iter().find(|effect| effect.enabled && self.lacks_rotors_of(effect)) {
             let found = format!("nothing, and effect `{}` sums over rotors", effect.name);
             return fault("rotor", found, "a table `[[rotor]]` for each: speed (rad/s, a formula of columns), position_m, turns");
         }
@@ -213,6 +213,11 @@ impl Model {
             }
         }
         Ok(())
+    }
+
+    /// Whether an effect sums over rotors and none are listed.
+    pub fn lacks_rotors_of(&self, effect: &Effect) -> bool {
+        self.rotors.is_empty() && effect.reads_rotors()
     }
 
     /// One of the model's own numbers by name.

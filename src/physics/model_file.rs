@@ -7,14 +7,13 @@ use super::definition::Vehicle;
 use super::effect::{Effect, FORMULA_COEFFICIENT, FORMULA_KIND, Parameter};
 use super::evaluate::standard_names;
 use super::model::{Entry, Model, ModelData};
-use super::rotors::{Rotor, Turning};
+use super::rotor_file::{read_rotor, write_rotor};
 use super::signal::{SIGNALS, changeable, signal_named};
 use super::toml_section::{Section, line_of, number};
 use super::vehicle::{self, Assumed};
 use crate::error::{Error, Result};
 use crate::flight::Channel;
 use crate::flight::split::Protocol;
-use crate::formula::Formula;
 use crate::suggest::did_you_mean;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -26,9 +25,6 @@ use toml::de::{DeTable, DeValue};
 const NOMINAL_MASS_KG: f64 = 4.58;
 const NOMINAL_INERTIA: [f64; 3] = [0.18, 0.34, 0.28];
 const NOMINAL_ROTOR_RADIUS_M: f64 = 0.80;
-
-/// Where a rotor pushes to that lifts, in body axes.
-const UP: [f64; 3] = [0.0, 0.0, -1.0];
 
 /// What effects mean: since 2 they read and change the signals of the model; since 3 a rotor that slows down takes less power
 /// and damps less, and the induced flow settles sooner the more air passes; since 4 a falling mass changes accelerations, not forces.
@@ -260,36 +256,6 @@ fn read_vehicle(model: &Section<'_>) -> Result<Vehicle> {
     })
 }
 
-fn read_rotor(section: &Section<'_>) -> Result<Rotor> {
-    section.allow(&["speed", "position_m", "axis", "turns"])?;
-    let text = section
-        .text("speed")?
-        .ok_or_else(|| section.fault("speed", "nothing", "`speed = \"…\"`, rad/s, a formula of columns of the log"))?;
-    let speed = Formula::parse(text).map_err(|error| located(section, "speed", "rotor", error))?;
-    let turns = section
-        .text("turns")?
-        .ok_or_else(|| section.fault("turns", "nothing", "`turns = \"clockwise\"` or `\"counterclockwise\"`, seen from above"))?;
-    let names = Turning::ALL.map(Turning::name);
-    let turns = Turning::ALL.into_iter().find(|turning| turning.name() == turns).ok_or_else(|| {
-        let found = format!("`{turns}`{}", did_you_mean(turns, names));
-        section.fault("turns", found, format!("one of `{}`, seen from above", names.join("`, `")))
-    })?;
-    let position_m = section.numbers("position_m")?.ok_or_else(|| {
-        section.fault("position_m", "nothing", "`position_m = [forward, starboard, down]` from the centre of mass")
-    })?;
-    Ok(Rotor { speed, position_m, axis: section.numbers("axis")?.unwrap_or(UP), turns })
-}
-
-fn write_rotor(text: &mut String, rotor: &Rotor) {
-    let Rotor { speed, position_m, axis, turns } = rotor;
-    // Writing to a String does not fail.
-    let _ = writeln!(text, "\n[[rotor]]\nspeed = {}\nposition_m = {position_m:?}", quoted(&speed.to_string()));
-    if *axis != UP {
-        let _ = writeln!(text, "axis = {axis:?}");
-    }
-    let _ = writeln!(text, "turns = {}", quoted(turns.name()));
-}
-
 fn read_data(file: &Section<'_>) -> Result<ModelData> {
     let Some(section) = file.section("data", "data")? else { return Ok(ModelData::default()) };
     section.allow(&["control_delay_s", "locked", "split"])?;
@@ -497,7 +463,7 @@ fn channel_named(section: &Section<'_>, channel: &str) -> Result<Channel> {
 }
 
 /// Puts file and line before a formula error.
-fn located(section: &Section<'_>, key: &str, owner: &str, error: Error) -> Error {
+pub(super) fn located(section: &Section<'_>, key: &str, owner: &str, error: Error) -> Error {
     let Error::Formula { message, formula, at } = error else { return error };
     match section.fault(key, "", "") {
         Error::Config { place, .. } => {
@@ -567,7 +533,7 @@ fn write_effect(text: &mut String, effect: &Effect) {
 }
 
 /// Text as a TOML string.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml::Value::String(text.into()).to_string()
 }
 

@@ -194,7 +194,7 @@ impl Studio {
         let is_addable = |definition: &&crate::physics::Definition| {
             definition.notes.is_some_and(|notes| notes.vehicles.contains(&model.vehicle))
                 && model.effect(definition.kind).is_none()
-                && !(model.rotors.is_empty() && definition.effect(model.mass_kg, model.rotor_radius_m).reads_rotors())
+                && !model.lacks_rotors_of(&definition.effect(model.mass_kg, model.rotor_radius_m))
         };
         let addable = catalogue::definitions().filter(is_addable);
         Ok(ModelText {

@@ -43,7 +43,7 @@ pub(super) fn candidates(model: &Model, flights: &[Flight]) -> Vec<Candidate> {
             return None;
         }
         let mut effect = definition.effect(model.mass_kg, model.rotor_radius_m);
-        if effect.reads_rotors() && model.rotors.is_empty() {
+        if model.lacks_rotors_of(&effect) {
             return None;
         }
         effect.added_by = Some(FOUND.into());
