@@ -14,6 +14,7 @@
 mod cases;
 mod change;
 mod corruptions;
+mod fifth;
 mod fourth;
 mod further;
 mod mend;

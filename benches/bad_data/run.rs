@@ -3,6 +3,7 @@
 use crate::cases::{SINGLES, Single};
 use crate::change::{Chance, Change, Corruption, Log, Part};
 use crate::corruptions;
+use crate::fifth::FIFTH;
 use crate::fourth::FOURTH;
 use crate::further::FURTHER;
 use crate::mend::through_files;
@@ -62,12 +63,13 @@ const SHARE: f64 = 0.5;
 /// What is only reported.
 const RESERVED_HALF: &str = "reserved";
 /// All corruptions, by the round in which they were written.
-pub const HALVES: [(&str, &[Corruption]); 6] = [
+pub const HALVES: [(&str, &[Corruption]); 7] = [
     ("development", corruptions::DEVELOPMENT),
     ("further", FURTHER),
     ("second", SECOND),
     ("third", THIRD),
     ("fourth", FOURTH),
+    ("fifth", FIFTH),
     (RESERVED_HALF, RESERVED),
 ];
 
@@ -111,7 +113,7 @@ pub struct Mended {
 /// One case.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Line {
-    /// `development`, `further`, `second`, `third`, `fourth`, `reserved`, `uncorrupted` or `clean`.
+    /// `development`, `further`, `second`, `third`, `fourth`, `fifth`, `reserved`, `uncorrupted` or `clean`.
     pub half: String,
     /// Identifier; of a clean set what flies in it.
     pub corruption: String,

@@ -1,12 +1,15 @@
 //! What would mend a broken relation of mechanics where no reading of whole streams does: one column that is late, filtered, scaled or off, that goes
-//! with a stick, settles from its start, lost its sign, overflows or is noisy, or rows that do not follow each other; what several columns share is in `jointly`.
+//! with a stick, settles from its start, swings, lost its sign, overflows or is noisy, or rows that do not follow each other; what several columns share is in
+//! `jointly`, and what a vector has too much of in `contents`.
 //! Each is tried on the channels of one flight, and the one that leaves least is the cause if it leaves little. Which flights stand out from the others is
 //! the business of `unexplained`; here each is taken by itself.
 
 use super::channels::{Channel, Stream, difference, summed};
+use super::contents::{self, Part};
 use super::increments::{Motion, Vector};
 use super::jointly;
 use super::robust::median;
+use super::stray;
 use super::streams::grain;
 use crate::flight::Column;
 use std::ops::Range;
@@ -20,7 +23,7 @@ const BY_ITSELF: f64 = 0.1;
 /// What is wrong with a state is wrong in both of its relations: another one is broken as well from this part of the share on.
 pub(super) const AS_WELL: f64 = 0.02;
 /// Pieces at least, for a fit.
-const FEWEST_PIECES: usize = 40;
+pub(super) const FEWEST_PIECES: usize = 40;
 
 /// Shifts that are tried, s.
 const LATEST_S: f64 = 0.6;
@@ -33,6 +36,17 @@ const SETTLING_S: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
 /// What settles does so within this part of the flight: a slower decay is a drift.
 const SETTLED: f64 = 0.25;
 
+/// A cause of two numbers is one where it leaves this part of what those of one do.
+const BETTER: f64 = 0.5;
+/// What swings does so at this frequency at least, Hz, …
+const SWINGS_HZ: f64 = 0.5;
+/// … at this part of the rate of samples at most, since noise goes with its own second difference as what swings at a quarter of it, …
+const SWINGS_OF_RATE: f64 = 0.12;
+/// … and with less than this damping ratio.
+const DAMPED: f64 = 0.5;
+/// Leaps of a derivative that overflows are so many times its usual steps at least.
+const FAR: f64 = 20.0;
+
 /// Where so much of the squares lies in this share of the pieces, a column leaps …
 const HELD: f64 = 0.8;
 /// … and rows do, where so many channels leap.
@@ -42,6 +56,10 @@ pub(super) const LEAPING: usize = 5;
 const IN_ONE_STEP: f64 = 0.5;
 /// Ends of a range agree with a leap to this part of it.
 const NEAR: f64 = 0.25;
+/// Leaps to and fro are so many at least …
+const TO_AND_FRO: usize = 6;
+/// … and alike to this part of them.
+const ALIKE: f64 = 0.05;
 
 /// Noise is white where squares of pieces are those that steps of independent noise make, to this factor.
 const WHITE: f64 = 2.0;
@@ -73,8 +91,14 @@ pub(super) enum Kind {
     Settles(f64, f64),
     /// It has only one sign.
     SignLost,
-    /// It goes on from the other end of this range.
+    /// It goes on from the other end of this range, or from 0 where there should be a sign.
     Overflows(f64),
+    /// It swings on its own at this frequency, Hz, with this damping ratio.
+    Swings(f64, f64),
+    /// Of a vector, by rows, how much it has too much for one of each component of another.
+    Holds(Part, [Vector; 3]),
+    /// It is wrong by so much, root mean square, as what it moves and what moves it agree; slowly changing, or not.
+    Stray(f64, bool),
     /// It leaps.
     Leaps,
     /// White noise, or vibration: root mean square.
@@ -87,6 +111,8 @@ pub(super) enum Kind {
     Rows,
     /// Steps of time are so many times as long as stamped, in the shortest and the longest of them.
     Pace([f64; 2]),
+    /// A derivative is so many times as large as it should be, another time at each sample, in the smallest and the largest.
+    Factors([f64; 2]),
 }
 
 impl Kind {
@@ -102,9 +128,13 @@ impl Kind {
             | Self::Follows(_, value)
             | Self::Settles(value, _)
             | Self::Overflows(value)
+            | Self::Swings(value, _)
+            | Self::Stray(value, _)
             | Self::Noise(value)
             | Self::Rounded(value) => value,
-            Self::SignLost | Self::Leaps | Self::OffCentre(_) | Self::Rows | Self::Pace(_) => 0.0,
+            Self::SignLost | Self::Holds(..) | Self::Leaps | Self::OffCentre(_) | Self::Rows | Self::Pace(_) | Self::Factors(_) => {
+                0.0
+            }
         }
     }
 
@@ -121,12 +151,16 @@ impl Kind {
             Self::Settles(..) => "settling",
             Self::SignLost => "sign_lost",
             Self::Overflows(_) => "overflow",
+            Self::Swings(..) => "swinging",
+            Self::Holds(..) => "holds_other",
+            Self::Stray(..) => "stray",
             Self::Leaps => "leaps",
             Self::Noise(_) => "noisy",
             Self::Rounded(_) => "rounded",
             Self::OffCentre(_) => "off_centre",
             Self::Rows => "rows",
             Self::Pace(_) => "uneven_time",
+            Self::Factors(_) => "uneven_factors",
         }
     }
 }
@@ -157,12 +191,17 @@ pub(super) fn of(motion: &Motion) -> Vec<Cause> {
     }
     let off_centre = jointly::off_centre(motion, &broken);
     let off_zero = jointly::off_zero(motion, &channels, &broken);
-    let is_told = |one: &&Broken<'_>| match one.channel.stream {
-        Stream::Velocity => off_centre.is_none(),
-        Stream::Attitude => off_zero.is_none(),
-        Stream::Position | Stream::Rates => true,
+    let holds = if off_centre.is_some() { Vec::new() } else { contents::of(motion, &channels, &broken) };
+    let is_told = |one: &&Broken<'_>| {
+        let stream = one.channel.stream;
+        let is_alone = match stream {
+            Stream::Velocity => off_centre.is_none(),
+            Stream::Attitude => off_zero.is_none(),
+            Stream::Position | Stream::Rates => true,
+        };
+        is_alone && !holds.iter().any(|cause| contents::explains(cause, stream))
     };
-    let of_several = off_centre.iter().chain(&off_zero).cloned();
+    let of_several = off_centre.iter().chain(&off_zero).chain(&holds).cloned();
     let mut causes: Vec<(Option<Blame>, Cause)> = of_several.map(|cause| (None, cause)).collect();
     for one in broken.iter().filter(is_told) {
         let Some(blame) = one.blamed(&channels, &broken) else { continue };
@@ -179,7 +218,10 @@ pub(super) fn of(motion: &Motion) -> Vec<Cause> {
             }
         }
     }
-    causes.into_iter().map(|entry| entry.1).collect()
+    let mut causes: Vec<Cause> = causes.into_iter().map(|entry| entry.1).collect();
+    causes.extend(jointly::uneven_factors(&channels, &broken, &causes));
+    causes.extend(stray::of(motion, &channels, &broken, &causes));
+    causes
 }
 
 /// The column that is to blame for a channel that does not fit.
@@ -243,12 +285,18 @@ impl<'a> Broken<'a> {
         }
     }
 
+    /// The least that any cause of a single column leaves of its squares, whichever of the two columns is wrong.
+    pub fn least_left(&self, motion: &Motion) -> f64 {
+        let trials = [true, false].map(|is_state| Trial { broken: self, from: 0, is_state });
+        trials.iter().flat_map(|trial| trial.all(motion)).map(|one| one.0).fold(self.square, f64::min)
+    }
+
     fn usual_error(&self) -> f64 {
         (self.square / self.errors.len() as f64).sqrt()
     }
 
     /// The pieces that hold most of the squared errors, in order, where they are few and each is the work of one step.
-    fn leaps(&self) -> Option<Vec<usize>> {
+    pub fn leaps(&self) -> Option<Vec<usize>> {
         let mut order: Vec<usize> = (0..self.errors.len()).collect();
         order.sort_unstable_by(|one, other| self.errors[*other].abs().total_cmp(&self.errors[*one].abs()));
         let mut rest = HELD * self.square;
@@ -292,7 +340,7 @@ impl<'a> Broken<'a> {
         later.or_else(|| Some((self.noise(is_state)?, None)))
     }
 
-    /// Half of the range, where leaps go from one end to the other.
+    /// The range, where leaps go from one of its ends to the other, or to and fro by as much each time.
     fn overflow(&self, leaps: &[usize]) -> Option<f64> {
         let state = &self.channel.state;
         let step = |piece: &usize| self.step_errors(*piece).max_by(|one, other| one.1.abs().total_cmp(&other.1.abs()));
@@ -303,7 +351,11 @@ impl<'a> Broken<'a> {
             let end = limit * step.signum();
             is_near(state[k], end) && is_near(state[k - 1], -end)
         };
-        (steps.iter().filter(goes_round).count() * 4 >= steps.len() * 3).then_some(limit)
+        let is_alike = |step: &&(usize, f64)| (0.5 * step.1.abs() - limit).abs() < ALIKE * limit;
+        let is_most = |count: usize| count * 4 >= steps.len() * 3;
+        let goes_both_ways = steps.iter().any(|step| step.1 > 0.0) && steps.iter().any(|step| step.1 < 0.0);
+        let is_to_and_fro = steps.len() >= TO_AND_FRO && goes_both_ways && is_most(steps.iter().filter(is_alike).count());
+        (is_most(steps.iter().filter(goes_round).count()) || is_to_and_fro).then_some(2.0 * limit)
     }
 
     /// The piece from which on errors are, if there are none before and there is much of the flight on both sides.
@@ -361,11 +413,89 @@ impl Trial<'_> {
         if self.pieces().len() < FEWEST_PIECES {
             return None;
         }
+        let (left, kind) = self.all(motion).into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
+        (left < LITTLE * square).then_some(kind)
+    }
+
+    /// What each cause leaves.
+    fn all(&self, motion: &Motion) -> Vec<(f64, Kind)> {
         let mut all = vec![self.late(), self.filtered(), self.averaged(), self.scaled(), self.off(), self.settles()];
         all.extend((0..4).map(|control| self.follows(motion, control)));
         all.extend(self.sign_lost());
-        let (left, kind) = all.into_iter().min_by(|one, other| one.0.total_cmp(&other.0))?;
-        (left < LITTLE * square).then_some(kind)
+        let simplest = all.iter().map(|one| one.0).fold(f64::INFINITY, f64::min);
+        all.extend(self.swings().filter(|one| one.0 < BETTER * simplest));
+        all.extend(self.wraps());
+        all
+    }
+
+    /// The errors on two features of a piece: what is left, and the coefficients.
+    fn on_two(&self, features: impl Fn(&Range<usize>) -> [f64; 2]) -> Option<(f64, [f64; 2])> {
+        let (mut gram, mut moment, mut square) = (nalgebra::Matrix2::<f64>::zeros(), nalgebra::Vector2::<f64>::zeros(), 0.0);
+        for (piece, error) in self.pieces().iter().zip(self.errors()) {
+            let row = nalgebra::Vector2::from(features(piece));
+            gram += row * row.transpose();
+            moment += *error * row;
+            square += error * error;
+        }
+        let solution = gram.cholesky()?.solve(&moment);
+        Some((square - moment.dot(&solution), solution.into()))
+    }
+
+    /// A sensor on springs: s″ + 2 ζ ω s′ + ω² s = ω² s₀ for what it shows, s, of what there is, s₀.
+    fn swings(&self) -> Option<(f64, Kind)> {
+        let (channel, step_s) = (self.broken.channel, self.broken.channel.step_s);
+        let column = if self.is_state { &channel.state } else { &channel.rate };
+        let last = column.len().checked_sub(2)?;
+        let at = |k: usize| k.clamp(1, last);
+        let first = |k: usize| (column[at(k) + 1] - column[at(k) - 1]) / (2.0 * step_s);
+        let second = |k: usize| (column[at(k) + 1] - 2.0 * column[at(k)] + column[at(k) - 1]) / (step_s * step_s);
+        // A state: e = Δs − ∫ f = −(Δs″ / ω² + 2 ζ Δs′ / ω). A derivative f: e = (Δf′ / ω² + 2 ζ Δf / ω).
+        let (left, [of_second, of_first]) = if self.is_state {
+            self.on_two(|piece| [second(piece.start) - second(piece.end), first(piece.start) - first(piece.end)])?
+        } else {
+            self.on_two(|piece| [first(piece.end) - first(piece.start), column[piece.end] - column[piece.start]])?
+        };
+        if of_second <= 0.0 {
+            return None;
+        }
+        let frequency = of_second.powf(-0.5);
+        let (frequency_hz, damping) = (frequency / std::f64::consts::TAU, 0.5 * of_first * frequency);
+        let is_one = (SWINGS_HZ..SWINGS_OF_RATE / step_s).contains(&frequency_hz) && (0.0..DAMPED).contains(&damping);
+        is_one.then_some((left, Kind::Swings(frequency_hz, damping)))
+    }
+
+    /// A column that leaps to and fro by the same amount, as counts do that are read without their sign or beyond their range.
+    fn wraps(&self) -> Option<(f64, Kind)> {
+        let channel = self.broken.channel;
+        let column = if self.is_state { &channel.state } else { &channel.rate };
+        let mut steps: Vec<f64> = column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        let (largest, usual) = (*steps.last()?, steps[steps.len() / 2]);
+        let leaps = &steps[steps.partition_point(|step| *step < (1.0 - NEAR) * largest)..];
+        let range = leaps[leaps.len() / 2];
+        let before = steps[..steps.len() - leaps.len()].last().copied().unwrap_or(0.0);
+        if leaps.len() < 2 || range < FAR * usual || before > 0.5 * range {
+            return None;
+        }
+        // Each leap undone, from a first value that may be beyond already.
+        let undone = |beyond: f64| {
+            let mut turns = beyond;
+            let of = |k: usize| {
+                if k > 0 {
+                    turns -= ((column[k] - column[k - 1]) / range).round();
+                }
+                column[k] + range * turns
+            };
+            let undone: Vec<f64> = (0..column.len()).map(of).collect();
+            if self.is_state {
+                let of_piece = |piece: &Range<usize>| (difference(&undone, piece) - difference(&channel.sum, piece)).powi(2);
+                return self.pieces().iter().map(of_piece).sum();
+            }
+            let sum = summed(&undone, channel.step_s);
+            self.left(|piece| difference(&sum, piece))
+        };
+        let left = [-1.0, 0.0, 1.0].map(undone).into_iter().fold(f64::INFINITY, f64::min);
+        Some((left, Kind::Overflows(range)))
     }
 
     /// Squares that are left where f summed is this.

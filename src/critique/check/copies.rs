@@ -1,9 +1,11 @@
-//! Columns of a flight that are a copy of another one: a channel that was logged twice, and one that was not logged.
+//! Copies that are none by their numbers: columns of a flight with the values of another one, a channel that was logged twice in the place of one that was not
+//! logged; and flights with the values of another but for signs, mirrored to have more. Flights with the same numbers are left out when they are read.
 
 use super::finding::Finding;
 use super::flights::in_flights;
 use crate::flight::{Column, Flight};
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 /// Columns with the values of another, in the flights where they have them; of all flights, too.
 pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
@@ -23,5 +25,36 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
             format!("{one} and {other} are identical: the same channel stands in both columns, and one of them was not logged");
         in_flights(&format!("same_{one}_{other}"), &indices, &message, flights)
     };
-    pairs.into_iter().map(told).collect()
+    pairs.into_iter().map(told).chain(mirrored(flights)).collect()
+}
+
+/// Flights that are others with some signs reversed.
+fn mirrored(flights: &[Flight]) -> Option<Finding> {
+    // Sums of magnitudes are the same to the last bit, whatever the signs.
+    let sizes = |flight: &Flight| -> [u64; Column::COUNT] {
+        let sums = Column::ALL.map(|column| flight.column(column).iter().map(|value| value.abs()).sum::<f64>().to_bits());
+        flight.rest();
+        sums
+    };
+    let mut first: BTreeMap<[u64; Column::COUNT], usize> = BTreeMap::new();
+    let mut such = Vec::new();
+    for (index, flight) in flights.iter().enumerate() {
+        match first.entry(sizes(flight)) {
+            Entry::Occupied(other) if is_mirrored(&flights[*other.get()], flight) => such.push(index),
+            Entry::Occupied(_) => {}
+            Entry::Vacant(place) => drop(place.insert(index)),
+        }
+    }
+    let message = "each holds the numbers of another flight with some signs reversed, a mirrored copy: no helicopter flies so, its rotors have one sense of turning";
+    (!such.is_empty()).then(|| in_flights("mirrored", &such, message, flights))
+}
+
+/// Whether each column is that of the other flight, or its negative, and one that moves is a negative.
+fn is_mirrored(one: &Flight, other: &Flight) -> bool {
+    let of = |column: Column| {
+        let pairs = || one.column(column).iter().zip(other.column(column));
+        (pairs().all(|(one, other)| one == other), pairs().all(|(one, other)| *one == -other))
+    };
+    let each = Column::ALL.map(of);
+    one.len() == other.len() && each.iter().all(|(same, reversed)| *same || *reversed) && each.iter().any(|(same, _)| !same)
 }

@@ -25,6 +25,9 @@ const TURNED: f64 = 0.17;
 /// Where the nose turns faster, rad/s, a heading that comes late looks turned.
 const SLOW: f64 = 0.5;
 
+/// Angles whose gains are less than this hardly move with the rates.
+const FLAT: f64 = 0.3;
+
 /// How a message begins of a gain that no unit explains.
 pub(super) const FAR: &str = "the gain of this axis is far from 1";
 /// How findings on offsets begin, and the name of that on the heading.
@@ -193,6 +196,9 @@ impl Gains {
         let mut findings: Vec<Finding> =
             gains.map(|((estimate, axis), column)| gain(relation, axis, column, units, estimate)).collect();
         alone(&mut findings, columns);
+        if relation == "attitude_rate" {
+            without_gyros(&mut findings);
+        }
         let offsets = match relation {
             "position_rate" => enough(&self.position, least_explained).map(|all| (all, OFFSETS[0], "m/s")),
             "attitude_rate" => enough(&self.attitude, least_explained).map(|all| (all, OFFSETS[1], "rad/s")),
@@ -239,6 +245,21 @@ fn alone(findings: &mut [Finding], columns: [&str; 3]) {
         if let Some((_, unit)) = unit {
             finding.set = Some(format!("[units] {column} = {unit}"));
         }
+    }
+}
+
+/// Angles of tilt that stay where they are while the aircraft turns are not those of an attitude.
+fn without_gyros(findings: &mut [Finding]) {
+    let value = |axis: usize| findings[axis].measured.filter(|_| findings[axis].verdict == Severity::Fault);
+    let is_flat = |value: Option<f64>| value.is_some_and(|value| value.abs() < FLAT);
+    if !(is_flat(value(0)) && is_flat(value(1))) {
+        return;
+    }
+    for finding in &mut findings[..2] {
+        finding.message = format!(
+            "{}; roll and pitch hardly follow the rates: the tilt against apparent gravity, as accelerometers alone show it, is no attitude",
+            finding.message
+        );
     }
 }
 

@@ -12,6 +12,8 @@ use nalgebra::{DMatrix, DVector};
 const GROWS: f64 = 0.5;
 /// A column is one of those that are off from this part of the largest on.
 const AMONG: f64 = 0.3;
+/// Factors differ where the largest is so many times the smallest.
+const UNEVEN: f64 = 1.3;
 /// Of the paces of a flight this share is shorter than the first that is told, and longer than the last.
 const ENDS: f64 = 0.05;
 
@@ -42,9 +44,53 @@ pub(super) fn uneven_time(channels: &[Channel], broken: usize) -> Option<Cause> 
     if left > LITTLE * before || paces.is_empty() {
         return None;
     }
-    paces.sort_unstable_by(f64::total_cmp);
-    let at = |share: f64| paces[((paces.len() - 1) as f64 * share).round() as usize];
-    Some(Cause { kind: Kind::Pace([at(ENDS), at(1.0 - ENDS)]), columns: Vec::new(), or: None, from_s: None })
+    Some(Cause { kind: Kind::Pace(ends(paces)?), columns: Vec::new(), or: None, from_s: None })
+}
+
+/// Whether recorded derivatives are off by a factor that is another at each sample and the same for all axes: differences that were divided by other steps of
+/// time than those of the rows. Of streams in which no cause is `known`.
+pub(super) fn uneven_factors(channels: &[Channel], broken: &[Broken<'_>], known: &[Cause]) -> Vec<Cause> {
+    let of = |stream: Stream| {
+        let such: Vec<&Channel> = channels.iter().filter(|one| one.stream == stream).collect();
+        let columns: Vec<Column> = such.iter().filter_map(|one| one.rate_column).collect();
+        let is_broken = |stream: Stream| broken.iter().any(|one| one.channel.stream == stream);
+        // A state that is wrong moves nothing rightly.
+        let is_asked = is_broken(stream)
+            && !is_broken(if stream == Stream::Velocity { Stream::Position } else { Stream::Attitude })
+            && such.len() == columns.len()
+            && !known.iter().any(|cause| cause.columns.iter().any(|column| columns.contains(column)));
+        if !is_asked {
+            return None;
+        }
+        let (mut before, mut left, mut factors) = (0.0, 0.0, Vec::new());
+        for k in 1..such[0].state.len() {
+            let pairs =
+                such.iter().map(|one| [one.state[k] - one.state[k - 1], 0.5 * one.step_s * (one.rate[k] + one.rate[k - 1])]);
+            let sums = pairs
+                .fold([0.0; 3], |sum, [change, says]| [sum[0] + change * change, sum[1] + change * says, sum[2] + says * says]);
+            let [changes, along, says] = sums;
+            if changes > 0.0 {
+                before += changes - 2.0 * along + says;
+                left += says - along * along / changes;
+                factors.push(along / changes);
+            }
+        }
+        let ends = ends(factors)?;
+        (left < LITTLE * before && ends[1] > UNEVEN * ends[0]).then_some(Cause {
+            kind: Kind::Factors(ends),
+            columns,
+            or: None,
+            from_s: None,
+        })
+    };
+    [Stream::Velocity, Stream::Rates].into_iter().filter_map(of).collect()
+}
+
+/// The values within which nearly all lie.
+fn ends(mut values: Vec<f64>) -> Option<[f64; 2]> {
+    values.sort_unstable_by(f64::total_cmp);
+    let at = |share: f64| values.get((values.len().checked_sub(1)? as f64 * share).round() as usize).copied();
+    Some([at(ENDS)?, at(1.0 - ENDS)?])
 }
 
 /// Whether rates have offsets, constant or growing from the start of the flight, which turn the attitude otherwise than it turned: e = −∫ E (b₀ + b₁ t) dt on

@@ -1,31 +1,94 @@
-//! Sticks that act on each other's axes in some flights and not in the rest: recorded behind a mixer, or before it, or turned against the swash plate. An
-//! aircraft in which they do so in all flights has a cross-coupling; that is the business of a search.
+//! Sticks that act on each other's axes: recorded behind a mixer, or before it, or turned against the swash plate. In some flights and not in the rest that is
+//! seen at once; an aircraft in which they do so in all flights has a cross-coupling, which is the business of a search, unless they do so as much as the
+//! axis's own stick.
 
-use super::finding::Finding;
+use super::finding::{Finding, Severity, finding};
 use super::flights::{FEWEST, in_flights};
 use super::groups::{Of, apart};
+use super::robust::median;
 use super::sticks::{AXES, EXPLAINED, FIRST, Regressions, STICKS, Sticks};
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
 /// Gains of a stick on another axis, over that of the axis' own stick, are of two kinds from here on apart.
 const LEAST: f64 = 0.15;
+/// No aircraft is so cross-coupled in all flights that another stick does this part of what the own one does, on two axes or more.
+const AS_MUCH: f64 = 0.4;
 
-/// A finding for each cyclic axis; nothing of flights in `except`.
+/// An axis, and another stick than its own.
+type Pair = [usize; 2];
+/// Pairs with their ratios.
+type Ratios = Vec<(Pair, f64)>;
+
+/// Pairs of what the swash plate moves: roll, pitch and heave. Yaw is coupled to the collective in every helicopter.
+const OF_SWASH_PLATE: [Pair; 6] = [[0, 1], [1, 0], [0, 3], [1, 3], [3, 0], [3, 1]];
+
+/// Findings; nothing of flights in `except`.
 pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<usize>) -> Vec<Finding> {
     let judged: Vec<&(usize, Regressions)> = sticks.flights.iter().filter(|(flight, _)| !except.contains(flight)).collect();
-    let of = |[axis, stick]: [usize; 2]| {
-        let ratios: Vec<Of> = judged.iter().filter_map(|(flight, all)| cross(*flight, all, axis, stick)).collect();
-        let (fewer, by) = apart(ratios, LEAST)?;
-        let (own, other) = (STICKS[axis], STICKS[stick]);
-        let message = format!(
-            "{own} and {other} are mixed or turned: {other} acts on {} by {by:.2} times what {own} does, as it does not in the other flights",
-            AXES[axis]
-        );
+    let ratios =
+        |[axis, stick]: Pair| -> Vec<Of> { judged.iter().filter_map(|(flight, all)| cross(*flight, all, axis, stick)).collect() };
+    let of_some: Vec<(Pair, Vec<usize>, f64)> = OF_SWASH_PLATE
+        .into_iter()
+        .filter_map(|pair| apart(ratios(pair), LEAST).map(|(fewer, by)| (pair, fewer, by)))
         // One flight may be flown so.
-        (fewer.len() >= FEWEST).then(|| in_flights(&format!("mixed_{own}_{other}"), &fewer, &message, flights))
+        .filter(|entry| entry.1.len() >= FEWEST)
+        .collect();
+    if !of_some.is_empty() {
+        return in_some(&of_some, flights);
+    }
+    let common = |pair: Pair| {
+        let such = ratios(pair);
+        let value = median(such.iter().map(|one| one.value).collect())?;
+        (2 * such.len() > judged.len() && value.abs() > AS_MUCH).then_some((pair, value))
     };
-    [[0, 1], [1, 0]].into_iter().filter_map(of).collect()
+    let in_all: Ratios = OF_SWASH_PLATE.into_iter().filter_map(common).collect();
+    let axes: BTreeSet<usize> = in_all.iter().map(|entry| entry.0[0]).collect();
+    let message = format!(
+        "{} are mixed: {}; more than any rotor couples them, as where servos of the swash plate, or sticks behind a mixer, were recorded",
+        names(in_all.iter().map(|entry| entry.0)),
+        told(&in_all)
+    );
+    (axes.len() > 1).then(|| finding("mixed_sticks", Severity::Fault, message, None)).into_iter().collect()
+}
+
+/// Flights in which the ratio of a pair is another than in the rest; those of the same flights in one finding.
+fn in_some(such: &[(Pair, Vec<usize>, f64)], flights: &[Flight]) -> Vec<Finding> {
+    let mut alike: Vec<(&[usize], Ratios)> = Vec::new();
+    for (pair, fewer, by) in such {
+        match alike.iter_mut().find(|(others, _)| others == fewer) {
+            Some((_, pairs)) => pairs.push((*pair, *by)),
+            None => alike.push((fewer, vec![(*pair, *by)])),
+        }
+    }
+    let of = |(fewer, pairs): (&[usize], Ratios)| {
+        let [axis, stick] = pairs[0].0;
+        let message = format!(
+            "{} are mixed or turned: {}, as {} not in the other flights",
+            names(pairs.iter().map(|entry| entry.0)),
+            told(&pairs),
+            if pairs.len() > 1 { "they do" } else { "it does" }
+        );
+        in_flights(&format!("mixed_{}_{}", STICKS[axis], STICKS[stick]), fewer, &message, flights)
+    };
+    alike.into_iter().map(of).collect()
+}
+
+/// All sticks of the pairs.
+fn names(pairs: impl Iterator<Item = Pair>) -> String {
+    let all: BTreeSet<usize> = pairs.flatten().collect();
+    let names: Vec<&str> = all.into_iter().map(|stick| STICKS[stick]).collect();
+    match names.as_slice() {
+        [some @ .., last] if !some.is_empty() => format!("{} and {last}", some.join(", ")),
+        names => names.concat(),
+    }
+}
+
+fn told(pairs: &[(Pair, f64)]) -> String {
+    let of = |([axis, stick], ratio): &(Pair, f64)| {
+        format!("{} acts on {} by {ratio:.2} times what {} does", STICKS[*stick], AXES[*axis], STICKS[*axis])
+    };
+    pairs.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 fn cross(flight: usize, regressions: &Regressions, axis: usize, stick: usize) -> Option<Of> {

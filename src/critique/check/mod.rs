@@ -5,7 +5,7 @@
 //! little (`forces`); which stick moves which axis is asked of each flight (`sticks`). Each flight is judged by itself and against the others
 //! (`odd`); columns that are frozen, held, rounded or noisy are seen by themselves (`streams`), and so are ends of ranges (`saturation`) and two sources by turns
 //! (`alternation`); dropped samples (`dropouts`) and cells that cannot be (`cells`) are counted. What would mend what no reading does is looked for in single
-//! columns (`causes`) and in several together (`jointly`).
+//! columns (`causes`), in several together (`jointly`) and in what vectors have of each other (`contents`).
 //! Nothing here changes the data: a finding says what to set in `dataset.toml`.
 
 mod advice;
@@ -15,6 +15,7 @@ mod causes;
 mod cells;
 mod channels;
 mod clocks;
+mod contents;
 mod copies;
 mod dead_zone;
 mod demands;
@@ -33,19 +34,24 @@ mod lines;
 mod mixes;
 mod mounts;
 mod odd;
+mod on_change;
 mod regression;
 mod relations;
 mod report;
 mod robust;
 mod saturation;
 mod sequences;
+mod slew;
 mod stamps;
 mod sticks;
+mod stray;
 mod streams;
+mod stretches;
 #[cfg(feature = "files")]
 mod suggestion;
 mod throws;
 mod timing;
+mod told;
 mod trims;
 mod unexplained;
 
@@ -206,6 +212,7 @@ impl Gathered {
             findings.extend(demands::findings(&followed, &data.flights));
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
             let mut of_sticks = self.sticks.findings(&data.flights, &self.unjudged);
+            of_sticks.extend(stretches::findings(&self.sticks, &data.flights, &self.unjudged));
             of_sticks.extend(mixes::findings(&self.sticks, &data.flights, &self.unjudged));
             of_sticks.extend(trims::findings(&self.sticks, &data.flights, &self.unjudged));
             of_sticks.extend(throws::findings(&self.sticks, &self.sides, &data.flights, &self.unjudged));
@@ -237,8 +244,19 @@ impl Gathered {
 /// What is wrong with single columns of flights of which nothing else says more than that they do not fit.
 fn blamed(judged: &[&Own], odd: &Odd, left: &[unexplained::OfFlight], data: &DataSet) -> Blamed {
     let is_named = |flight: usize| {
-        let mut own = odd.findings.iter().filter(|finding| finding.flights.contains(&data.flights[flight].name));
-        own.any(|finding| finding.verdict == Severity::Fault && !finding.message.contains(gains::FAR))
+        let own = odd.findings.iter().filter(|finding| finding.flights.contains(&data.flights[flight].name));
+        let faults: Vec<&Finding> = own.filter(|finding| finding.verdict == Severity::Fault).collect();
+        let is_far = |finding: &Finding| finding.message.contains(gains::FAR);
+        // A column that has nothing to do with what it should say has some offset, too.
+        let is_offset = |finding: &Finding| {
+            let column = finding.name.strip_prefix(gains::OFFSET);
+            column.is_some_and(|column| faults.iter().any(|far| is_far(far) && far.message.contains(column)))
+        };
+        // That a vector points elsewhere is a symptom, if the cause is found.
+        let points_elsewhere = |finding: &Finding| {
+            [relations::OTHER_DIRECTION, relations::OTHER_AXES].iter().any(|says| finding.message.contains(says))
+        };
+        faults.iter().any(|finding| !is_far(finding) && !is_offset(finding) && !points_elsewhere(finding))
     };
     let unnamed = judged.iter().filter(|own| !is_named(own.flight));
     let causes: Vec<(usize, Option<&[causes::Cause]>)> = unnamed.map(|own| (own.flight, own.causes.as_deref())).collect();

@@ -72,7 +72,9 @@ impl Own {
 /// The findings of a flight of which only a part is read otherwise say so; gains of the whole say nothing then.
 fn in_part(mut findings: Vec<Finding>, short: &Evidence) -> Vec<Finding> {
     for relation in &short.relations {
-        let is_open = findings.iter().any(|finding| finding.name == relation.name && finding.verdict != Severity::Fault);
+        // That a vector points elsewhere is no reading yet.
+        let is_read = |finding: &Finding| finding.verdict == Severity::Fault && finding.set.is_some();
+        let is_open = findings.iter().any(|finding| finding.name == relation.name && !is_read(finding));
         let Some((says, is_later, block)) = is_open.then(|| relation.reading_of_part()).flatten() else { continue };
         let place = format!("{:.0} s{}", SHORT_BLOCK_S * block as f64, if is_later { " on" } else { "" });
         let message = format!("{} {place} {says}, and not in the rest of the flight", if is_later { "from" } else { "up to" });

@@ -172,6 +172,11 @@ impl<const K: usize> BlockRegression<K> {
         self.blocks.iter().map(|sums| sums.square).sum()
     }
 
+    /// The same of each block.
+    pub fn squares(&self) -> Vec<f64> {
+        self.blocks.iter().map(|sums| sums.square).collect()
+    }
+
     /// Share of the squares of what is regressed that the fit explains. `None` as in [`BlockRegression::estimates`].
     pub fn explained(&self) -> Option<f64> {
         Some(1.0 - self.errors()?.iter().sum::<f64>() / self.square())
@@ -215,6 +220,31 @@ impl<const K: usize> BlockRegression<K> {
         Sums::total(&self.blocks).solution()
     }
 
+    /// The fit to this part of the blocks, those that it explains best: blocks of another kind do not bend it (least trimmed squares by concentration steps,
+    /// Rousseeuw & Van Driessen 2006). `None` as in [`BlockRegression::estimates`].
+    pub fn fit_to_best(&self, part: f64) -> Option<[f64; K]> {
+        const STEPS: usize = 5;
+        let mut beta = self.solution()?.beta;
+        for _ in 0..STEPS {
+            let now = self.errors_of(&beta);
+            let share = |at: &usize| now[*at] / self.blocks[*at].square.max(f64::MIN_POSITIVE);
+            let mut order: Vec<usize> = (0..self.blocks.len()).collect();
+            order.sort_unstable_by(|one, other| share(one).total_cmp(&share(other)));
+            order.truncate((part * order.len() as f64).ceil() as usize);
+            let best = order.iter().fold(Sums::NOTHING, |mut sum, at| {
+                sum.take(&self.blocks[*at]);
+                sum
+            });
+            beta = best.solution()?.beta;
+        }
+        Some(beta)
+    }
+
+    /// Sum of squared errors of each block under these coefficients.
+    pub fn errors_of(&self, beta: &[f64; K]) -> Vec<f64> {
+        self.blocks.iter().map(|sums| sums.error(beta)).collect()
+    }
+
     /// Rows added.
     pub fn rows(&self) -> f64 {
         self.blocks.iter().map(|sums| sums.rows).sum()
@@ -222,8 +252,7 @@ impl<const K: usize> BlockRegression<K> {
 
     /// Sum of squared errors of each block under the common least-squares fit. `None` as in [`BlockRegression::estimates`].
     pub fn errors(&self) -> Option<Vec<f64>> {
-        let beta = self.solution()?.beta;
-        Some(self.blocks.iter().map(|sums| sums.error(&beta)).collect())
+        Some(self.errors_of(&self.solution()?.beta))
     }
 }
 

@@ -9,7 +9,10 @@ use super::increments::{Instant, Motion, Vector};
 use super::sequences::{XYZ, XZY, YXZ, YZX, ZXY};
 use crate::blocks::{BlockMean, BlockSum, FEW_BLOCKS};
 use crate::flight::GRAVITY_M_S2;
-use crate::flight::attitude::{Matrix3, body_rates, cross, rotate, rotate_back, rotation_body_to_inertial};
+use crate::flight::attitude::{
+    Matrix3, QuaternionOrder, body_rates, cross, dot, euler_to_quaternion, quaternion_to_rotation, rotate, rotate_back,
+    rotation_body_to_inertial,
+};
 use std::ops::Range;
 
 /// Three vectors, for relations of one vector with the rest zero.
@@ -35,6 +38,18 @@ pub(super) struct Relation {
     hypotheses: Vec<Hypothesis>,
     /// Error and size of the measured change by hypothesis, one entry a block.
     misfit: Vec<Vec<(f64, f64)>>,
+    /// The way without its direction: what of it was measured and what the rate says.
+    way: Option<Way>,
+    /// Error and size of the way, in all flights in which the nominal reading does not hold.
+    of_way: (f64, f64),
+}
+
+/// Of a piece, how far the state moved and how far its rate says, both without a direction; and what to say where only these agree.
+#[derive(Clone, Copy)]
+struct Way {
+    says: &'static str,
+    measured: fn(&Instant, &Instant) -> f64,
+    rate: fn(&Instant) -> f64,
 }
 
 /// Share of the nominal error that another reading may leave at most to be taken for true.
@@ -47,6 +62,8 @@ const HOLDS: f64 = 0.25 * MATERIAL_SHARE;
 const LARGEST_SHARE: f64 = 0.25;
 /// A part of a flight that is read otherwise, and the rest of it, are of so many short blocks at least.
 const FEWEST_BLOCKS: usize = 3;
+/// The ways agree where this share of their squares is left.
+const SAME_WAY: f64 = 0.02;
 /// Unexplained share above which a relation is worth a warning though no other reading does better.
 const POOR_SHARE: f64 = 0.5;
 
@@ -64,6 +81,15 @@ const REVERSED: &str = "s have the other sign";
 const TRANSPOSED: &str =
     "[columns] q1 = \"-q1\", q2 = \"-q2\", q3 = \"-q3\" (the quaternion goes from inertial to body axes), with the file's names";
 const REORDERED: &str = "the quaternion's scalar stands at its other end";
+const MADE_OF_WXYZ: &str = "the attitude was made of a quaternion w, x, y, z that was read as x, y, z, w";
+const MADE_OF_XYZW: &str = "the attitude was made of a quaternion x, y, z, w that was read as w, x, y, z";
+const FROM_QUATERNION: &str =
+    "roll, pitch and yaw anew from the quaternion, or its columns in their place, with `quaternion` in the right order";
+
+pub(super) const OTHER_DIRECTION: &str =
+    "the velocity is as fast as the position moves, and points elsewhere: it was turned by wrong angles, or the attitude is wrong";
+pub(super) const OTHER_AXES: &str = "the attitude turns as fast as the rates say, and about other axes: angles or rates are written in axes or in an order that are not \
+                          known here";
 const ROLL_SIGN: &str = "[columns] roll = \"-roll\", with the file's name";
 const PITCH_SIGN: &str = "[columns] pitch = \"-pitch\", with the file's name";
 const ANGLES_DEGREES: &str = "[units] angles = \"deg\"";
@@ -116,6 +142,30 @@ fn turned(angles: Vector) -> Matrix3 {
     rotation_body_to_inertial(angles[0], angles[1], angles[2])
 }
 
+/// R_b^in of angles that were made of a quaternion in this order, read in the other one.
+fn reread(angles: Vector, order: QuaternionOrder) -> Matrix3 {
+    let parts = order.other().written(euler_to_quaternion(angles[0], angles[1], angles[2]));
+    quaternion_to_rotation(order.scalar_last(parts))
+}
+
+fn of_wxyz(instant: &Instant) -> Matrix3 {
+    reread(instant.angles, QuaternionOrder::ScalarFirst)
+}
+
+fn of_xyzw(instant: &Instant) -> Matrix3 {
+    reread(instant.angles, QuaternionOrder::ScalarLast)
+}
+
+fn length(vector: Vector) -> f64 {
+    dot(vector, vector).sqrt()
+}
+
+/// The angle, rad, of the one turn from an attitude to another.
+fn angle_between(one: &Instant, other: &Instant) -> f64 {
+    let trace: f64 = one.rotation.iter().zip(&other.rotation).map(|(row, turned)| dot(*row, *turned)).sum();
+    (0.5 * (trace - 1.0)).clamp(-1.0, 1.0).acos()
+}
+
 fn scaled(vector: Vector, by: Vector) -> Vector {
     std::array::from_fn(|axis| vector[axis] * by[axis])
 }
@@ -137,7 +187,13 @@ fn axes(rotation: &Matrix3) -> Stack {
 impl Relation {
     fn new(name: &'static str, formula: &'static str, applies: fn(&Motion) -> bool, hypotheses: Vec<Hypothesis>) -> Self {
         let misfit = hypotheses.iter().map(|_| Vec::new()).collect();
-        Self { name, formula, applies, hypotheses, misfit }
+        Self { name, formula, applies, hypotheses, misfit, way: None, of_way: (0.0, 0.0) }
+    }
+
+    /// The same with a way.
+    const fn along(mut self, way: Way) -> Self {
+        self.way = Some(way);
+        self
     }
 
     /// ṗ = R v.
@@ -145,7 +201,14 @@ impl Relation {
     pub fn position(quaternion: Option<&'static str>) -> Self {
         let at = |i: &Instant| stack(i.position);
         let read = |says, set, state, rate| Hypothesis { says, set, state, rate };
-        let order = quaternion.map(|set| read(REORDERED, set, at, |i| stack(rotate(&i.reordered, i.velocity))));
+        // A log of angles does not say what they were made of.
+        let order = match quaternion {
+            Some(set) => vec![read(REORDERED, set, at, |i| stack(rotate(&i.reordered, i.velocity)))],
+            None => vec![
+                read(MADE_OF_WXYZ, FROM_QUATERNION, at, |i| stack(rotate(&of_wxyz(i), i.velocity))),
+                read(MADE_OF_XYZW, FROM_QUATERNION, at, |i| stack(rotate(&of_xyzw(i), i.velocity))),
+            ],
+        };
         Self::new("position_rate", "p' = R v", |motion| motion.position && motion.heading, [vec![
             read("", "", at, |i| stack(rotate(&i.rotation, i.velocity))),
             read("the velocity is written in inertial axes", "velocity = \"inertial\"", at, |i| stack(i.velocity)),
@@ -170,7 +233,11 @@ impl Relation {
             read(YZX.says, YZX.set, at, |i| stack(rotate(&YZX.rotation(i.angles), i.velocity))),
             read(ZXY.says, ZXY.set, at, |i| stack(rotate(&ZXY.rotation(i.angles), i.velocity))),
             read(LEVEL, UNLEVEL, at, |i| stack(rotate(&turned(scaled(i.angles, [0.0, 0.0, 1.0])), i.velocity))),
-        ], order.into_iter().collect()].concat())
+        ], order].concat()).along(Way {
+            says: OTHER_DIRECTION,
+            measured: |start, end| length(std::array::from_fn(|axis| end.position[axis] - start.position[axis])),
+            rate: |i| length(i.velocity),
+        })
     }
 
     /// `quaternion` is how to say the other order, where the attitude is one.
@@ -198,7 +265,13 @@ impl Relation {
                 read("the angles are in degrees", ANGLES_DEGREES, |i| stack(turned(i.angles.map(|angle| angle * DEGREE))[2]), |i| stack(cross(turned(i.angles.map(|angle| angle * DEGREE))[2], i.rates))),
             ]);
         }
-        let order = quaternion.map(|set| read(REORDERED, set, |i| axes(&i.reordered), |i| turning(&i.reordered, i.rates)));
+        let order = match quaternion {
+            Some(set) => vec![read(REORDERED, set, |i| axes(&i.reordered), |i| turning(&i.reordered, i.rates))],
+            None => vec![
+                read(MADE_OF_WXYZ, FROM_QUATERNION, |i| axes(&of_wxyz(i)), |i| turning(&of_wxyz(i), i.rates)),
+                read(MADE_OF_XYZW, FROM_QUATERNION, |i| axes(&of_xyzw(i)), |i| turning(&of_xyzw(i), i.rates)),
+            ],
+        };
         Self::new("attitude_rate", "dR'/dt = R' x w", |motion| motion.heading, [vec![
             read("", "", |i| axes(&i.rotation), |i| turning(&i.rotation, i.rates)),
             read("the attitude is that of the inertial frame seen from the body (transposed)", TRANSPOSED, |i| axes(&transposed(&i.rotation)), |i| turning(&transposed(&i.rotation), i.rates)),
@@ -224,7 +297,11 @@ impl Relation {
             read(YZX.says, YZX.set, |i| axes(&YZX.rotation(i.angles)), |i| turning(&YZX.rotation(i.angles), i.rates)),
             read(ZXY.says, ZXY.set, |i| axes(&ZXY.rotation(i.angles)), |i| turning(&ZXY.rotation(i.angles), i.rates)),
             read(OF_ANGLES, TO_BODY, |i| axes(&i.rotation), |i| turning(&i.rotation, body_rates(i.angles[0], i.angles[1], i.rates))),
-        ], order.into_iter().collect()].concat())
+        ], order].concat()).along(Way {
+            says: OTHER_AXES,
+            measured: angle_between,
+            rate: |i| length(i.rates),
+        })
     }
 
     /// The recorded v̇ is the derivative of the body components of v.
@@ -289,6 +366,10 @@ impl Relation {
         let (error, size) = total(&self.misfit[0][first..]);
         // Where the nominal reading holds another leaves all.
         let holds = error <= HOLDS * size;
+        if let Some(way) = self.way.filter(|_| !holds) {
+            let of = motion.pieces(0).step_by(every).map(|(piece, _)| way.misfit(motion, &piece));
+            self.of_way = of.fold(self.of_way, |sum, one| (sum.0 + one.0, sum.1 + one.1));
+        }
         for reading in 1..self.hypotheses.len() {
             if holds {
                 let sizes = self.misfit[0][first..].iter().map(|block| (block.1, block.1)).collect::<Vec<_>>();
@@ -386,6 +467,7 @@ impl Relation {
         for (blocks, others) in self.misfit.iter_mut().zip(&other.misfit) {
             blocks.extend(others.chunks(together).map(total));
         }
+        self.of_way = (self.of_way.0 + other.of_way.0, self.of_way.1 + other.of_way.1);
     }
 
     /// Severity over all flights, `left` as of [`Relation::other_reading`]; `None` where the relation never applied.
@@ -419,6 +501,9 @@ impl Relation {
                 100.0 * self.share(index)
             );
             finding.set = Some(self.hypotheses[index].set.into());
+        } else if let Some(way) = self.way.filter(|_| nominal > POOR_SHARE && self.of_way.0 < SAME_WAY * self.of_way.1) {
+            finding.verdict = Severity::Fault;
+            finding.message = format!("{} does not hold; {}", self.formula, way.says);
         } else if nominal > POOR_SHARE {
             finding.verdict = Severity::Warning;
             finding.message = format!("{} holds poorly, and no other reading of the log does much better", self.formula);
@@ -450,6 +535,15 @@ fn running(blocks: &[(f64, f64)]) -> Vec<(f64, f64)> {
 /// Errors and sizes of several blocks.
 fn total(blocks: &[(f64, f64)]) -> (f64, f64) {
     blocks.iter().fold((0.0, 0.0), |sum, block| (sum.0 + block.0, sum.1 + block.1))
+}
+
+impl Way {
+    /// Squared error, and the square of the way itself.
+    fn misfit(&self, motion: &Motion, piece: &Range<usize>) -> (f64, f64) {
+        let measured = (self.measured)(&motion.instants[piece.start], &motion.instants[piece.end]);
+        let [says] = motion.integral(piece, |sample| [(self.rate)(&motion.instants[sample])]);
+        ((measured - says).powi(2), measured.powi(2))
+    }
 }
 
 impl Hypothesis {

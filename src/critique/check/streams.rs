@@ -4,7 +4,9 @@
 use super::finding::{Finding, Severity, finding};
 use super::flights::{CONTROLS, MOST, in_flights, of_all};
 use super::lines;
-use super::robust::{lower_quartile, median};
+use super::on_change;
+use super::robust::{NORMAL, lower_quartile, median};
+use super::slew;
 use crate::flight::{Column, Flight, Targets};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -34,7 +36,7 @@ const LEAST_NOISE: f64 = 0.03;
 pub(super) const HELD: &str = "held_";
 
 /// Position matters for the height above ground alone.
-const POSITION: [Column; 3] = [Column::X, Column::Y, Column::Z];
+pub(super) const POSITION: [Column; 3] = [Column::X, Column::Y, Column::Z];
 /// Columns whose rests mean something: a stick may rest.
 fn measured() -> impl Iterator<Item = Column> {
     Column::ALL.into_iter().filter(|column| !CONTROLS.contains(column))
@@ -59,9 +61,13 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let is_rounded = |column: Column| grains.iter().any(|entry| entry.0 == column && entry.1.steps.iter().any(Option::is_some));
     let mut findings = Vec::new();
     let mut held: Vec<(Hold, Vec<Column>)> = Vec::new();
+    let sent = on_change::findings(flights, measured().filter(present).filter(|column| !is_rounded(*column)));
     for column in measured().filter(present) {
         let rests = Rests::of(flights, column);
-        findings.extend(rests.frozen(flights, column));
+        // One that is sent on change rests as long as nothing changes.
+        if !sent.iter().any(|entry| entry.1.contains(&column)) {
+            findings.extend(rests.frozen(flights, column));
+        }
         let Some(hold) = rests.held(flights).filter(|_| !is_rounded(column)) else { continue };
         match held.iter_mut().find(|(other, _)| *other == hold) {
             Some((_, columns)) => columns.push(column),
@@ -77,6 +83,8 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         }
     }
     findings.extend(held.into_iter().filter_map(|(hold, columns)| of_hold(flights, &hold, &columns)));
+    findings.extend(sent.into_iter().map(|entry| entry.0));
+    findings.extend(slew::findings(flights, &|column| is_rounded(column)));
     findings.extend(lines::findings(flights, &|column| is_rounded(column)));
     let rounded: Vec<(Column, Finding)> =
         grains.into_iter().filter_map(|(column, grains)| Some((column, grains.finding(flights, column)?))).collect();
@@ -312,13 +320,18 @@ fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
     (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
 }
 
-/// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there.
+/// Leaps make third differences of which the usual one is this part of the root mean square, or less.
+const LEAPS: f64 = 0.2;
+
+/// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there. Leaps are no noise.
 fn noise_of(flight: &Flight, column: Column) -> f64 {
     let second = (1.0 / flight.step_s).round().max(8.0) as usize;
     let of_second = |values: &[f64]| {
-        let third = values.windows(4).map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]);
+        let third: Vec<f64> = values.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+        let square = third.iter().map(|difference| difference * difference).sum::<f64>() / third.len() as f64;
+        let usual = NORMAL * median(third).unwrap_or(0.0);
         // Coefficients 1, 3, 3, 1: their squares add up to 20.
-        (third.map(|difference| difference * difference).sum::<f64>() / (values.len() - 3) as f64 / 20.0).sqrt()
+        if usual > 0.0 && usual < LEAPS * square.sqrt() { usual / 20.0_f64.sqrt() } else { (square / 20.0).sqrt() }
     };
     let mut sizes: Vec<f64> = flight.column(column).chunks_exact(second).map(of_second).collect();
     flight.rest();
