@@ -35,9 +35,9 @@ pub struct Plan {
     pub reserved: bool,
 }
 
-/// What is reported. Seeds 80000 to 80002, 83000 to 83006 and 85000 to 85007, with clean sets 81000 to 81399, 84000 to 84399 and 86100 to 86499, were spent: looked
+/// What is reported. Seeds 80000 to 80002, 83000 to 83006 and 85000 to 85009, with clean sets 81000 to 81399, 84000 to 84399 and 86100 to 86499, were spent: looked
 /// at before the checks were as they are.
-pub const REPORTED: Plan = Plan { seeds: 85_008..85_018, clean: 400, every: 1, reserved: true };
+pub const REPORTED: Plan = Plan { seeds: 85_010..85_020, clean: 400, every: 1, reserved: true };
 /// On which checks are tuned.
 pub const DEVELOPMENT: Plan = Plan { seeds: 500..502, clean: 400, every: 1, reserved: false };
 /// Some minutes.

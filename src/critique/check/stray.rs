@@ -77,7 +77,7 @@ fn agreed(seen: &[Seen], pieces: &[Range<usize>], together: usize) -> Option<(Ve
     let mean = |part: &[Seen], side: fn(&Seen) -> Vector| -> Vector {
         std::array::from_fn(|axis| part.iter().map(|one| side(one)[axis]).sum::<f64>() / part.len() as f64)
     };
-    let (mut sizes, mut changes, mut of_own, mut left) = ([0.0; 3], 0.0, 0.0, 0.0);
+    let (mut sizes, mut of_own, mut left) = ([0.0; 3], 0.0, 0.0);
     let mut count = 0.0;
     for at in (0..(seen.len() + 1).saturating_sub(2 * together)).step_by(together) {
         if pieces[at..at + 2 * together].windows(2).any(|pair| pair[0].end != pair[1].start) {
@@ -89,12 +89,14 @@ fn agreed(seen: &[Seen], pieces: &[Range<usize>], together: usize) -> Option<(Ve
         for axis in 0..3 {
             let [by_moved, by_own] = [moved_after[axis] - moved[axis], own_after[axis] - own[axis]];
             sizes[axis] += moved[axis] * moved[axis];
-            changes += by_moved * by_moved;
             of_own += by_own * by_own;
             left += (by_own - by_moved).powi(2);
         }
         count += 1.0;
     }
-    let is_slow = changes < SLOW * SLOW * sizes.iter().sum::<f64>();
-    (left < LITTLE * of_own).then(|| (sizes.map(|size| (size / count).sqrt()), is_slow))
+    // From one piece to the next the noise of a position would be most of it, so the other side is asked.
+    let changes = seen.windows(2).flat_map(|pair| (0..3).map(|axis| (pair[1].by_own[axis] - pair[0].by_own[axis]).powi(2)));
+    let change = changes.sum::<f64>() / (seen.len() - 1) as f64;
+    let sizes = sizes.map(|size| size / count);
+    (left < LITTLE * of_own).then(|| (sizes.map(f64::sqrt), change < SLOW * SLOW * sizes.iter().sum::<f64>()))
 }
