@@ -468,13 +468,13 @@ impl Trial<'_> {
     fn wraps(&self) -> Option<(f64, Kind)> {
         let channel = self.broken.channel;
         let column = if self.is_state { &channel.state } else { &channel.rate };
-        let mut steps: Vec<f64> = column.windows(2).map(|pair| (pair[1] - pair[0]).abs()).collect();
-        steps.sort_unstable_by(f64::total_cmp);
-        let (largest, usual) = (*steps.last()?, steps[steps.len() / 2]);
-        let leaps = &steps[steps.partition_point(|step| *step < (1.0 - NEAR) * largest)..];
-        let range = leaps[leaps.len() / 2];
-        let before = steps[..steps.len() - leaps.len()].last().copied().unwrap_or(0.0);
-        if leaps.len() < 2 || range < FAR * usual || before > 0.5 * range {
+        let steps = || column.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+        let largest = steps().fold(0.0, f64::max);
+        let is_leap = |step: &f64| *step > (1.0 - NEAR) * largest;
+        let usual = steps().sum::<f64>() / column.len() as f64;
+        let before = steps().filter(|step| !is_leap(step)).fold(0.0, f64::max);
+        let range = median(steps().filter(is_leap).collect())?;
+        if steps().filter(is_leap).count() < 2 || range < FAR * usual || before > 0.5 * range {
             return None;
         }
         // Each leap undone, from a first value that may be beyond already.

@@ -8,9 +8,9 @@
 
 use super::causes::{Broken, Cause, Kind, LITTLE};
 use super::channels::{Channel, Stream};
-use super::increments::{Motion, Vector};
+use super::increments::{Instant, Motion, Vector};
 use crate::flight::Column;
-use crate::flight::attitude::{cross, euler_rates};
+use crate::flight::attitude::{Matrix3, cross, euler_rates};
 use nalgebra::{SMatrix, SVector};
 use std::ops::Range;
 
@@ -117,8 +117,28 @@ impl Suspect {
         }
     }
 
+    /// At each sample, by rows how the state of [`Suspect::moved`] moves by a unit along or about each body axis.
+    fn moves(self, motion: &Motion) -> Vec<Matrix3> {
+        let of = |instant: &Instant| match self.moved() {
+            Stream::Attitude => {
+                let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                    .map(|rates| euler_rates(instant.angles[0], instant.angles[1], rates));
+                std::array::from_fn(|axis| [x[axis], y[axis], z[axis]])
+            }
+            _ => instant.rotation,
+        };
+        motion.instants.iter().map(of).collect()
+    }
+
     /// What a piece says of M and b in a channel; `None` where the vector does not stand in it.
-    fn row(self, part: Part, motion: &Motion, channel: &Channel, piece: &Range<usize>) -> Option<[f64; COLUMNS]> {
+    fn row(
+        self,
+        part: Part,
+        motion: &Motion,
+        moves: &[Matrix3],
+        channel: &Channel,
+        piece: &Range<usize>,
+    ) -> Option<[f64; COLUMNS]> {
         let axis = channel.column as usize % 3;
         let is_state = matches!(self, Self::Velocity | Self::Rates);
         if channel.stream == self.own() {
@@ -135,13 +155,7 @@ impl Suspect {
         }
         (is_state && channel.stream == self.moved()).then(|| {
             motion.integral(piece, |k| {
-                let (instant, values) = (&motion.instants[k], part.at(motion, k));
-                // How the row's state moves by a unit about or along each body axis.
-                let moves: Vector = match self {
-                    Self::Velocity => instant.rotation[axis],
-                    _ => [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-                        .map(|rates| euler_rates(instant.angles[0], instant.angles[1], rates)[axis]),
-                };
+                let (moves, values) = (moves[k][axis], part.at(motion, k));
                 std::array::from_fn(|at| if at < 9 { -moves[at / 3] * values[at % 3] } else { -moves[at - 9] })
             })
         })
@@ -156,6 +170,14 @@ struct Fit {
     gains: [Vector; 3],
 }
 
+/// The channels of both relations of a vector, and what each counts.
+struct Related<'a> {
+    motion: &'a Motion,
+    moves: &'a [Matrix3],
+    channels: &'a [&'a Channel],
+    weights: &'a [f64],
+}
+
 /// Squares of all errors of the two relations, in parts of what changes in each, and what the fit leaves of them.
 struct Sums {
     gram: SMatrix<f64, COLUMNS, COLUMNS>,
@@ -164,12 +186,13 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(suspect: Suspect, part: Part, motion: &Motion, channels: &[&Channel], weights: &[f64]) -> Self {
+    fn of(suspect: Suspect, part: Part, of: &Related<'_>) -> Self {
+        let Related { motion, moves, channels, weights } = of;
         let mut sums = Self { gram: SMatrix::zeros(), moment: SVector::zeros(), square: 0.0 };
-        for (channel, weight) in channels.iter().zip(weights) {
+        for (channel, weight) in channels.iter().zip(*weights) {
             for (piece, error) in channel.pieces.iter().zip(channel.errors()) {
                 sums.square += weight * error * error;
-                if let Some(row) = suspect.row(part, motion, channel, piece) {
+                if let Some(row) = suspect.row(part, motion, moves, channel, piece) {
                     let row = SVector::from(row);
                     sums.gram += *weight * row * row.transpose();
                     sums.moment += *weight * error * row;
@@ -199,8 +222,8 @@ impl Sums {
     }
 }
 
-fn fitted(suspect: Suspect, part: Part, motion: &Motion, channels: &[&Channel], weights: &[f64]) -> Option<(Fit, f64)> {
-    let sums = Sums::of(suspect, part, motion, channels, weights);
+fn fitted(suspect: Suspect, part: Part, of: &Related<'_>) -> Option<(Fit, f64)> {
+    let sums = Sums::of(suspect, part, of);
     let (left, solution) = sums.fit(|_| true)?;
     let by_itself = suspect.itself() == Some(part);
     let (left_by_columns, _) = sums.fit(|at| at >= 9 || by_itself && at % 4 == 0)?;
@@ -236,15 +259,18 @@ fn of_stream(own: Stream, motion: &Motion, channels: &[Channel], broken: &[Broke
     if weights.iter().any(|weight| !weight.is_finite()) {
         return None;
     }
+    let moves = suspects[0].moves(motion);
+    let related = Related { motion, moves: &moves, channels: &used, weights: &weights };
     let tried = suspects.iter().flat_map(|suspect| PARTS.map(|part| (*suspect, part)));
     let fits = tried.filter_map(|(suspect, part)| {
-        let (fit, square) = fitted(suspect, part, motion, &used, &weights)?;
+        let (fit, square) = fitted(suspect, part, &related)?;
         Some((suspect, part, fit, square))
     });
     let (suspect, part, fit, square) = fits.min_by(|one, other| one.2.left.total_cmp(&other.2.left))?;
-    let single: f64 = such.iter().map(|one| one.least_left(motion) / size(one.channel.stream)).sum();
+    // What single columns leave takes longest, and is asked last.
+    let single = || such.iter().map(|one| one.least_left(motion) / size(one.channel.stream)).sum::<f64>();
     let is_beyond = |least: f64| fit.left < BEYOND_SINGLE * least;
-    let is_cause = fit.left < LITTLE * square && is_beyond(single) && is_beyond(fit.left_by_columns);
+    let is_cause = fit.left < LITTLE * square && is_beyond(fit.left_by_columns) && is_beyond(single());
     is_cause.then(|| Cause { kind: Kind::Holds(part, fit.gains), columns: suspect.columns().to_vec(), or: None, from_s: None })
 }
 

@@ -7,9 +7,7 @@ use super::robust::median;
 use super::streams::POSITION;
 use crate::flight::{Column, Flight};
 
-/// A column that was sent on change rests in this share of the samples at least …
-const RESTING: f64 = 0.5;
-/// … steps so often …
+/// A column that was sent on change steps so often …
 const FEWEST_STEPS: usize = 20;
 /// … and its smallest steps, but for one in twenty, are this part of the usual one: none is smaller than what had to be reached.
 const SMALLEST: f64 = 0.6;
@@ -22,13 +20,12 @@ const EXACT: f64 = 0.02;
 /// How names of these findings begin.
 const ON_CHANGE: &str = "on_change_";
 
-/// The change that has to be reached in each flight where there is one.
+/// The change that has to be reached in a flight in which most samples are those before them; `None` where there is none.
 fn least(flight: &Flight, column: Column) -> Option<f64> {
     let values = flight.column(column);
     let mut steps: Vec<f64> = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| *step > 0.0).collect();
-    let rests = values.len().saturating_sub(1 + steps.len()) as f64 > RESTING * values.len() as f64;
     flight.rest();
-    if !rests || steps.len() < FEWEST_STEPS {
+    if steps.len() < FEWEST_STEPS {
         return None;
     }
     steps.sort_unstable_by(f64::total_cmp);
@@ -38,12 +35,12 @@ fn least(flight: &Flight, column: Column) -> Option<f64> {
     (smallest > SMALLEST * usual && !is_rounded).then_some(smallest)
 }
 
-/// Columns that were sent on change, those of the same flights in one finding.
-pub(super) fn findings(flights: &[Flight], columns: impl Iterator<Item = Column>) -> Vec<(Finding, Vec<Column>)> {
+/// Columns that were sent on change, those of the same flights in one finding; `columns` with the flights in which they rest most of the time.
+pub(super) fn findings(flights: &[Flight], columns: impl Iterator<Item = (Column, Vec<usize>)>) -> Vec<(Finding, Vec<Column>)> {
     let mut alike: Vec<(Vec<usize>, Vec<Column>, Vec<f64>)> = Vec::new();
-    for column in columns {
+    for (column, resting) in columns {
         let each: Vec<(usize, f64)> =
-            flights.iter().enumerate().filter_map(|(index, flight)| Some((index, least(flight, column)?))).collect();
+            resting.into_iter().filter_map(|index| Some((index, least(&flights[index], column)?))).collect();
         let Some(change) = median(each.iter().map(|entry| entry.1).collect()) else { continue };
         let indices: Vec<usize> = each.into_iter().map(|entry| entry.0).collect();
         match alike.iter_mut().find(|(others, of, _)| shares(others, &indices) && of[0].unit() == column.unit()) {
@@ -110,7 +107,6 @@ mod tests {
         let change = least(&on_change, Column::Roll).expect("it was sent on change");
         assert!((0.06..0.07).contains(&change), "{change}");
         for (how, other) in [
-            ("smooth", flight("smooth", smooth)),
             ("rounded", flight("rounded", |k| (smooth(k) / 0.06).round() * 0.06)),
             ("held", flight("held", |k| smooth(k - k % 20))),
         ] {

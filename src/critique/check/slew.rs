@@ -16,8 +16,7 @@ const FEWEST: usize = 50;
 fn limit(flight: &Flight, column: Column) -> Option<f64> {
     let values = flight.column(column);
     let steps = || values.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-    let largest = steps().fold(0.0, f64::max);
-    let moving = steps().filter(|step| *step > 0.0).count();
+    let (largest, moving) = steps().fold((0.0, 0), |(largest, moving), step| (step.max(largest), moving + usize::from(step > 0.0)));
     let at_limit = steps().filter(|step| *step > (1.0 - EXACT) * largest).count();
     flight.rest();
     (largest > 0.0 && at_limit >= FEWEST && at_limit as f64 > SHARE * moving as f64).then_some(largest / flight.step_s)

@@ -61,9 +61,10 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
     let is_rounded = |column: Column| grains.iter().any(|entry| entry.0 == column && entry.1.steps.iter().any(Option::is_some));
     let mut findings = Vec::new();
     let mut held: Vec<(Hold, Vec<Column>)> = Vec::new();
-    let sent = on_change::findings(flights, measured().filter(present).filter(|column| !is_rounded(*column)));
-    for column in measured().filter(present) {
-        let rests = Rests::of(flights, column);
+    let rests: Vec<(Column, Rests)> = measured().filter(present).map(|column| (column, Rests::of(flights, column))).collect();
+    let resting = rests.iter().filter(|entry| !is_rounded(entry.0)).map(|(column, rests)| (*column, rests.resting()));
+    let sent = on_change::findings(flights, resting);
+    for (column, rests) in rests {
         // One that is sent on change rests as long as nothing changes.
         if !sent.iter().any(|entry| entry.1.contains(&column)) {
             findings.extend(rests.frozen(flights, column));
@@ -130,6 +131,15 @@ impl Rests {
         };
         let (counts, longest) = flights.iter().map(of_flight).unzip();
         Self { counts, longest }
+    }
+
+    /// Flights in which most samples are those before them.
+    fn resting(&self) -> Vec<usize> {
+        let rests = |counts: &BTreeMap<usize, usize>| {
+            let samples: usize = counts.iter().map(|(length, count)| length * count).sum();
+            2 * counts.values().sum::<usize>() < samples
+        };
+        self.counts.iter().enumerate().filter(|entry| rests(entry.1)).map(|entry| entry.0).collect()
     }
 
     /// The rest to which half of all samples belong at most.
@@ -294,8 +304,9 @@ fn noise(flights: &[Flight], column: Column) -> Option<Finding> {
     // In other units the noise is another, too, but no other share.
     let share = |index: usize| each[index] / variance(&flights[index..=index], column).sqrt();
     let usual_share = lower_quartile((0..each.len()).map(share).collect())?;
+    let is_one = |&index: &usize| each[index] > least && share(index) > 0.5 * NOISIER * usual_share;
     let such: Vec<usize> =
-        (0..each.len()).filter(|&index| each[index] > least && share(index) > 0.5 * NOISIER * usual_share).collect();
+        (0..each.len()).filter(is_one).filter(|&index| noise_without_leaps(&flights[index], column) > least).collect();
     let size = median(such.iter().map(|&index| each[index]).collect())?;
     let name = column.name();
     let message = format!(
@@ -320,19 +331,33 @@ fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
     (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
 }
 
+/// Third differences; of white noise their squares are 20 times its own: coefficients 1, 3, 3, 1.
+fn third_differences(values: &[f64]) -> impl Iterator<Item = f64> + '_ {
+    values.windows(4).map(|w| w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0])
+}
+
+/// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there.
+fn noise_of(flight: &Flight, column: Column) -> f64 {
+    let square = |values: &[f64]| third_differences(values).map(|difference| difference * difference).sum::<f64>();
+    quietest(flight, column, |values| (square(values) / (values.len() - 3) as f64 / 20.0).sqrt())
+}
+
 /// Leaps make third differences of which the usual one is this part of the root mean square, or less.
 const LEAPS: f64 = 0.2;
 
-/// Root mean square of white noise, from third differences in the quietest tenth of the seconds: what a vehicle does is smooth there. Leaps are no noise.
-fn noise_of(flight: &Flight, column: Column) -> f64 {
-    let second = (1.0 / flight.step_s).round().max(8.0) as usize;
-    let of_second = |values: &[f64]| {
-        let third: Vec<f64> = values.windows(4).map(|w| (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).abs()).collect();
+/// The same, but of a column that leaps now and then by its usual third difference: leaps are no noise.
+fn noise_without_leaps(flight: &Flight, column: Column) -> f64 {
+    quietest(flight, column, |values| {
+        let third: Vec<f64> = third_differences(values).map(f64::abs).collect();
         let square = third.iter().map(|difference| difference * difference).sum::<f64>() / third.len() as f64;
         let usual = NORMAL * median(third).unwrap_or(0.0);
-        // Coefficients 1, 3, 3, 1: their squares add up to 20.
         if usual > 0.0 && usual < LEAPS * square.sqrt() { usual / 20.0_f64.sqrt() } else { (square / 20.0).sqrt() }
-    };
+    })
+}
+
+/// A number of each second of a column, in the quietest tenth of them.
+fn quietest(flight: &Flight, column: Column, of_second: impl Fn(&[f64]) -> f64) -> f64 {
+    let second = (1.0 / flight.step_s).round().max(8.0) as usize;
     let mut sizes: Vec<f64> = flight.column(column).chunks_exact(second).map(of_second).collect();
     flight.rest();
     sizes.sort_unstable_by(f64::total_cmp);
