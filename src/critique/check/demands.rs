@@ -1,10 +1,10 @@
 //! Sticks that are the demand of a rate controller, as with a gyro that holds the heading: the rate is what the stick said a moment before, nearly without rest. What
 //! moves the axis is then not in the log, and the lag of the loop looks like one of the aircraft.
 
-use super::causes::lagged;
 use super::finding::Finding;
 use super::flights::of_set_or_flights;
 use super::increments::Motion;
+use super::repairs::lagged;
 use super::robust::median;
 use super::sticks::STICKS;
 use crate::flight::Flight;

@@ -37,6 +37,7 @@ mod odd;
 mod on_change;
 mod regression;
 mod relations;
+mod repairs;
 mod report;
 mod robust;
 mod saturation;

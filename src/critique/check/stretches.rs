@@ -25,6 +25,15 @@ const SHARE: f64 = 0.1;
 /// … and in all together they answer in this part.
 const REST: f64 = 0.3;
 
+/// Stretches of a flight: those in which axes go deaf, those in which they answer, all that tell, and when the first deaf one begins, s.
+#[derive(Default)]
+struct Stretches {
+    deaf: usize,
+    answering: usize,
+    telling: usize,
+    first_s: Option<f64>,
+}
+
 /// Flights with such stretches; nothing of those in `except`.
 pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<usize>) -> Option<Finding> {
     let judged: Vec<&(usize, Regressions)> = sticks.flights.iter().filter(|(flight, _)| !except.contains(flight)).collect();
@@ -45,29 +54,29 @@ pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<us
         let own = regressions[0].blocks();
         (0..own).map(move |block| (*flight, block))
     });
-    let mut of_flight: BTreeMap<usize, [usize; 3]> = BTreeMap::new();
-    let mut first_s = None;
+    let mut of_flight: BTreeMap<usize, Stretches> = BTreeMap::new();
     for (at, (flight, block)) in blocks.enumerate() {
-        let sums = of_flight.entry(flight).or_default();
+        let own = of_flight.entry(flight).or_default();
         let is_deaf = count(at, &|mended| mended < -SPOILT) >= TOGETHER;
-        sums[0] += usize::from(is_deaf);
-        sums[1] += usize::from(count(at, &|mended| mended > MENDED) >= TOGETHER);
-        sums[2] += usize::from(count(at, &|_| true) >= TOGETHER);
-        first_s = first_s.or_else(|| is_deaf.then_some(SHORT_BLOCK_S * block as f64));
+        own.deaf += usize::from(is_deaf);
+        own.answering += usize::from(count(at, &|mended| mended > MENDED) >= TOGETHER);
+        own.telling += usize::from(count(at, &|_| true) >= TOGETHER);
+        own.first_s = own.first_s.or_else(|| is_deaf.then_some(SHORT_BLOCK_S * block as f64));
     }
-    let total = of_flight.values().fold([0; 3], |sum, one| [sum[0] + one[0], sum[1] + one[1], sum[2] + one[2]]);
     let part = |count: usize, of: usize| count as f64 / of.max(1) as f64;
-    let such: Vec<usize> =
-        of_flight.iter().filter(|(_, sums)| sums[0] > 1 && part(sums[0], sums[2]) > SHARE).map(|entry| *entry.0).collect();
-    if such.is_empty() || part(total[1], total[2]) < REST {
+    let is_told = |own: &Stretches| own.deaf > 1 && part(own.deaf, own.telling) > SHARE;
+    let such: Vec<usize> = of_flight.iter().filter(|(_, own)| is_told(own)).map(|entry| *entry.0).collect();
+    let total = |of: fn(&Stretches) -> usize| of_flight.values().map(of).sum::<usize>();
+    if such.is_empty() || part(total(|own| own.answering), total(|own| own.telling)) < REST {
         return None;
     }
+    let of_such = |of: fn(&Stretches) -> usize| such.iter().map(|flight| of(&of_flight[flight])).sum::<usize>();
     let message = format!(
-        "the controls do not move the axes in some stretches as they do in the rest ({} of {} in which it moves enough, the first from {:.0} s on): another \
+        "the controls do not move the axes in some stretches as they do in the rest ({} of {} in which it moves enough, in the first flight from {:.0} s on): another \
          pilot or an autopilot flew, or the sticks of another moment were recorded",
-        total[0],
-        total[2],
-        first_s.unwrap_or(0.0)
+        of_such(|own| own.deaf),
+        of_such(|own| own.telling),
+        of_flight[&such[0]].first_s.unwrap_or(0.0)
     );
     let found = of_set_or_flights("deaf_stretches", &such, of_flight.len(), &message, None, flights);
     Some(Finding { verdict: Severity::Fault, ..found })
