@@ -126,6 +126,10 @@ pub fn train(browser: &Browser) -> Result<()> {
     browser.click("#train")
 }
 
+/// From here on the page asks a second late how the training stands.
+const LATE: &str = "const now = window.fetch; window.fetch = async (...what) => { \
+    if (/\\/training$/.test(new URL(what[0], location.href).pathname)) await new Promise((go) => setTimeout(go, 1000)); return now(...what); };";
+
 #[test]
 fn a_network_is_trained_while_its_losses_are_watched_and_rolled_out() -> Result<()> {
     let Some(browser) = Browser::start(1280, 720)? else {
@@ -144,6 +148,8 @@ fn a_network_is_trained_while_its_losses_are_watched_and_rolled_out() -> Result<
         "/epoch 1 of 3, step [1-9][0-9]* of [0-9]+, loss .* left/.test(document.querySelector('#training .progress').textContent)",
     )?;
     browser.wait("document.querySelector('[data-view=train] .spin')")?;
+    // However late it is told that the training has stopped, what may be gone on with is shown.
+    browser.run(LATE)?;
     browser.click("#train-stop")?;
     browser.wait("document.querySelector('#training').dataset.progress === 'stopped'")?;
     browser.click("[data-go-on=run]")?;

@@ -39,8 +39,12 @@ let asked = 0;
 export async function show(app, into) {
   window.clearTimeout(timer);
   const mine = ++asked;
-  /** @type {[import('./api.js').TrainingPlan, import('./api.js').Training, import('./api.js').Runs]} */
-  const [plan, training, runs] = await Promise.all([ask('training_plan'), ask('training'), ask('runs')]);
+  // How the training stands is asked first: what it leaves behind at its end is then there, or it is looked at again.
+  /** @type {import('./api.js').Training} */
+  const training = await ask('training');
+  if (mine !== asked) return;
+  /** @type {[import('./api.js').TrainingPlan, import('./api.js').Runs]} */
+  const [plan, runs] = await Promise.all([ask('training_plan'), ask('runs')]);
   const isHere = () => mine === asked && read().view === 'train';
   if (!isHere()) return;
   const goes = running(training);
