@@ -6,6 +6,7 @@ use super::channels::ChannelValues;
 use super::compare::{Comparison, ModelError, PartError};
 use super::digits::{Kind, significant};
 use super::regime::Regime;
+use super::shares::Shares;
 use super::wrap::{WIDTH, clipped, wrapped};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::split::Part;
@@ -63,6 +64,37 @@ impl Comparison {
     /// Whether a model is the best in a measure and column (`vx_dot` … `mean`), beyond chance.
     pub fn is_best(&self, measure: &str, column: &str, model: usize) -> bool {
         self.best.get(measure).and_then(|columns| columns.get(column)).is_some_and(|best| *best == model)
+    }
+
+    /// What matters first: what is compared, the root mean square errors with their intervals, and who explains how much, in a sentence.
+    ///
+    /// # Examples
+    /// ```
+    /// use phyture::critique::Comparison;
+    ///
+    /// fn tell(comparison: &Comparison) {
+    ///     println!("{}", comparison.in_short());
+    /// }
+    /// ```
+    pub const fn in_short(&self) -> InShort<'_> {
+        InShort(self)
+    }
+
+    fn what_is_compared(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}", wrapped("", &self.basis()))?;
+        if self.own_from_first_half {
+            writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
+        }
+        if let Some(caution) = self.caution() {
+            writeln!(f, "{}", wrapped("", &caution))?;
+        }
+        Ok(())
+    }
+
+    fn not_finite(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(model) = self.models.iter().find(|model| model.not_finite > 0) else { return Ok(()) };
+        let text = "predictions are not finite numbers; its measures are left open (–) in the channels they hit";
+        writeln!(f, "\n{}", wrapped("", &format!("`{}`: {} {text}", model.name, model.not_finite)))
     }
 
     fn measure_table(&self, f: &mut fmt::Formatter<'_>, (title, words, kind, measure): Measure) -> fmt::Result {
@@ -215,15 +247,27 @@ pub const FLOOR: &str = "Floor: what is left of the recorded accelerations witho
 pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its \
                                        first half. The same for every row.";
 
+/// A comparison without its tables of other measures, parts, shares and intervals: [`Comparison::in_short`].
+pub struct InShort<'a>(&'a Comparison);
+
+impl fmt::Display for InShort<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(comparison) = self;
+        comparison.what_is_compared(f)?;
+        comparison.measure_table(f, MEASURES[0])?;
+        comparison.not_finite(f)?;
+        writeln!(f, "\n{}", wrapped("", LEGEND))?;
+        if comparison.floor.is_some() {
+            writeln!(f, "{}", wrapped("", FLOOR))?;
+        }
+        let mut sentences = comparison.shares.iter().filter_map(Shares::sentence);
+        sentences.try_for_each(|sentence| write!(f, "\n{}", wrapped("", &sentence)))
+    }
+}
+
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}", wrapped("", &self.basis()))?;
-        if self.own_from_first_half {
-            writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
-        }
-        if let Some(caution) = self.caution() {
-            writeln!(f, "{}", wrapped("", &caution))?;
-        }
+        self.what_is_compared(f)?;
         for (index, measure) in MEASURES.into_iter().enumerate() {
             self.measure_table(f, measure)?;
             if index == 0 {
@@ -235,10 +279,7 @@ impl fmt::Display for Comparison {
         }
         self.part_table(f, "manoeuvre")?;
         self.part_table(f, "regime")?;
-        if let Some(model) = self.models.iter().find(|model| model.not_finite > 0) {
-            let text = "predictions are not finite numbers; its measures are left open (–) in the channels they hit";
-            writeln!(f, "\n{}", wrapped("", &format!("`{}`: {} {text}", model.name, model.not_finite)))?;
-        }
+        self.not_finite(f)?;
         writeln!(f, "\n{}", wrapped("", LEGEND))?;
         if self.floor.is_some() {
             writeln!(f, "{}", wrapped("", FLOOR))?;
@@ -322,7 +363,9 @@ mod tests {
         let flights = flights(|_, sample, _| (sample % 7) as f64)?;
         let windows = every_window(&flights);
         let row = |name: &str, value: f64| Row { name: name.into(), predicted: vec![PerChannel::splat(value); windows.len()] };
-        let text = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Part::All)?.to_string();
+        let compared = compare(&flights, &windows, &[row("mean of the data", 3.0), row("zero", 0.0)], Part::All)?;
+        let (text, short) = (compared.to_string(), compared.in_short().to_string());
+        assert!(text.lines().take(6).eq(short.lines().take(6)) && !short.contains("RMSE by"), "{short}");
         assert!(text.starts_with("200 windows of all flights, those used for fitting included, every sample"), "{text}");
         assert!(text.contains("rad/s²") && text.contains("RMSE by manoeuvre") && text.contains("forward"), "{text}");
         let rmse: Vec<&str> = text.lines().skip_while(|line| !line.starts_with("RMSE")).skip(3).take(4).collect();

@@ -108,6 +108,8 @@ pub struct StepText {
     pub rmse: Option<ChannelValues>,
     /// Its 95 % interval.
     pub ci95: Option<Intervals>,
+    /// Share of the variance of what was measured that it predicts.
+    pub r2: Option<ChannelValues>,
     /// Whether its numbers come from a calibration of this very model.
     pub calibrated: bool,
 }
@@ -168,8 +170,9 @@ impl Studio {
         let text = |(index, state): (usize, &Arc<State>)| StepText {
             id: state.id,
             did: state.did.clone(),
-            rmse: errors.of.get(index).map(|found| found.0),
-            ci95: errors.of.get(index).map(|found| found.1),
+            rmse: errors.of.get(index).map(|found| found.rmse),
+            ci95: errors.of.get(index).map(|found| found.ci95),
+            r2: errors.of.get(index).map(|found| found.r2),
             calibrated: state.calibration.is_some(),
         };
         let (kept, unkept, left) = {

@@ -39,8 +39,16 @@ pub enum PartWanted {
 /// A state, a part, and whether flights are judged on their second halves for the sake of another state.
 type Key = (u64, PartWanted, bool);
 
-/// An error by channel with its interval.
-type Errors = (ChannelValues, Intervals);
+/// How well a state does, by channel.
+#[derive(Clone, Copy)]
+pub(super) struct Errors {
+    /// Root mean square error.
+    pub rmse: ChannelValues,
+    /// Its 95 % interval.
+    pub ci95: Intervals,
+    /// Share of the variance predicted.
+    pub r2: ChannelValues,
+}
 
 /// The errors of a state, what they were judged on, and whether that is second halves.
 type Known = (Errors, String, bool);
@@ -137,7 +145,8 @@ impl Judge {
                 None => {
                     let judged = self.beside(set, split, state, PartWanted::Judged, beside)?;
                     let model = &judged.comparison.models[1];
-                    let found = ((model.rmse, model.rmse_ci95), judged.comparison.basis(), judged.comparison.own_from_first_half);
+                    let errors = Errors { rmse: model.rmse, ci95: model.rmse_ci95, r2: model.r2 };
+                    let found = (errors, judged.comparison.basis(), judged.comparison.own_from_first_half);
                     held(&self.errors).insert(key, found.clone());
                     found
                 }

@@ -22,7 +22,9 @@ fn settled(browser: &Browser) -> Result<()> {
 
 /// From the map to the worst ten seconds of the yaw acceleration, and closer.
 fn look(browser: &Browser, url: &str) -> Result<()> {
-    browser.open(&format!("{url}&view=where&channel=5"))?;
+    // The yaw acceleration is the one that is predicted worst.
+    browser.open(&format!("{url}&view=where"))?;
+    browser.wait("location.hash.includes('channel=5')")?;
     browser.wait("document.querySelectorAll('#map tbody tr').length === 5")?;
     browser.click("#map tbody tr:nth-child(2) button[data-channel=wz_dot]")?;
     browser

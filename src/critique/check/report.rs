@@ -42,16 +42,50 @@ impl CheckReport {
         names.dedup();
         names
     }
+
+    /// What a person has to know first: the summary, and each finding that is not as expected.
+    ///
+    /// # Examples
+    /// ```
+    /// # #[cfg(not(feature = "sim"))]
+    /// # fn main() {}
+    /// # #[cfg(feature = "sim")]
+    /// # fn main() -> phyture::Result<()> {
+    /// use phyture::critique::check::check;
+    /// use phyture::sim::{Simulation, simulate};
+    ///
+    /// let report = check(&simulate(&Simulation { minutes: 4.0, ..Simulation::baseline() })?, None);
+    /// assert!(report.in_short().lines().count() < report.to_string().lines().count());
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn in_short(&self) -> String {
+        let is_expected = |finding: &&Finding| finding.verdict == Severity::Ok;
+        let (expected, others): (Vec<&Finding>, Vec<&Finding>) = self.findings.iter().partition(is_expected);
+        let basis = format!(
+            "{} flights, {:.0} s; accelerations {}; {} of {} findings are as expected",
+            self.flights,
+            self.duration_s,
+            self.origin(),
+            expected.len(),
+            self.findings.len()
+        );
+        let lines = [wrapped("", &self.summary), wrapped("", &basis)];
+        lines.into_iter().chain(others.iter().map(ToString::to_string)).collect::<Vec<_>>().join("\n")
+    }
+
+    const fn origin(&self) -> &'static str {
+        match self.targets {
+            Targets::Recorded => "recorded",
+            Targets::Derived => "derived from v and w by a zero-phase differentiator",
+        }
+    }
 }
 
 impl fmt::Display for CheckReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let targets = match self.targets {
-            Targets::Recorded => "recorded",
-            Targets::Derived => "derived from v and w by a zero-phase differentiator",
-        };
         writeln!(f, "{}", wrapped("", &self.summary))?;
-        writeln!(f, "{} flights, {:.0} s; accelerations {targets}", self.flights, self.duration_s)?;
+        writeln!(f, "{} flights, {:.0} s; accelerations {}", self.flights, self.duration_s, self.origin())?;
         self.notes.iter().try_for_each(|note| writeln!(f, "{}", wrapped("note: ", note)))?;
         for (subject, title) in
             [(Subject::Conventions, "Conventions"), (Subject::Timing, "Timing"), (Subject::Excitation, "Excitation")]

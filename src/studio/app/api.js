@@ -10,7 +10,7 @@ import { read } from './place.js';
  * @typedef {{ name: string, manoeuvre: string, duration_s: number, step_s: number, derived: boolean, judges: number }} Flight
  * @typedef {{ version: string, data: string, duration_s: number, parts_s: [number, number], judging: string, flights: Flight[], channels: Channel[],
  *   variables: [string, string][], names: string[], signals: [string, string, string][], check: string, fault: boolean }} Overview
- * @typedef {{ id: number, did: string, rmse: PerChannel | null, ci95: Intervals | null, calibrated: boolean }} Step
+ * @typedef {{ id: number, did: string, rmse: PerChannel | null, ci95: Intervals | null, r2: PerChannel | null, calibrated: boolean }} Step
  * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_first_half: boolean, saved: boolean, file: string | null,
  *   file_changed: boolean, kept: string | null, unkept: string | null, left: Left[], revision: number }} Steps
  * @typedef {{ file: string, written_s: number, steps: string[], search: string | null, fault: string | null }} Left

@@ -187,7 +187,7 @@ function head() {
       { class: 'tools' },
       h(
         'span',
-        { class: 'state', title: steps.file ?? 'no model file yet' },
+        { class: 'state', title: `${steps.steps[steps.at].did}; ${steps.file ?? 'no model file yet'}` },
         h('span', { id: 'state-name' }, steps.steps[steps.at].did),
         h('small', {}, steps.saved ? 'saved' : 'not saved'),
       ),
@@ -218,6 +218,10 @@ function score() {
     const [before, after] = [first.rmse?.[key] ?? null, now.rmse?.[key] ?? null];
     const change = before && after !== null ? after / before - 1 : 0;
     const fell = steps.at > 0 && Math.abs(change) >= 0.0005;
+    const predicted = now.r2?.[key] ?? null;
+    const r2 = predicted === null ? '' : `R² ${predicted.toFixed(3)}`.replace('-', '−');
+    // Learn counts squares, as they add up over effects.
+    const square = fell ? `; its square ${change < 0 ? 'fell' : 'rose'} by ${percent(Math.abs((1 + change) ** 2 - 1))}` : '';
     return h(
       'button',
       {
@@ -225,7 +229,7 @@ function score() {
         class: 'cell',
         'data-channel': of.symbol,
         'aria-pressed': String(index === channel),
-        title: `${of.name}, root mean square error on ${app.steps.judged_on}`,
+        title: `${of.name}, root mean square error on ${app.steps.judged_on}${square}${r2 && `. ${r2}: share of the variance that is predicted`}`,
         onclick: () => slide({ channel: index }),
       },
       h('span', { class: 'what' }, h('b', {}, of.symbol), ` ${of.name.replace(' acceleration', '')}${fell ? `, was ${number(before)}` : ''}`),
@@ -233,7 +237,7 @@ function score() {
       h(
         'span',
         { class: fell ? (change < 0 ? 'fall' : 'rise') : 'quiet' },
-        fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : '',
+        fell ? `${change < 0 ? '▼' : '▲'} ${percent(Math.abs(change))}` : r2,
       ),
     );
   };
@@ -333,6 +337,7 @@ async function start() {
     return;
   }
   overviewNote();
+  if (!new URLSearchParams(location.hash.slice(1)).has('channel')) slide({ channel: worst() });
   window.addEventListener('hashchange', () => draw());
   window.addEventListener('keydown', key);
   // Another tab may have changed the model, or another program its file.
@@ -343,6 +348,15 @@ async function start() {
   await draw();
   document.body.dataset.ready = 'yes';
   watch();
+}
+
+/** The channel of which the model opened predicts the least. */
+function worst() {
+  const { steps, overview } = app;
+  const r2 = overview.channels.map(({ symbol }) => {
+    return steps.steps[steps.at].r2?.[/** @type {keyof import('./api.js').PerChannel} */ (symbol)] ?? Infinity;
+  });
+  return r2.indexOf(Math.min(...r2));
 }
 
 function overviewNote() {

@@ -175,7 +175,12 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
 
     context.say("\n2. Conventions and timing of the data");
     let report = check(&set, None);
-    context.say(&report);
+    if context.is_verbose() {
+        context.say(&report);
+    } else {
+        context.say(report.in_short());
+        context.say(format!("each finding: {} check {}/flights", typed(), out.display()));
+    }
     if report.fault {
         return Ok(ExitCode::from(CHECK_FAILED));
     }
@@ -221,7 +226,12 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let mut judged = contest.run(&set, &split)?;
     judged.set_floor(&set, &explainable.flights)?;
     contest.trace(&set, &split, &mut judged)?;
-    context.say(format!("\n{}", judged.comparison));
+    if context.is_verbose() {
+        context.say(format!("\n{}", judged.comparison));
+    } else {
+        context.say(format!("\n{}", judged.comparison.in_short()));
+        context.say("\nOther measures, manoeuvres, regimes, shares and prediction intervals: on the page, and here with --verbose");
+    }
     let provenance = [
         ("data".to_owned(), format!("built-in truth helicopter, seed {}, {minutes} min; hidden: {hidden}", context.seed())),
         ("locked".to_owned(), LOCKED.join(", ")),
