@@ -28,7 +28,7 @@ pub(super) fn read_csv(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Raw
     if content.iter().all(u8::is_ascii_whitespace) {
         return Err(fault(path, "an empty file", "a header line and at least one row; remove the file if the flight is void"));
     }
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(content);
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(content);
     let mut record = csv::ByteRecord::new();
     reader.read_byte_record(&mut record).map_err(|error| csv_fault(path, &error))?;
     let names = header(path, &record)?;
@@ -51,7 +51,7 @@ pub(super) fn read_csv(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Raw
                 path: path.into(),
                 line,
                 column: names[index].clone(),
-                found: format!("`{}`", String::from_utf8_lossy(cell)),
+                found: format!("`{}`", String::from_utf8_lossy(cell.trim_ascii())),
                 expected: NOT_A_NUMBER.into(),
             })?;
             values.push(value);
@@ -65,8 +65,9 @@ pub(super) fn read_csv(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<Raw
     Ok(RawTable { path: path.into(), names, columns, lines, read: Some(Read::of(path, &bytes)) })
 }
 
-/// An empty cell is "no number", NaN; so is the word NaN. Text is none.
+/// An empty cell is "no number", NaN; so is the word NaN. Text is none. Blanks around it do not matter.
 fn number(cell: &[u8]) -> Option<f64> {
+    let cell = cell.trim_ascii();
     if cell.is_empty() {
         return Some(f64::NAN);
     }
@@ -74,7 +75,7 @@ fn number(cell: &[u8]) -> Option<f64> {
 }
 
 fn header(path: &Path, record: &csv::ByteRecord) -> Result<Vec<String>> {
-    let names: Vec<String> = record.iter().map(|name| String::from_utf8_lossy(name).into_owned()).collect();
+    let names: Vec<String> = record.iter().map(|name| String::from_utf8_lossy(name.trim_ascii()).into_owned()).collect();
     if names.iter().all(|name| name.parse::<f64>().is_ok()) {
         let expected = "a header line with the columns' names";
         return Err(fault(

@@ -313,7 +313,7 @@ fn sparing(done: Assembled, held: &AtomicUsize) -> Assembled {
 #[cfg(feature = "rayon")]
 fn in_parallel<T: Send>(logs: &[Log], read: impl Fn(&Log) -> T + Send + Sync) -> Vec<T> {
     use rayon::prelude::*;
-    logs.par_iter().map(read).collect()
+    logs.par_iter().with_max_len(1).map(read).collect()
 }
 
 #[cfg(not(feature = "rayon"))]

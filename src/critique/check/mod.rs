@@ -108,7 +108,7 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let (delay, control_delay) = gathered.together.timing.control_delay(model.map(|model| model.data.control_delay_s));
     let mut findings = gathered.findings(data);
     findings.push(delay);
-    let (excitation, collinearity) = (excitation::movements(&data.flights), excitation::collinearity(&data.flights));
+    let Columns { excitation, collinearity, .. } = gathered.columns;
     findings.extend(excitation::findings(&excitation, &collinearity));
     findings.iter_mut().for_each(|finding| advice::heed(finding, &data.source));
 
@@ -130,10 +130,49 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     }
 }
 
+/// What columns show by themselves, in all flights.
+struct Columns {
+    /// What is wrong with them …
+    poor: Vec<Finding>,
+    /// … and the flights of which single cells are.
+    spoilt: BTreeSet<usize>,
+    dead_zones: Vec<Finding>,
+    excitation: Vec<Excitation>,
+    collinearity: Vec<Collinearity>,
+}
+
+impl Columns {
+    fn of(flights: &[Flight]) -> Self {
+        let of_cells = || {
+            let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(flights).into_iter().unzip();
+            let found = [
+                saturation::findings(flights),
+                alternation::findings(flights),
+                dropouts::findings(flights),
+                copies::findings(flights),
+            ];
+            (spikes.into_iter().chain(found.into_iter().flatten()), spoilt.into_iter().flatten().collect())
+        };
+        let of_streams = || both(|| streams::findings(flights), of_cells);
+        let moved = || (excitation::movements(flights), excitation::collinearity(flights));
+        let ((streams, (cells, spoilt)), (dead_zones, (excitation, collinearity))) =
+            both(of_streams, || both(|| dead_zone::findings(flights), moved));
+        Self { poor: streams.into_iter().chain(cells).collect(), spoilt, dead_zones, excitation, collinearity }
+    }
+}
+
+/// Two pieces of work, beside each other where there are threads.
+fn both<A: Send, B: Send>(one: impl FnOnce() -> A + Send, other: impl FnOnce() -> B + Send) -> (A, B) {
+    #[cfg(feature = "rayon")]
+    let done = rayon::join(one, other);
+    #[cfg(not(feature = "rayon"))]
+    let done = (one(), other());
+    done
+}
+
 /// What the flights say by themselves, and those together of which nothing is known to be wrong.
 struct Gathered {
-    /// Of columns by themselves.
-    poor: Vec<Finding>,
+    columns: Columns,
     /// Of flights that break with the others.
     odd: Vec<Finding>,
     /// All read something in the same other way.
@@ -158,12 +197,9 @@ impl Gathered {
     fn new(data: &DataSet) -> Self {
         let quaternion = data.source.quaternion.map(other_order);
         let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
-        let Read { each, sticks, piled, sides, followed } = read(data, quaternion, step_s);
-        let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(&data.flights).into_iter().unzip();
-        let poor = streams::findings(&data.flights).into_iter().chain(spikes);
-        let poor = poor.chain(saturation::findings(&data.flights)).chain(alternation::findings(&data.flights));
-        let poor: Vec<Finding> = poor.chain(dropouts::findings(&data.flights)).chain(copies::findings(&data.flights)).collect();
-        let faults = poor.iter().filter(|finding| finding.verdict == Severity::Fault);
+        let (Read { each, sticks, piled, sides, followed }, columns) =
+            both(|| read(data, quaternion, step_s), || Columns::of(&data.flights));
+        let faults = columns.poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);
         let mut except: BTreeSet<usize> = (0..data.flights.len()).filter(unfit).collect();
@@ -173,7 +209,7 @@ impl Gathered {
             evidence
         };
         // A spike moves no axis; without it the rest of the flight is as good as any.
-        let mut unjudged: BTreeSet<usize> = spoilt.into_iter().flatten().chain(except.iter().copied()).collect();
+        let mut unjudged: BTreeSet<usize> = columns.spoilt.union(&except).copied().collect();
         let judged: Vec<&Own> = each.iter().filter(|own| !unjudged.contains(&own.flight)).collect();
         let all = of(&except);
         let misread = odd::is_misread(&judged, &all);
@@ -192,13 +228,13 @@ impl Gathered {
         unjudged.extend(&of_strange);
         let stamps = stamps::findings(&judged, &unjudged, &data.flights);
         let odd = blamed.findings.into_iter().chain(odd.findings).chain(strange).chain(stamps).collect();
-        Self { poor, odd, misread, together: of(&except), except, unjudged, sticks, piled, sides, followed, left }
+        Self { columns, odd, misread, together: of(&except), except, unjudged, sticks, piled, sides, followed, left }
     }
 
     /// All that is said of conventions and of streams against each other, causes before symptoms.
     fn findings(&self, data: &DataSet) -> Vec<Finding> {
         let mut findings = vec![origin(&data.flights)];
-        findings.extend(self.poor.iter().chain(&self.odd).cloned());
+        findings.extend(self.columns.poor.iter().chain(&self.odd).cloned());
         findings.extend(self.together.kinematics(0.0));
         // Of the attitude the relations know more than the force does.
         let is_read = |finding: &Finding| finding.verdict == Severity::Fault && RELATIONS[..2].contains(&finding.name.as_str());
@@ -208,7 +244,7 @@ impl Gathered {
         let is_other = |finding: &Finding| !known.is_empty() && !known.contains(&finding.set) && finding.verdict == Severity::Fault;
         findings.extend(lateral.filter(|finding| !is_other(finding)));
         if !self.misread {
-            findings.extend(dead_zone::findings(&data.flights));
+            findings.extend(self.columns.dead_zones.iter().cloned());
             let followed: Vec<_> = self.followed.iter().filter(|(flight, _)| !self.unjudged.contains(flight)).copied().collect();
             findings.extend(demands::findings(&followed, &data.flights));
             let cut_off = limits::findings(&self.piled, &data.flights, &self.unjudged);
@@ -231,7 +267,7 @@ impl Gathered {
         let rest = data.flights.iter().enumerate().filter(|(flight, _)| !self.except.contains(flight));
         findings.extend(plausibility(&rest.map(|entry| entry.1).collect::<Vec<_>>()));
         // A stream that is held is late by half of its rest: that is said already.
-        if self.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
+        if self.columns.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
             findings.extend(self.together.timing.offsets(0.0));
         } else {
             findings.extend(self.together.halves.findings());
@@ -264,7 +300,7 @@ fn blamed(judged: &[&Own], odd: &Odd, left: &[unexplained::OfFlight], data: &Dat
     blame::gathered(&causes, &unexplained::outstanding(left), &data.flights)
 }
 
-/// Flights that are read side by side, and then leave the memory.
+/// Flights that are read side by side at most, and then leave the memory.
 #[cfg(feature = "rayon")]
 const BESIDE: usize = 8;
 
@@ -281,18 +317,24 @@ fn read(data: &DataSet, quaternion: Option<&'static str>, step_s: f64) -> Read {
     let one = |flight: usize| {
         let motion = increments::Motion::new(&data.flights[flight], &data.source);
         data.flights[flight].rest();
-        (Own::new(flight, &motion, quaternion, step_s), Sticks::of(&motion), limits::of(&motion), demands::of(&motion))
+        let of_sticks = || (Sticks::of(&motion), limits::of(&motion), demands::of(&motion));
+        both(|| Own::new(flight, &motion, quaternion, step_s), of_sticks)
     };
     let indices: Vec<usize> = (0..data.flights.len()).collect();
     #[cfg(feature = "rayon")]
     let found: Vec<_> = {
         use rayon::prelude::*;
-        indices.chunks(BESIDE).flat_map(|some| some.par_iter().map(|&flight| one(flight)).collect::<Vec<_>>()).collect()
+        // A few threads wait for nobody.
+        let some = if rayon::current_num_threads() <= BESIDE { indices.len().max(1) } else { BESIDE };
+        indices
+            .chunks(some)
+            .flat_map(|some| some.par_iter().with_max_len(1).map(|&flight| one(flight)).collect::<Vec<_>>())
+            .collect()
     };
     #[cfg(not(feature = "rayon"))]
     let found: Vec<_> = indices.into_iter().map(one).collect();
     let mut read = Read { each: Vec::new(), sticks: Sticks::new(), piled: Vec::new(), sides: Vec::new(), followed: Vec::new() };
-    for (flight, (own, sides, piled, followed)) in found.into_iter().enumerate() {
+    for (flight, (own, (sides, piled, followed))) in found.into_iter().enumerate() {
         read.each.push(own);
         read.sticks.push(flight, &sides);
         read.piled.push((flight, piled));

@@ -6,14 +6,20 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// Sums of one block: XᵀX, Xᵀy and Σy².
 #[derive(Clone)]
 struct Sums<const K: usize> {
-    gram: [[f64; K]; K],
+    /// XᵀX, of which the diagonal and what is below it are kept up.
+    lower: [[f64; K]; K],
     moment: [f64; K],
     square: f64,
     rows: f64,
 }
 
 impl<const K: usize> Sums<K> {
-    const NOTHING: Self = Self { gram: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 };
+    const NOTHING: Self = Self { lower: [[0.0; K]; K], moment: [0.0; K], square: 0.0, rows: 0.0 };
+
+    /// Of XᵀX.
+    fn gram(&self, i: usize, j: usize) -> f64 {
+        self.lower[i.max(j)][i.min(j)]
+    }
 
     fn total(several: &[Self]) -> Self {
         several.iter().fold(Self::NOTHING, |mut sum, one| {
@@ -23,7 +29,7 @@ impl<const K: usize> Sums<K> {
     }
 
     fn take(&mut self, one: &Self) {
-        self.gram.as_flattened_mut().iter_mut().zip(one.gram.as_flattened()).for_each(|(sum, one)| *sum += one);
+        self.lower.as_flattened_mut().iter_mut().zip(one.lower.as_flattened()).for_each(|(sum, one)| *sum += one);
         self.moment.iter_mut().zip(one.moment).for_each(|(sum, one)| *sum += one);
         self.square += one.square;
         self.rows += one.rows;
@@ -35,10 +41,10 @@ impl<const K: usize> Sums<K> {
         let place = |i: usize| if i < K { i } else { column };
         let gram = |i: usize, j: usize| {
             let sums = if i < K && j < K { self } else { after };
-            sums.gram[place(i)][place(j)]
+            sums.gram(place(i), place(j))
         };
         Sums {
-            gram: std::array::from_fn(|i| std::array::from_fn(|j| gram(i, j))),
+            lower: std::array::from_fn(|i| std::array::from_fn(|j| gram(i, j))),
             moment: std::array::from_fn(|i| if i < K { self.moment[i] } else { after.moment[column] }),
             square: self.square,
             rows: self.rows,
@@ -48,11 +54,11 @@ impl<const K: usize> Sums<K> {
     /// The least-squares fit on these sums. `None` where the columns do not determine β.
     fn solution(&self) -> Option<Solution<K>> {
         // Columns in units of their own length, so that the factorisation sees correlations and not units.
-        let scale: [f64; K] = std::array::from_fn(|i| self.gram[i][i].sqrt());
+        let scale: [f64; K] = std::array::from_fn(|i| self.gram(i, i).sqrt());
         if scale.iter().any(|scale| !(*scale > 0.0 && scale.is_finite())) {
             return None;
         }
-        let gram = DMatrix::from_fn(K, K, |i, j| self.gram[i][j] / (scale[i] * scale[j]));
+        let gram = DMatrix::from_fn(K, K, |i, j| self.gram(i, j) / (scale[i] * scale[j]));
         let inverse = Cholesky::new(gram)?.inverse();
         let scaled = &inverse * DVector::from_fn(K, |i, _| self.moment[i] / scale[i]);
         let beta: [f64; K] = std::array::from_fn(|i| scaled[i] / scale[i]);
@@ -61,7 +67,7 @@ impl<const K: usize> Sums<K> {
 
     /// Squared errors that β leaves.
     fn error(&self, beta: &[f64; K]) -> f64 {
-        let fitted = |i: usize| (0..K).map(|j| self.gram[i][j] * beta[j]).sum::<f64>();
+        let fitted = |i: usize| (0..K).map(|j| self.gram(i, j) * beta[j]).sum::<f64>();
         (self.square + (0..K).map(|i| beta[i] * (fitted(i) - 2.0 * self.moment[i])).sum::<f64>()).max(0.0)
     }
 }
@@ -104,7 +110,7 @@ impl<const K: usize> BlockRegression<K> {
         sums.rows += 1.0;
         for (i, left) in row.iter().enumerate() {
             sums.moment[i] += left * value;
-            row.iter().enumerate().for_each(|(j, right)| sums.gram[i][j] += left * right);
+            row[..=i].iter().enumerate().for_each(|(j, right)| sums.lower[i][j] += left * right);
         }
     }
 
@@ -122,7 +128,7 @@ impl<const K: usize> BlockRegression<K> {
     /// On some of the columns.
     pub fn on<const J: usize>(&self, columns: [usize; J]) -> BlockRegression<J> {
         let of = |sums: &Sums<K>| Sums {
-            gram: columns.map(|i| columns.map(|j| sums.gram[i][j])),
+            lower: columns.map(|i| columns.map(|j| sums.gram(i, j))),
             moment: columns.map(|i| sums.moment[i]),
             square: sums.square,
             rows: sums.rows,
@@ -161,7 +167,7 @@ impl<const K: usize> BlockRegression<K> {
 
     /// Standard deviation of a column over rows, the 1 being column `constant`, in units of that one.
     pub fn deviation(&self, column: usize, constant: usize) -> f64 {
-        let total = |i: usize, j: usize| self.blocks.iter().map(|sums| sums.gram[i][j]).sum::<f64>();
+        let total = |i: usize, j: usize| self.blocks.iter().map(|sums| sums.gram(i, j)).sum::<f64>();
         let weight = total(constant, constant);
         let mean = total(column, constant) / weight;
         (total(column, column) / weight - mean * mean).max(0.0).sqrt()
@@ -198,7 +204,7 @@ impl<const K: usize> BlockRegression<K> {
         let Solution { beta, scale, inverse } = self.solution()?;
         let mut meat = DMatrix::<f64>::zeros(K, K);
         for sums in &self.blocks {
-            let fitted = |i: usize| (0..K).map(|j| sums.gram[i][j] * beta[j]).sum::<f64>();
+            let fitted = |i: usize| (0..K).map(|j| sums.gram(i, j) * beta[j]).sum::<f64>();
             let score = DVector::from_fn(K, |i, _| (sums.moment[i] - fitted(i)) / scale[i]);
             meat += &score * score.transpose();
         }
