@@ -133,10 +133,11 @@ fn of_part(
         None => sample,
     };
     let recorded = columns.get(Column::Vx).map_or(0, <[f64]>::len);
-    let whole = in_step(&mut columns, &schema.late, step_s, recorded);
+    let (whole, with_them) = in_step(&mut columns, &schema.late, step_s, recorded);
     if !schema.late.is_empty() {
         let moved: Vec<String> = schema.late.iter().map(|(column, late_s)| format!("{} {late_s:.3} s", column.name())).collect();
-        done.common_notes.insert(format!("moved back in time, as dataset.toml says: {}", moved.join(", ")));
+        let with_them = if with_them.is_empty() { String::new() } else { format!("; with them {}", with_them.join(", ")) };
+        done.common_notes.insert(format!("moved back in time, as dataset.toml says: {}{with_them}", moved.join(", ")));
     }
     let absent = fill_absent(&mut columns, schema, step_s, done);
     let targets = derive(&table, &mut columns, schema, step_s, done)?;

@@ -18,6 +18,8 @@ pub(super) struct Columns {
     pub canonical: [Option<Vec<f64>>; Column::COUNT],
     /// Further columns, as recorded.
     pub extra: BTreeMap<String, Vec<f64>>,
+    /// What is made of some of them, by formulas of the description.
+    pub made: BTreeMap<String, BTreeSet<Column>>,
     /// The attitude came from a quaternion.
     pub quaternion: bool,
 }
@@ -101,10 +103,17 @@ const OPERATORS: [char; 9] = ['+', '*', '/', '^', '(', '<', '>', '-', '\''];
 /// without heading.
 pub(super) fn convert(table: &RawTable, schema: &Schema, step_s: f64) -> Result<Columns> {
     let mut used: BTreeSet<String> = schema.columns.get("t").map_or(vec!["t".into()], Clone::clone).into_iter().collect();
-    let mut columns = Columns { canonical: Default::default(), extra: BTreeMap::new(), quaternion: false };
+    let mut columns = Columns { canonical: Default::default(), extra: BTreeMap::new(), made: BTreeMap::new(), quaternion: false };
     for column in Column::ALL {
         if let Some((values, name)) = source(table, schema, step_s, column.name())? {
             columns.canonical[column as usize] = Some(values);
+            if table.column(&name).is_none()
+                && let Ok(formula) = Formula::parse(&name)
+            {
+                formula.names().into_iter().for_each(|read| {
+                    columns.made.entry(read.to_owned()).or_default().insert(column);
+                });
+            }
             used.insert(name);
         }
     }
