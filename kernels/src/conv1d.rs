@@ -20,6 +20,7 @@ use crate::{Real, Rows, RowsMut};
 mod backward;
 mod epilogue;
 mod packing;
+pub mod sequences;
 mod winograd;
 
 pub(crate) use backward::{BackwardInput, BackwardWeight};
@@ -28,7 +29,9 @@ pub(crate) use epilogue::BackwardEpilogue;
 use epilogue::Finish;
 pub use epilogue::{Epilogue, backward_epilogue};
 pub(crate) use packing::Pack;
+use packing::panels;
 pub use packing::{Weight, pack, pack_transposed, packed_len};
+pub(crate) use sequences::{BackwardInputSequences, BackwardWeightSequences, ForwardSequences};
 
 /// Kernel length and padding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,10 +51,15 @@ impl Geometry {
     }
 }
 
-/// Scratch, in numbers, that any function here needs.
+/// Scratch, in numbers, that any function here needs, but for those on [`sequences`].
 pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    scratch_len_of(1, geometry, inputs, outputs)
+}
+
+/// Scratch, in numbers, that any function here needs for so many sequences at once.
+pub fn scratch_len_of(sequences: usize, geometry: Geometry, inputs: usize, outputs: usize) -> usize {
     let forward = packed_len(geometry, inputs, outputs);
-    let backward = packed_len(geometry, outputs, inputs) + ends_len(geometry, inputs, outputs);
+    let backward = packed_len(geometry, outputs, inputs) + ends_len(sequences, geometry, inputs, outputs);
     if winograd::applies(geometry, inputs, outputs) {
         let product = winograd::product_scratch_len(inputs.max(outputs));
         (forward.max(backward) + product).max(winograd::gradient_scratch_len(inputs, outputs))
@@ -61,8 +69,8 @@ pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
 }
 
 /// A row of zeros, and the gradients of the padded rows.
-const fn ends_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
-    outputs + (geometry.left + geometry.right) * inputs
+const fn ends_len(sequences: usize, geometry: Geometry, inputs: usize, outputs: usize) -> usize {
+    outputs + sequences * (geometry.left + geometry.right) * inputs
 }
 
 /// Where y may be cut for [`forward_rows`]: at multiples of this many rows, every row is computed by the same instructions as uncut.
@@ -100,15 +108,13 @@ pub fn forward_rows<T: Real>(
 ) {
     assert!(first + y.rows() <= geometry.output_rows(x.rows()), "conv1d: rows of y");
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d: length of the bias");
-    let (packed, scratch) = match weight {
-        Weight::Packed(packed) => (packed, scratch),
-        Weight::Plain(weight) => {
-            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, x.cols(), y.cols()));
-            pack(isa, geometry, (x.cols(), y.cols()), weight, packed);
-            (&*packed, rest)
-        }
-    };
-    T::conv1d_forward(isa, Forward { geometry, x, packed, bias, epilogue, first, y, scratch });
+    let sizes = (x.cols(), y.cols());
+    if winograd::applies(geometry, sizes.0, sizes.1) {
+        let y = sequences::Output { y, dropout: epilogue.dropout };
+        return sequences::forward_rows(isa, geometry, &[x], (weight, bias), epilogue.activation, (first, &mut [y]), scratch);
+    }
+    let (packed, _) = panels(isa, geometry, sizes, weight, scratch);
+    T::conv1d_forward(isa, Forward { geometry, x, packed, bias, epilogue, first, y });
 }
 
 pub(crate) struct Forward<'a, T> {
@@ -119,7 +125,6 @@ pub(crate) struct Forward<'a, T> {
     epilogue: Epilogue,
     first: usize,
     y: RowsMut<'a, T>,
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
@@ -127,14 +132,10 @@ impl<T: Real> Tiled<T> for Forward<'_, T> {
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         const { assert!(CUT.is_multiple_of(MR), "a cut ends inside a tile") };
         let Geometry { taps, left, .. } = self.geometry;
-        let (rows, inputs, outputs) = (self.y.rows(), self.x.cols(), self.y.cols());
-        let shifted = Shifted { x: self.x, taps, left, first: self.first, rows };
-        let mut sink = Finish::new(self.first, self.y, self.bias, self.epilogue);
-        if winograd::applies(self.geometry, inputs, outputs) {
-            let packed = &self.packed[..winograd::packed_len(inputs, outputs)];
-            return winograd::product::<T, I, _, _, MR, NR>(taps, &shifted, (rows, inputs), packed, &mut sink, self.scratch);
-        }
+        let (inputs, outputs) = (self.x.cols(), self.y.cols());
+        let shifted = Shifted { x: self.x, taps, left, first: self.first, rows: self.y.rows() };
         let panels = &self.packed[..taps * inputs * outputs.next_multiple_of(NR)];
+        let mut sink = Finish::new(self.first, self.y, self.bias, self.epilogue);
         tile::rows::<T, I, _, _, MR, NR>(&shifted, outputs, panels, &mut sink);
     }
 }
@@ -146,13 +147,6 @@ struct Shifted<'a, T> {
     left: usize,
     first: usize,
     rows: usize,
-}
-
-impl<T> Shifted<'_, T> {
-    #[inline(always)]
-    fn source(&self, i: usize, j: usize) -> usize {
-        (self.first + i + j).saturating_sub(self.left).min(self.x.rows() - 1)
-    }
 }
 
 impl<T> LeftRows<T> for Shifted<'_, T> {
@@ -170,14 +164,7 @@ impl<T> LeftRows<T> for Shifted<'_, T> {
     }
     #[inline(always)]
     fn piece(&self, i: usize, tap: usize) -> &[T] {
-        self.x.row(self.source(i, tap))
-    }
-}
-
-impl<T> winograd::Sequence<T> for Shifted<'_, T> {
-    #[inline(always)]
-    fn row(&self, s: usize) -> &[T] {
-        self.x.row(self.source(s, 0))
+        self.x.row((self.first + i + tap).saturating_sub(self.left).min(self.x.rows() - 1))
     }
 }
 

@@ -188,6 +188,12 @@ pub trait Op<T: Real>: Send + Sync {
         None
     }
 
+    /// How the gradient of its weight is made from all samples of a step, if operands of these shapes make that worth while. It is
+    /// micro-batched, too.
+    fn large_weight(&self, _operands: &[Shape]) -> Option<&dyn LargeWeight<T>> {
+        None
+    }
+
     /// How it couples the samples of a step, if it does.
     fn coupling(&self) -> Option<&dyn Coupling<T>> {
         None
@@ -211,7 +217,7 @@ pub struct WeightGradient<'a, T> {
     pub rows: Range<usize>,
     /// Their gradient.
     pub gradient: Gradient<'a, T>,
-    /// Scratch, as [`MicroBatched::weight_scratch`] says; holds anything.
+    /// Scratch, as [`LargeWeight::weight_scratch`] says; holds anything.
     pub scratch: &'a mut [T],
     /// Shapes of the operands.
     pub shapes: &'a [Shape],
@@ -219,19 +225,24 @@ pub struct WeightGradient<'a, T> {
     pub isa: InstructionSet,
 }
 
-/// An operation with a weight so large that, sample by sample, it would come from memory for each one: it works on some samples at once,
-/// and so do all other operations of its plan, in turn. The gradient of the weight, as large, is made once a step from all samples.
+/// An operation that gains by working on some samples at once, where these take turns at the operations of their plan.
 ///
 /// What a sample gives must not depend on the others in its micro-batch, to the bit. Operands from [`WEIGHT`] on are parameters, and operand 0
-/// is none; its backward pass reads it.
+/// is none.
 pub trait MicroBatched<T: Real>: Differentiable<T> {
     /// [`Op::forward`] for each of 1 to [`MICRO_BATCH`] samples.
     fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]);
 
-    /// [`Differentiable::backward`] for each. The gradient of the weight is not asked for; those of the other parameters are those of all
-    /// together, and asked of the first sample alone.
+    /// [`Differentiable::backward`] for each. The gradients of parameters are those of all together, and asked of the first sample alone; that of a
+    /// [`LargeWeight`] is not asked for.
     fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]);
+}
 
+/// An operation with a weight so large that, sample by sample, it would come from memory for each one: it works on some samples at once,
+/// and so do all other operations of its plan, in turn. The gradient of the weight, as large, is made once a step from all samples.
+///
+/// Its backward pass reads operand 0.
+pub trait LargeWeight<T: Real>: MicroBatched<T> {
     /// Some rows of the gradient of the weight. The bits of a row may depend on which rows are asked for together.
     fn weight_gradient(&self, io: WeightGradient<'_, T>);
 

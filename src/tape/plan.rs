@@ -89,7 +89,10 @@ impl<T: Real> Plan<T> {
     fn compile(graph: &Graph<T>, loss: Option<Var>, outputs: &[Var]) -> Result<Self> {
         let orders = Orders::of(graph, loss, outputs)?;
         let layout = Layout::of(graph, &orders, loss, outputs)?;
-        let micro_batches = MicroBatches::of(graph, &orders.forward, &orders.backward);
+        // Where the weights are more than what a sample holds, reading them from memory is what a step of training waits for; samples that
+        // take turns at an operation find them in the cache.
+        let take_turns = loss.is_some() && !orders.wait(graph) && layout.slab_len < graph.parameter_count();
+        let micro_batches = MicroBatches::of(graph, &orders, take_turns);
         let mut large_weights = micro_batches.large_weights(graph);
         let summed = complement(large_weights.iter().map(|(_, weight)| weight.range.clone()), graph.parameter_count());
         let mut steps = Steps::new(graph, &layout, &micro_batches, &summed);
@@ -97,10 +100,6 @@ impl<T: Real> Plan<T> {
         let (mut backward, backward_packed) = steps.list(&orders.backward, Direction::Backward);
         let kept = steps.keep(&orders.backward, &mut backward, &mut large_weights);
         let takes_some = forward.iter().any(|step| step.micro_batched);
-        // Where the weights are more than what a sample holds, reading them from memory is what a step of training waits for; samples that
-        // take turns at an operation find them in the cache.
-        let waits = forward.iter().any(|step| step.op.coupling().is_some());
-        let takes_turns = loss.is_some() && !waits && layout.slab_len < graph.parameter_count();
         Ok(Self {
             stretches: [&forward, &backward].map(|steps| stretches(steps)),
             forward,
@@ -110,7 +109,7 @@ impl<T: Real> Plan<T> {
             input_gradients: layout.input_gradients(graph),
             loss: loss.map(|loss| (layout.value(loss.0).start, layout.gradient(loss.0).start)),
             slab_len: layout.slab_len,
-            micro_batch: if takes_some || takes_turns { MICRO_BATCH } else { 1 },
+            micro_batch: if takes_some || take_turns { MICRO_BATCH } else { 1 },
             packed_len: [forward_packed, backward_packed],
             parameter_len: graph.parameter_count(),
             unreached: steps.unreached(),

@@ -375,7 +375,7 @@ impl<T: Real> Session<T> {
 mod tests {
     use super::super::gradcheck;
     use super::super::op::MICRO_BATCH;
-    use super::super::ops::{Dropout, Flatten, Linear, SquaredError, Temporal};
+    use super::super::ops::{Conv1d, Dropout, Epilogue, Flatten, Linear, SquaredError, Temporal};
     use super::super::plan::tests::{random_graph, recipe};
     use super::*;
     use phyture_kernels::Tolerance;
@@ -519,17 +519,42 @@ mod tests {
         Ok((graph, loss, output))
     }
 
+    /// Two convolutions of short sequences, whose weights are more than all that a sample holds.
+    fn short_sequences<T: Real>() -> Result<(Graph<T>, Var, Var)> {
+        let mut graph = Graph::<T>::new();
+        let (x, target) = (graph.input_with_gradient("x", &[9, 32])?, graph.input("target", &[11, 32])?);
+        let (first, bias) = (graph.parameter("first", &[5, 32, 64])?, graph.parameter("bias", &[64])?);
+        let second = graph.parameter("second", &[3, 64, 32])?;
+        let leaky = Conv1d { padding: (3, 3), epilogue: Epilogue::Leaky { leak: 0.01, dropout: 0.3 } };
+        let hidden = graph.apply(leaky, &[x, first, bias])?;
+        let output = graph.apply(Conv1d { padding: (1, 1), epilogue: Epilogue::Tanh }, &[hidden, second])?;
+        let loss = graph.apply(SquaredError { scale: 1.0 }, &[output, target])?;
+        Ok((graph, loss, output))
+    }
+
     #[test]
     fn a_sample_does_not_depend_on_its_micro_batch() -> Result<()> {
         let (graph, loss, output) = large_weights::<f64>()?;
-        let parameters = parameters(graph.parameter_count());
-        let mut alone = Session::train(&graph, loss, &[output], Threads(1))?;
-        assert!(alone.plan.micro_batch > 1, "these weights are not worth a micro_batch");
-        let weights = &alone.plan.large_weights;
+        let plan = Plan::train(&graph, loss, &[output])?;
+        let weights = &plan.large_weights;
         assert!(weights.iter().any(|weight| weight.steps.len() > 1) && weights.iter().any(|weight| weight.piece < weight.rows));
+        samples_are_as_they_are_alone(&graph, loss, output)?;
+        let (graph, loss, output) = short_sequences::<f64>()?;
+        let plan = Plan::train(&graph, loss, &[output])?;
+        let at_once = [&plan.forward, &plan.backward].map(|steps| steps.iter().filter(|step| step.micro_batched).count());
+        assert_eq!((at_once, plan.large_weights.len()), ([2, 2], 0));
+        assert!(!Plan::infer(&graph, &[output])?.forward.iter().any(|step| step.micro_batched), "a prediction is of one sample");
+        samples_are_as_they_are_alone(&graph, loss, output)
+    }
+
+    /// Each sample of a step to the bit, the gradients of all up to rounding, and these against differences.
+    fn samples_are_as_they_are_alone(graph: &Graph<f64>, loss: Var, output: Var) -> Result<()> {
+        let parameters = parameters(graph.parameter_count());
+        let mut alone = Session::train(graph, loss, &[output], Threads(1))?;
+        assert!(alone.plan.micro_batch > 1, "these weights are not worth a micro_batch");
         // A power of 2, by which a loss can be divided without rounding.
         let samples = SHARDS * MICRO_BATCH;
-        let mut session = Session::train(&graph, loss, &[output], Threads(2))?;
+        let mut session = Session::train(graph, loss, &[output], Threads(2))?;
         session.set_poison(true);
         session.step(&parameters, samples, None, &fill)?;
         let mut sums = vec![0.0; graph.parameter_count()];
@@ -544,7 +569,7 @@ mod tests {
         let allowed = Tolerance::Close.relative_f64() * largest;
         assert!(session.gradients().iter().zip(&sums).all(|(found, sum)| (found - sum).abs() <= allowed));
         gradcheck::graph(
-            &gradcheck::LossOf { graph: &graph, loss, parameters: &parameters, samples: 11, dropout: KEY, fill: &fill },
+            &gradcheck::LossOf { graph, loss, parameters: &parameters, samples: 11, dropout: KEY, fill: &fill },
             &|_| false,
             3,
         )
@@ -584,7 +609,7 @@ mod tests {
 
     #[test]
     fn micro_batches_give_the_same_bits_on_any_number_of_threads() -> Result<()> {
-        for (graph, loss, output) in [large_weights::<f32>()?, little_beside_the_weights()?] {
+        for (graph, loss, output) in [large_weights::<f32>()?, little_beside_the_weights()?, short_sequences()?] {
             let parameters = parameters(graph.parameter_count());
             for samples in [2, SHARDS * MICRO_BATCH + 3] {
                 let mut found = Vec::new();

@@ -5,9 +5,10 @@
 //! dW[j, c, o] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
 //! ```
 
-use super::{Geometry, Shifted, Weight, ends_len, pack_transposed, packed_len, winograd};
+use super::packing::panels_of_adjoint;
+use super::{Geometry, Weight, ends_len, sequences, winograd};
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
-use crate::tile::{self, LeftRows, Pair, Sink, Store};
+use crate::tile::{self, LeftRows, Store};
 use crate::{Real, Rows, RowsMut, Write, linear};
 
 /// dx {=, +=} the adjoint of the convolution and of its padding, applied to dz.
@@ -25,16 +26,12 @@ pub fn backward_input<T: Real>(
 ) {
     assert_eq!(dz.rows(), geometry.output_rows(dx.rows()), "conv1d: rows of dz");
     let (inputs, outputs) = (dx.cols(), dz.cols());
-    let (ends, rest) = scratch.split_at_mut(ends_len(geometry, inputs, outputs));
-    let (packed, scratch) = match weight {
-        Weight::Packed(packed) => (packed, rest),
-        Weight::Plain(weight) => {
-            let (packed, rest) = rest.split_at_mut(packed_len(geometry, outputs, inputs));
-            pack_transposed(isa, geometry, (inputs, outputs), weight, packed);
-            (&*packed, rest)
-        }
-    };
-    T::conv1d_backward_input(isa, BackwardInput { geometry, dz, packed, dx, write, ends, scratch });
+    if winograd::applies(geometry, inputs, outputs) {
+        return sequences::backward_input(isa, geometry, &[dz], weight, &mut [dx], write, scratch);
+    }
+    let (ends, rest) = scratch.split_at_mut(ends_len(1, geometry, inputs, outputs));
+    let (packed, _) = panels_of_adjoint(isa, geometry, (inputs, outputs), weight, rest);
+    T::conv1d_backward_input(isa, BackwardInput { geometry, dz, packed, dx, write, ends });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
@@ -45,7 +42,6 @@ pub(crate) struct BackwardInput<'a, T> {
     write: Write,
     /// A row of zeros, and the gradients of the padded rows.
     ends: &'a mut [T],
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
@@ -61,24 +57,10 @@ impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
         let part = |first, jump_at, jump, rows| Reversed { dz: self.dz, zeros, taps, first, jump_at, jump, rows };
         let mut inner = Store { c: self.dx.reborrow(), bias: None, write: self.write };
         let mut outer = Store { c: RowsMut::packed(ends, left + right, inputs), bias: None, write: Write::Set };
-        if winograd::applies(self.geometry, inputs, outputs) {
-            let packed = &self.packed[..winograd::packed_len(outputs, inputs)];
-            let rows = n + left + right;
-            let mut sink = Padded { left, n, inner, outer };
-            winograd::product::<T, I, _, _, MR, NR>(
-                taps,
-                &part(0, rows, 0, rows),
-                (rows, outputs),
-                packed,
-                &mut sink,
-                self.scratch,
-            );
-        } else {
-            let panels = &self.packed[..taps * outputs * inputs.next_multiple_of(NR)];
-            tile::rows::<T, I, _, _, MR, NR>(&part(left, n, 0, n), inputs, panels, &mut inner);
-            // The padded rows in front and behind, as one operand.
-            tile::rows::<T, I, _, _, MR, NR>(&part(0, left, n, left + right), inputs, panels, &mut outer);
-        }
+        let panels = &self.packed[..taps * outputs * inputs.next_multiple_of(NR)];
+        tile::rows::<T, I, _, _, MR, NR>(&part(left, n, 0, n), inputs, panels, &mut inner);
+        // The padded rows in front and behind, as one operand.
+        tile::rows::<T, I, _, _, MR, NR>(&part(0, left, n, left + right), inputs, panels, &mut outer);
         for (s, end) in ends.chunks_exact(inputs.max(1)).enumerate() {
             let target = self.dx.row_mut(if s < left { 0 } else { n - 1 });
             target.iter_mut().zip(end).for_each(|(d, e)| *d += *e);
@@ -119,50 +101,6 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
     }
 }
 
-impl<T> winograd::Sequence<T> for Reversed<'_, T> {
-    /// Taps are in reverse: the last one reads the row itself.
-    #[inline(always)]
-    fn row(&self, s: usize) -> &[T] {
-        self.piece(s, self.taps - 1)
-    }
-}
-
-/// Rows of a padded sequence, sent to the sequence or to its padding.
-struct Padded<'a, T> {
-    left: usize,
-    n: usize,
-    inner: Store<'a, T>,
-    outer: Store<'a, T>,
-}
-
-impl<'a, T> Padded<'a, T> {
-    /// Where padded row i goes.
-    #[inline(always)]
-    fn target(&mut self, i: usize) -> (&mut Store<'a, T>, usize) {
-        if i < self.left {
-            (&mut self.outer, i)
-        } else if i < self.left + self.n {
-            (&mut self.inner, i - self.left)
-        } else {
-            (&mut self.outer, i - self.n)
-        }
-    }
-}
-
-impl<T: Real> Sink<T> for Padded<'_, T> {
-    #[inline(always)]
-    fn store<I: Isa>(&mut self, i: usize, j: usize, sums: &[T]) {
-        let (store, i) = self.target(i);
-        store.store::<I>(i, j, sums);
-    }
-
-    #[inline(always)]
-    fn store_whole<I: Isa, const NR: usize>(&mut self, i: usize, j: usize, sums: Pair<T, I>) {
-        let (store, i) = self.target(i);
-        store.store_whole::<I, NR>(i, j, sums);
-    }
-}
-
 /// dW {=, +=} `Σ_t dz[t, o]·x[clamp(t + j − left), c]`.
 ///
 /// # Panics
@@ -178,7 +116,10 @@ pub fn backward_weight<T: Real>(
 ) {
     assert_eq!(dz.rows(), geometry.output_rows(x.rows()), "conv1d: rows of dz");
     assert_eq!(dweight.len(), geometry.taps * x.cols() * dz.cols(), "conv1d: length of the weight's gradient");
-    T::conv1d_backward_weight(isa, BackwardWeight { geometry, x, dz, dweight, write, scratch });
+    if winograd::applies(geometry, x.cols(), dz.cols()) {
+        return sequences::backward_weight(isa, geometry, &[x], &[dz], dweight, write, scratch);
+    }
+    T::conv1d_backward_weight(isa, BackwardWeight { geometry, x, dz, dweight, write });
 }
 
 pub(crate) struct BackwardWeight<'a, T> {
@@ -187,24 +128,18 @@ pub(crate) struct BackwardWeight<'a, T> {
     dz: Rows<'a, T>,
     dweight: &'a mut [T],
     write: Write,
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for BackwardWeight<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
         let (n, inputs, outputs) = (self.dz.rows(), self.x.cols(), self.dz.cols());
-        let Geometry { taps, left, .. } = self.geometry;
+        let left = self.geometry.left;
         if n == 0 {
             if self.write == Write::Set {
                 self.dweight.fill(T::ZERO);
             }
             return;
-        }
-        if winograd::applies(self.geometry, inputs, outputs) {
-            let shifted = Shifted { x: self.x, taps, left, first: 0, rows: n };
-            let target = (self.dweight, self.write);
-            return winograd::weight_gradient::<T, I, _, MR, NR>(taps, &shifted, inputs, self.dz, target, self.scratch);
         }
         let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
         // For each block of rows, x and one panel of dz stay in the first-level cache for all taps.

@@ -21,21 +21,27 @@ pub struct Epilogue {
 impl Epilogue {
     /// y = z.
     pub const NONE: Self = Self { activation: Activation::Identity, dropout: None };
+
+    /// What dropout multiplies a kept element with.
+    #[inline(always)]
+    pub(super) fn scale<T: Real>(self) -> T {
+        T::of(self.dropout.map_or(1.0, Mask::scale))
+    }
 }
 
 /// y = dropout(f(sums + b)), rows `first…`.
 pub(super) struct Finish<'a, T> {
-    first: usize,
-    y: RowsMut<'a, T>,
-    bias: Option<&'a [T]>,
-    epilogue: Epilogue,
-    scale: T,
+    pub first: usize,
+    pub y: RowsMut<'a, T>,
+    pub bias: Option<&'a [T]>,
+    pub epilogue: Epilogue,
+    pub scale: T,
 }
 
 impl<'a, T: Real> Finish<'a, T> {
     #[inline(always)]
     pub(super) fn new(first: usize, y: RowsMut<'a, T>, bias: Option<&'a [T]>, epilogue: Epilogue) -> Self {
-        Self { first, y, bias, epilogue, scale: T::of(epilogue.dropout.map_or(1.0, Mask::scale)) }
+        Self { first, y, bias, epilogue, scale: epilogue.scale() }
     }
 
     /// y of row `i`, columns `j…`, from z without its bias. By value, so that nothing else can point to these numbers and the steps

@@ -49,6 +49,42 @@ pub fn pack_transposed<T: Real>(
     T::conv1d_pack(isa, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
 }
 
+/// The weight packed for [`forward`](super::forward), in the scratch where it is not yet, and the rest of the scratch.
+pub(super) fn panels<'a, T: Real>(
+    isa: InstructionSet,
+    geometry: Geometry,
+    sizes: (usize, usize),
+    weight: Weight<'a, T>,
+    scratch: &'a mut [T],
+) -> (&'a [T], &'a mut [T]) {
+    match weight {
+        Weight::Packed(packed) => (packed, scratch),
+        Weight::Plain(weight) => {
+            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, sizes.0, sizes.1));
+            pack(isa, geometry, sizes, weight, packed);
+            (packed, rest)
+        }
+    }
+}
+
+/// The same for [`backward_input`](super::backward_input).
+pub(super) fn panels_of_adjoint<'a, T: Real>(
+    isa: InstructionSet,
+    geometry: Geometry,
+    sizes: (usize, usize),
+    weight: Weight<'a, T>,
+    scratch: &'a mut [T],
+) -> (&'a [T], &'a mut [T]) {
+    match weight {
+        Weight::Packed(packed) => (packed, scratch),
+        Weight::Plain(weight) => {
+            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, sizes.1, sizes.0));
+            pack_transposed(isa, geometry, sizes, weight, packed);
+            (packed, rest)
+        }
+    }
+}
+
 pub(crate) struct Pack<'a, T> {
     geometry: Geometry,
     inputs: usize,

@@ -14,7 +14,7 @@
 
 use super::Geometry;
 use crate::instruction_set::Isa;
-use crate::tile::{self, Pair, Sink, Store};
+use crate::tile::{self, Pair, Store};
 use crate::vector::Vector;
 use crate::{Real, Rows, RowsMut, Write};
 
@@ -158,42 +158,78 @@ impl<T: Real> Weights<'_, T> {
     }
 }
 
-/// The rows of a sequence with its ends: row s as a slice, for any s.
-pub(super) trait Sequence<T> {
-    fn row(&self, s: usize) -> &[T];
+/// Some sequences of the same length with their ends: row s of one of them as a slice, for any s.
+pub(super) trait Sequences<T> {
+    fn row(&self, sequence: usize, s: usize) -> &[T];
 }
 
-/// sink ← z, `rows` of it, from the sequence x `[rows + taps − 1, inputs]` and the packed weight.
+/// Where the rows of as many results go: row i of one of them, columns `j…`.
+pub(super) trait Sinks<T: Real> {
+    fn store_whole<I: Isa, const NR: usize>(&mut self, sequence: usize, i: usize, j: usize, sums: Pair<T, I>);
+}
+
+/// How many sequences, and for each how many rows of z, and channels of x.
+#[derive(Clone, Copy)]
+pub(super) struct Extent {
+    pub sequences: usize,
+    pub rows: usize,
+    pub inputs: usize,
+}
+
+/// Groups of m rows, those of one sequence after those of another.
+#[derive(Clone, Copy)]
+struct Groups {
+    m: usize,
+    of_each: usize,
+    in_all: usize,
+}
+
+impl Groups {
+    #[inline(always)]
+    const fn new(m: usize, sequences: usize, rows: usize) -> Self {
+        let of_each = rows.div_ceil(m);
+        Self { m, of_each, in_all: sequences * of_each }
+    }
+
+    /// Sequence and first row of a group.
+    #[inline(always)]
+    const fn place(self, group: usize) -> (usize, usize) {
+        (group / self.of_each, group % self.of_each * self.m)
+    }
+}
+
+/// sinks ← z of each sequence x `[rows + taps − 1, inputs]`, from the packed weight.
 #[inline(always)]
-pub(super) fn product<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const MR: usize, const NR: usize>(
+pub(super) fn product<T: Real, I: Isa, X: Sequences<T>, S: Sinks<T>, const MR: usize, const NR: usize>(
     taps: usize,
     x: &X,
-    (rows, inputs): (usize, usize),
+    extent: Extent,
     packed: &[T],
-    sink: &mut S,
+    sinks: &mut S,
     scratch: &mut [T],
 ) {
     // The number of rows of a group is a constant of the loops that combine it.
     match taps {
-        3 => groups::<T, I, X, S, 4, MR, NR>(x, (rows, inputs), packed, sink, scratch),
-        _ => groups::<T, I, X, S, 2, MR, NR>(x, (rows, inputs), packed, sink, scratch),
+        3 => groups::<T, I, X, S, 4, MR, NR>(x, extent, packed, sinks, scratch),
+        _ => groups::<T, I, X, S, 2, MR, NR>(x, extent, packed, sinks, scratch),
     }
 }
 
 #[inline(always)]
-fn groups<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const M: usize, const MR: usize, const NR: usize>(
+fn groups<T: Real, I: Isa, X: Sequences<T>, S: Sinks<T>, const M: usize, const MR: usize, const NR: usize>(
     x: &X,
-    (rows, inputs): (usize, usize),
+    Extent { sequences, rows, inputs }: Extent,
     packed: &[T],
-    sink: &mut S,
+    sinks: &mut S,
     scratch: &mut [T],
 ) {
     const { assert!(GROUPS.is_multiple_of(MR), "a block of groups ends inside a tile") };
     let (v, products) = scratch.split_at_mut(POINTS * apart(GROUPS * inputs));
     let products = &mut products[..POINTS * apart(GROUPS * NR)];
-    for start in (0..rows).step_by(GROUPS * M) {
-        let count = (rows - start).div_ceil(M).min(GROUPS);
-        transform::<T, I, X, NR>(x, (start, M), (count, apart(GROUPS * inputs)), inputs, v);
+    let groups = Groups::new(M, sequences, rows);
+    for start in (0..groups.in_all).step_by(GROUPS) {
+        let count = (groups.in_all - start).min(GROUPS);
+        transform::<T, I, X, NR>(x, (groups, start), (count, apart(GROUPS * inputs)), inputs, v);
         for (panel, j) in packed.chunks_exact(POINTS * inputs * NR).zip((0..).step_by(NR)) {
             let points = v.chunks_exact(apart(GROUPS * inputs)).zip(panel.chunks_exact(inputs * NR));
             let points = points.zip(products.chunks_exact_mut(apart(GROUPS * NR)));
@@ -210,10 +246,10 @@ fn groups<T: Real, I: Isa, X: Sequence<T>, S: Sink<T>, const M: usize, const MR:
                         add_multiple::<T, I, NR>(z, power(point, i, M), product);
                     }
                 }
+                let (sequence, first) = groups.place(start + group);
                 for (i, z) in z.into_iter().enumerate() {
-                    let row = start + group * M + i;
-                    if row < rows {
-                        sink.store_whole::<I, NR>(row, j, z);
+                    if first + i < rows {
+                        sinks.store_whole::<I, NR>(sequence, first + i, j, z);
                     }
                 }
             }
@@ -229,20 +265,20 @@ fn add_multiple<T: Real, I: Isa, const NR: usize>(sum: &mut Pair<T, I>, factor: 
     }
 }
 
-/// v of `count` groups of m rows from row `first` on, `[τ][groups][inputs]` with points `distance` apart.
+/// v of `count` groups from group `first` on, `[τ][groups][inputs]` with points `distance` apart.
 #[inline(always)]
-fn transform<T: Real, I: Isa, X: Sequence<T>, const NR: usize>(
+fn transform<T: Real, I: Isa, X: Sequences<T>, const NR: usize>(
     x: &X,
-    (first, m): (usize, usize),
+    (groups, first): (Groups, usize),
     (count, distance): (usize, usize),
     inputs: usize,
     v: &mut [T],
 ) {
     for group in 0..count {
-        let start = first + group * m;
+        let (sequence, start) = groups.place(first + group);
         let mut rows: [&[T]; POINTS] = [&[]; POINTS];
         for (k, row) in rows.iter_mut().enumerate() {
-            *row = &x.row(start + k)[..inputs];
+            *row = &x.row(sequence, start + k)[..inputs];
         }
         for c in (0..inputs).step_by(NR) {
             let mut x = [[I::Vector::splat(T::ZERO); 2]; POINTS];
@@ -262,39 +298,40 @@ fn transform<T: Real, I: Isa, X: Sequence<T>, const NR: usize>(
     }
 }
 
-/// dW {=, +=} the gradient of the weight `[taps, in, out]` from the sequence x `[rows + taps − 1, inputs]` and dz `[rows, outputs]`.
+/// dW {=, +=} the gradient of the weight `[taps, in, out]` from sequences x `[rows + taps − 1, inputs]` and dz `[rows, outputs]` of each, at least one.
 #[inline(always)]
-pub(super) fn weight_gradient<T: Real, I: Isa, X: Sequence<T>, const MR: usize, const NR: usize>(
+pub(super) fn weight_gradient<T: Real, I: Isa, X: Sequences<T>, const MR: usize, const NR: usize>(
     taps: usize,
     x: &X,
     inputs: usize,
-    dz: Rows<'_, T>,
+    dzs: &[Rows<'_, T>],
     (dweight, write): (&mut [T], Write),
     scratch: &mut [T],
 ) {
     match taps {
-        3 => gradient_groups::<T, I, X, 4, MR, NR>(x, inputs, dz, (dweight, write), scratch),
-        _ => gradient_groups::<T, I, X, 2, MR, NR>(x, inputs, dz, (dweight, write), scratch),
+        3 => gradient_groups::<T, I, X, 4, MR, NR>(x, inputs, dzs, (dweight, write), scratch),
+        _ => gradient_groups::<T, I, X, 2, MR, NR>(x, inputs, dzs, (dweight, write), scratch),
     }
 }
 
 #[inline(always)]
-fn gradient_groups<T: Real, I: Isa, X: Sequence<T>, const M: usize, const MR: usize, const NR: usize>(
+fn gradient_groups<T: Real, I: Isa, X: Sequences<T>, const M: usize, const MR: usize, const NR: usize>(
     x: &X,
     inputs: usize,
-    dz: Rows<'_, T>,
+    dzs: &[Rows<'_, T>],
     (dweight, write): (&mut [T], Write),
     scratch: &mut [T],
 ) {
-    let (rows, outputs) = (dz.rows(), dz.cols());
+    let outputs = dzs[0].cols();
     let (v, rest) = scratch.split_at_mut(POINTS * apart(WEIGHT_GROUPS * inputs));
     let (d_products, rest) = rest.split_at_mut(POINTS * apart(WEIGHT_GROUPS * outputs));
     let du = &mut rest[..POINTS * apart(inputs * outputs)];
-    for start in (0..rows).step_by(WEIGHT_GROUPS * M) {
-        let count = (rows - start).div_ceil(M).min(WEIGHT_GROUPS);
+    let groups = Groups::new(M, dzs.len(), dzs[0].rows());
+    for start in (0..groups.in_all).step_by(WEIGHT_GROUPS) {
+        let count = (groups.in_all - start).min(WEIGHT_GROUPS);
         let write = if start == 0 { Write::Set } else { Write::Add };
-        transform::<T, I, X, NR>(x, (start, M), (count, apart(WEIGHT_GROUPS * inputs)), inputs, v);
-        spread::<T, I, M, NR>(&dz, (start, count), d_products);
+        transform::<T, I, X, NR>(x, (groups, start), (count, apart(WEIGHT_GROUPS * inputs)), inputs, v);
+        spread::<T, I, M, NR>(dzs, (groups, start, count), d_products);
         let points = v.chunks_exact(apart(WEIGHT_GROUPS * inputs)).zip(d_products.chunks_exact(apart(WEIGHT_GROUPS * outputs)));
         for ((v, d_products), du) in points.zip(du.chunks_exact_mut(apart(inputs * outputs))) {
             let v = Rows::packed(v, count, inputs);
@@ -329,21 +366,22 @@ fn gradient_groups<T: Real, I: Isa, X: Sequence<T>, const M: usize, const MR: us
     }
 }
 
-/// Gradients of the products of `count` groups from dz, from row `start` on, as panels `[τ][out/NR][WEIGHT_GROUPS][NR]`.
+/// Gradients of the products of `count` groups from dz, from group `start` on, as panels `[τ][out/NR][WEIGHT_GROUPS][NR]`.
 #[inline(always)]
 fn spread<T: Real, I: Isa, const M: usize, const NR: usize>(
-    dz: &Rows<'_, T>,
-    (start, count): (usize, usize),
+    dzs: &[Rows<'_, T>],
+    (groups, start, count): (Groups, usize, usize),
     d_products: &mut [T],
 ) {
-    let outputs = dz.cols();
+    let outputs = dzs[0].cols();
     for group in 0..count {
+        let (sequence, first) = groups.place(start + group);
+        let dz = &dzs[sequence];
         for (panel, j) in (0..outputs).step_by(NR).enumerate() {
             let mut z = [[I::Vector::splat(T::ZERO); 2]; M];
             for (i, z) in z.iter_mut().enumerate() {
-                let row = start + group * M + i;
-                if row < dz.rows()
-                    && let Some(row) = dz.row(row)[j..].first_chunk::<NR>()
+                if first + i < dz.rows()
+                    && let Some(row) = dz.row(first + i)[j..].first_chunk::<NR>()
                 {
                     *z = tile::load::<T, I, NR>(row);
                 }

@@ -6,12 +6,18 @@
 use super::{rows, rows_mut};
 use crate::tape::Shape;
 use crate::tape::error::Result;
-use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Pack, Pass, Reads, misfit};
+use crate::tape::op::{
+    Backward, Differentiable, Forward, MICRO_BATCH, Memory, MicroBatched, Op, Pack, Pass, Reads, WEIGHT, misfit,
+};
 use phyture_kernels::activation::Activation;
-use phyture_kernels::conv1d::{self, Geometry, Weight};
+use phyture_kernels::conv1d::{self, Geometry, Weight, sequences};
 use phyture_kernels::dropout::Mask;
+use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::random::Stream;
-use phyture_kernels::{Real, Rows, RowsMut};
+use phyture_kernels::{Real, Rows, RowsMut, Write};
+
+/// The operand after the weight.
+const BIAS: usize = WEIGHT + 1;
 
 /// What follows the convolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,6 +77,46 @@ impl Conv1d {
     }
 }
 
+impl Sizes {
+    /// Numbers of y.
+    const fn results(&self) -> usize {
+        self.geometry.output_rows(self.rows) * self.outputs
+    }
+}
+
+impl Conv1d {
+    /// Into `io.y`, in parts where there are threads to spare.
+    fn forward_alone<T: Real>(&self, io: &mut Forward<'_, T>) {
+        let Some(Sizes { geometry, rows, inputs, outputs }) = self.sizes(io.shapes) else { return };
+        let (x, weight) = (Rows::packed(io.x[0], rows, inputs), weight(io.x[WEIGHT], io.packed));
+        let bias = (io.shapes.len() > BIAS).then_some(io.x[BIAS]);
+        let (isa, epilogue) = (io.isa, self.epilogue.kernel(io.stream));
+        io.parts.rows(geometry.output_rows(rows), conv1d::CUT, [&mut *io.y], &mut *io.scratch, |piece, [y], scratch| {
+            let y = RowsMut::packed(y, piece.len(), outputs);
+            conv1d::forward_rows(isa, geometry, x, (weight, bias), epilogue, (piece.start, y), scratch);
+        });
+    }
+
+    /// dz, in `to` where something follows the convolution.
+    fn backward_epilogue<'a, T: Real>(
+        &self,
+        sizes: &Sizes,
+        (isa, stream): (InstructionSet, Option<Stream>),
+        y: &[T],
+        dy: &'a [T],
+        to: &'a mut [T],
+    ) -> Rows<'a, T> {
+        let (rows, outputs) = (sizes.geometry.output_rows(sizes.rows), sizes.outputs);
+        let dy = Rows::packed(dy, rows, outputs);
+        if self.epilogue == Epilogue::None {
+            return dy;
+        }
+        let dz = RowsMut::packed(&mut *to, rows, outputs);
+        conv1d::backward_epilogue(isa, self.epilogue.kernel(stream), Rows::packed(y, rows, outputs), dy, dz);
+        Rows::packed(to, rows, outputs)
+    }
+}
+
 impl<T: Real> Op<T> for Conv1d {
     fn name(&self) -> &'static str {
         "conv1d"
@@ -95,7 +141,11 @@ impl<T: Real> Op<T> for Conv1d {
 
     fn memory(&self, operands: &[Shape]) -> Memory {
         let Some(Sizes { geometry, rows, inputs, outputs }) = self.sizes(operands) else { return Memory::default() };
-        let scratch = conv1d::scratch_len(geometry, inputs, outputs);
+        let scratch = if sequences::applies(geometry, inputs, outputs) {
+            conv1d::scratch_len_of(MICRO_BATCH, geometry, inputs, outputs)
+        } else {
+            conv1d::scratch_len(geometry, inputs, outputs)
+        };
         // Gradient of z in front.
         let backward_scratch = geometry.output_rows(rows) * outputs + scratch;
         let forward_packed = conv1d::packed_len(geometry, inputs, outputs);
@@ -111,20 +161,17 @@ impl<T: Real> Op<T> for Conv1d {
         }
     }
 
-    fn forward(&self, io: Forward<'_, T>) {
-        let ([x, _, bias @ ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
-        let Sizes { geometry, outputs, .. } = sizes;
-        let (x, weight) = (rows(io.x[0], x), weight(io.x[1], io.packed));
-        let bias = (!bias.is_empty()).then_some(io.x[2]);
-        let epilogue = self.epilogue.kernel(io.stream);
-        io.parts.rows(geometry.output_rows(sizes.rows), conv1d::CUT, [io.y], io.scratch, |piece, [y], scratch| {
-            let y = RowsMut::packed(y, piece.len(), outputs);
-            conv1d::forward_rows(io.isa, geometry, x, (weight, bias), epilogue, (piece.start, y), scratch);
-        });
+    fn forward(&self, mut io: Forward<'_, T>) {
+        self.forward_alone(&mut io);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
         Some(self)
+    }
+
+    fn micro_batched(&self, operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
+        let Sizes { geometry, inputs, outputs, .. } = self.sizes(operands)?;
+        sequences::applies(geometry, inputs, outputs).then_some(self as _)
     }
 }
 
@@ -136,18 +183,9 @@ impl<T: Real> Differentiable<T> for Conv1d {
 
     fn backward(&self, io: Backward<'_, T>) {
         let ([x, ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
-        let Sizes { geometry, outputs, .. } = sizes;
-        let count = geometry.output_rows(sizes.rows);
-        let (dz, scratch) = io.scratch.split_at_mut(count * outputs);
-        let dy = Rows::packed(io.dy, count, outputs);
-        let dz = if self.epilogue == Epilogue::None {
-            dy
-        } else {
-            let y = Rows::packed(io.y, count, outputs);
-            let to = RowsMut::packed(&mut *dz, count, outputs);
-            conv1d::backward_epilogue(io.isa, self.epilogue.kernel(io.stream), y, dy, to);
-            Rows::packed(dz, count, outputs)
-        };
+        let geometry = sizes.geometry;
+        let (dz, scratch) = io.scratch.split_at_mut(sizes.results());
+        let dz = self.backward_epilogue(&sizes, (io.isa, io.stream), io.y, io.dy, dz);
         let [dx, dweight, dbias, ..] = io.dx;
         if let Some(dx) = dx {
             let weight = weight(io.x[1], io.packed);
@@ -158,6 +196,69 @@ impl<T: Real> Differentiable<T> for Conv1d {
         }
         if let Some(dbias) = dbias {
             conv1d::backward_bias(io.isa, dz, dbias.values, dbias.write);
+        }
+    }
+}
+
+impl<T: Real> MicroBatched<T> for Conv1d {
+    fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]) {
+        let [first, others @ ..] = micro_batch else { return };
+        let Some(Sizes { geometry, rows, inputs, outputs }) = self.sizes(first.shapes) else { return };
+        if others.is_empty() {
+            return self.forward_alone(first);
+        }
+        let bias = (first.shapes.len() > BIAS).then_some(first.x[BIAS]);
+        let (isa, weight, scratch) = (first.isa, weight(first.x[WEIGHT], first.packed), std::mem::take(&mut first.scratch));
+        let mut xs = [Rows::packed(first.x[0], rows, inputs); MICRO_BATCH];
+        xs.iter_mut().zip(&*micro_batch).for_each(|(x, io)| *x = Rows::packed(io.x[0], rows, inputs));
+        let count = micro_batch.len();
+        let mut samples = micro_batch.iter_mut();
+        let activation = self.epilogue.kernel(None).activation;
+        let mut ys: [_; MICRO_BATCH] = std::array::from_fn(|_| match samples.next() {
+            Some(io) => sequences::Output {
+                y: RowsMut::packed(&mut *io.y, geometry.output_rows(rows), outputs),
+                dropout: self.epilogue.kernel(io.stream).dropout,
+            },
+            None => sequences::Output { y: RowsMut::packed(&mut [], 0, outputs), dropout: None },
+        });
+        sequences::forward(isa, geometry, &xs[..count], (weight, bias), activation, &mut ys[..count], scratch);
+    }
+
+    fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]) {
+        let count = micro_batch.len();
+        let Some(first) = micro_batch.first_mut() else { return };
+        let (Some(sizes), isa) = (self.sizes(first.shapes), first.isa) else { return };
+        let Sizes { geometry, rows, inputs, outputs } = sizes;
+        let weight = weight(first.x[WEIGHT], first.packed);
+        let (dweight, dbias) = (first.dx[WEIGHT].take(), first.dx[BIAS].take());
+        // Each has dz in its own scratch; the products work in that of the first.
+        let (own, scratch) = std::mem::take(&mut first.scratch).split_at_mut(sizes.results());
+        first.scratch = own;
+        let mut xs = [Rows::packed(&[], 0, inputs); MICRO_BATCH];
+        let mut dzs = [Rows::packed(&[], 0, outputs); MICRO_BATCH];
+        let mut dxs: [RowsMut<'_, T>; MICRO_BATCH] = std::array::from_fn(|_| RowsMut::packed(&mut [], 0, inputs));
+        let mut write = None;
+        for (index, io) in micro_batch.iter_mut().enumerate() {
+            xs[index] = Rows::packed(io.x[0], rows, inputs);
+            let dz = &mut io.scratch[..sizes.results()];
+            dzs[index] = self.backward_epilogue(&sizes, (isa, io.stream), io.y, io.dy, dz);
+            // All samples ask for the gradient of x, or none does.
+            if let Some(dx) = &mut io.dx[0] {
+                dxs[index] = RowsMut::packed(&mut *dx.values, rows, inputs);
+                write = Some(dx.write);
+            }
+        }
+        if let Some(write) = write {
+            sequences::backward_input(isa, geometry, &dzs[..count], weight, &mut dxs[..count], write, &mut *scratch);
+        }
+        if let Some(dweight) = dweight {
+            sequences::backward_weight(isa, geometry, &xs[..count], &dzs[..count], dweight.values, dweight.write, scratch);
+        }
+        if let Some(dbias) = dbias {
+            for (index, dz) in dzs[..count].iter().enumerate() {
+                let write = if index == 0 { dbias.write } else { Write::Add };
+                conv1d::backward_bias(isa, *dz, dbias.values, write);
+            }
         }
     }
 }

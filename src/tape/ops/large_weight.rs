@@ -6,7 +6,9 @@
 //! many as a kernel sums over at once. Beside a large W these copies are small.
 
 use crate::tape::Shape;
-use crate::tape::op::{Backward, Differentiable, Forward, LARGE_WEIGHT, MICRO_BATCH, MicroBatched, WEIGHT, WeightGradient};
+use crate::tape::op::{
+    Backward, Differentiable, Forward, LARGE_WEIGHT, LargeWeight, MICRO_BATCH, MicroBatched, WEIGHT, WeightGradient,
+};
 use phyture_kernels::instruction_set::InstructionSet;
 use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, strided, temporal};
 
@@ -81,6 +83,14 @@ pub(super) fn micro_batched<'a, T: Real, O: Product + Differentiable<T>>(
     op.sizes(operands).filter(|sizes| sizes.are_large()).map(|_| op as _)
 }
 
+/// The operation as one whose weight has its gradient made from all samples, if that is worth it.
+pub(super) fn large_weight<'a, T: Real, O: Product + Differentiable<T>>(
+    op: &'a O,
+    operands: &[Shape],
+) -> Option<&'a dyn LargeWeight<T>> {
+    op.sizes(operands).filter(|sizes| sizes.are_large()).map(|_| op as _)
+}
+
 impl<T: Real, O: Product + Differentiable<T>> MicroBatched<T> for O {
     fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]) {
         if let Some(sizes) = micro_batch.first().and_then(|io| self.sizes(io.shapes)) {
@@ -93,7 +103,9 @@ impl<T: Real, O: Product + Differentiable<T>> MicroBatched<T> for O {
             backward(micro_batch, sizes);
         }
     }
+}
 
+impl<T: Real, O: Product + Differentiable<T>> LargeWeight<T> for O {
     fn weight_gradient(&self, io: WeightGradient<'_, T>) {
         if let Some(sizes) = self.sizes(io.shapes) {
             weight_gradient(io, sizes);

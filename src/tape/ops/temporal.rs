@@ -6,7 +6,7 @@ use super::large_weight::{self, Product, Sizes};
 use super::{rows, rows_mut};
 use crate::tape::Shape;
 use crate::tape::error::Result;
-use crate::tape::op::{Backward, Differentiable, Forward, Memory, MicroBatched, Op, Reads, misfit};
+use crate::tape::op::{Backward, Differentiable, Forward, LargeWeight, Memory, MicroBatched, Op, Reads, misfit};
 use phyture_kernels::{Real, Rows, RowsMut, temporal};
 
 /// Operands x, W and, optionally, b.
@@ -57,6 +57,10 @@ impl<T: Real> Op<T> for Temporal {
 
     fn micro_batched(&self, operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
         large_weight::micro_batched(self, operands)
+    }
+
+    fn large_weight(&self, operands: &[Shape]) -> Option<&dyn LargeWeight<T>> {
+        large_weight::large_weight(self, operands)
     }
 }
 

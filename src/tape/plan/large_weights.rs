@@ -1,13 +1,12 @@
-//! Which weights are large: so large that operations on them take some samples at once, and that their gradients are made once from all
-//! samples of a step. Where their other buffers lie is the plan's; the arithmetic is that of `ops` and of the session.
+//! Which operations take some samples at once: those on weights that are large, whose gradients are made once from all samples of a step, and where
+//! samples take turns those that gain by it. Where their other buffers lie is the plan's; the arithmetic is that of `ops` and of the session.
 
-use super::orders::shapes_of;
+use super::orders::{Orders, operation, shapes_of};
 use crate::tape::graph::{Graph, Source, Var};
-use crate::tape::op::{Op, WEIGHT};
+use crate::tape::op::WEIGHT;
 use phyture_kernels::Real;
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::sync::Arc;
 
 /// A parameter whose gradient is made once from all samples of a step.
 #[derive(Clone, Debug)]
@@ -33,28 +32,30 @@ pub(super) struct MicroBatches {
 }
 
 impl MicroBatches {
-    /// None where samples wait for each other. A weight of which a part of the gradient comes sample by sample is no large weight.
-    pub fn of<T: Real>(graph: &Graph<T>, forward: &[usize], backward: &[usize]) -> Self {
-        let nodes = &graph.nodes;
-        let is_parameter = |var: &Var| matches!(nodes[var.0].source, Source::Parameter(_));
-        let operation = |&node: &usize| match &nodes[node].source {
-            Source::Op { op, operands } => Some((node, op, operands)),
-            _ => None,
-        };
-        if forward.iter().filter_map(operation).any(|(_, op, _)| op.coupling().is_some()) {
+    /// None where samples wait for each other. A weight of which a part of the gradient comes sample by sample is no large weight. Where samples take
+    /// turns, be it for the sake of a large weight, operations take some at once that gain by it.
+    pub fn of<T: Real>(graph: &Graph<T>, orders: &Orders, take_turns: bool) -> Self {
+        if orders.wait(graph) {
             return Self { nodes: BTreeSet::new(), weights: BTreeSet::new() };
         }
-        let suits = |op: &Arc<dyn Op<T>>, operands: &[Var]| {
+        let nodes = &graph.nodes;
+        let is_parameter = |var: &Var| matches!(nodes[var.0].source, Source::Parameter(_));
+        let suits = |&node: &usize| {
+            let (op, operands) = operation(graph, node);
             let (x, weights) = operands.split_at(WEIGHT.min(operands.len()));
             !x.iter().any(is_parameter)
                 && weights.iter().all(is_parameter)
                 && op.micro_batched(&shapes_of(graph, operands)).is_some()
         };
+        let is_large = |&node: &usize| {
+            let (op, operands) = operation(graph, node);
+            op.large_weight(&shapes_of(graph, operands)).is_some()
+        };
         let (mut weights, mut others) = (BTreeSet::new(), BTreeSet::new());
-        for (_, op, operands) in backward.iter().filter_map(operation) {
-            let micro_batched = suits(op, operands);
-            for (index, var) in operands.iter().enumerate().filter(|(_, var)| is_parameter(var)) {
-                if micro_batched && index == WEIGHT {
+        for node in &orders.backward {
+            let is_large = suits(node) && is_large(node);
+            for (index, var) in operation(graph, *node).1.iter().enumerate().filter(|(_, var)| is_parameter(var)) {
+                if is_large && index == WEIGHT {
                     weights.insert(var.0)
                 } else {
                     others.insert(var.0)
@@ -62,9 +63,13 @@ impl MicroBatches {
             }
         }
         weights.retain(|weight| !others.contains(weight));
-        let whole = |operands: &[Var]| operands.get(WEIGHT).is_some_and(|weight| !others.contains(&weight.0));
-        let micro_batched = forward.iter().filter_map(operation).filter(|(_, op, operands)| suits(op, operands) && whole(operands));
-        Self { nodes: micro_batched.map(|(node, ..)| node).collect(), weights }
+        let is_whole = |node: &usize| operation(graph, *node).1.get(WEIGHT).is_some_and(|weight| !others.contains(&weight.0));
+        let (large, gaining): (Vec<usize>, Vec<usize>) = orders.forward.iter().copied().filter(suits).partition(is_large);
+        let mut nodes: BTreeSet<usize> = large.into_iter().filter(is_whole).collect();
+        if take_turns || !nodes.is_empty() {
+            nodes.extend(gaining);
+        }
+        Self { nodes, weights }
     }
 
     /// The weights with their places in the flat slab, sorted by these, each with its node; no steps yet.

@@ -31,6 +31,11 @@ impl Orders {
         let backward = forward.iter().rev().copied().filter(|&node| backpropagated[node]).collect();
         Ok(Self { forward, backward, backpropagated })
     }
+
+    /// Whether samples wait for each other at some operation.
+    pub fn wait<T: Real>(&self, graph: &Graph<T>) -> bool {
+        self.forward.iter().any(|&node| operation(graph, node).0.coupling().is_some())
+    }
 }
 
 /// An operation of the graph and its operands, by a node of one of the lists.

@@ -132,7 +132,7 @@ impl<'a, T: Real> Steps<'a, T> {
             let end = middle + from[1].len();
             step.kept = Some(Kept { from, to: [size.len..middle, middle..end] });
             size.len = end;
-            let scratch = step.op.micro_batched(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
+            let scratch = step.op.large_weight(&step.shapes).map_or(0, |op| op.weight_scratch(&step.shapes, weight.piece));
             size.scratch = size.scratch.max(scratch);
         }
         size

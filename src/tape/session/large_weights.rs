@@ -55,7 +55,7 @@ impl<T: Real> LargeWeights<'_, T> {
     fn piece(&self, step: usize, rows: Range<usize>, gradient: Gradient<'_, T>, scratch: &mut [T]) {
         let Replay { plan, isa, samples, result_len, .. } = *self.replay;
         let step = &plan.backward[step];
-        let (Some(op), Some(kept)) = (step.op.micro_batched(&step.shapes), &step.kept) else { return };
+        let (Some(op), Some(kept)) = (step.op.large_weight(&step.shapes), &step.kept) else { return };
         let [x, dy] = kept.to.each_ref().map(|place| {
             let first = result_len - plan.kept_len + place.start;
             Rows::new(self.results.get(first..).unwrap_or_default(), samples, place.len(), result_len)
