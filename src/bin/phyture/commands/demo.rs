@@ -10,7 +10,7 @@ use super::{CHECK_FAILED, calibrate, simulate::starting_model};
 use crate::context::{Context, interruption, typed};
 use crate::pages::Figures;
 use phyture::Result;
-use phyture::critique::check::check;
+use phyture::critique::check::{CheckReport, check};
 use phyture::critique::diagnose::{Amended, Diagnosis, Options};
 use phyture::critique::digits::significant;
 use phyture::critique::{ChannelValues, Comparison};
@@ -125,6 +125,32 @@ fn fly(context: &Context, out: &Path, minutes: f64) -> Result<Flown> {
     Ok(Flown { set, explainable, hidden })
 }
 
+/// Checks the flights, and says what is not as expected, or with `--verbose` everything.
+fn checked(context: &Context, out: &Path, set: &DataSet) -> CheckReport {
+    context.say("\n2. Conventions and timing of the data");
+    let report = check(set, None);
+    if context.is_verbose() {
+        context.say(&report);
+    } else {
+        context.say(report.in_short());
+        context.say(format!("each finding: {} check {}/flights", typed(), out.display()));
+    }
+    if !report.fault {
+        context.say("What is hidden shows here, too: a lag looks like a delay, aerobatics with much missing like a moved trim. The demo goes on as it is.");
+    }
+    report
+}
+
+/// Says the errors, or with `--verbose` all that was compared.
+fn tell(context: &Context, comparison: &Comparison) {
+    if context.is_verbose() {
+        context.say(format!("\n{comparison}"));
+    } else {
+        context.say(format!("\n{}", comparison.in_short()));
+        context.say("\nOther measures, manoeuvres, regimes, shares and prediction intervals: on the page, and here with --verbose");
+    }
+}
+
 /// What both networks are trained with.
 struct Settings<'a> {
     out: &'a Path,
@@ -173,18 +199,9 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     context.say(format!("{minutes} minutes of flight and the whole story on them, in six steps; the full demo takes about two minutes on two cores at rest"));
     let Flown { set, explainable, hidden } = fly(context, out, minutes)?;
 
-    context.say("\n2. Conventions and timing of the data");
-    let report = check(&set, None);
-    if context.is_verbose() {
-        context.say(&report);
-    } else {
-        context.say(report.in_short());
-        context.say(format!("each finding: {} check {}/flights", typed(), out.display()));
-    }
-    if report.fault {
+    if checked(context, out, &set).fault {
         return Ok(ExitCode::from(CHECK_FAILED));
     }
-    context.say("What is hidden shows here, too: a lag looks like a delay, aerobatics with much missing like a moved trim. The demo goes on as it is.");
 
     context.say("\n3. The paper's baseline, calibrated on the flights that are not locked");
     let locked: Vec<String> = LOCKED.map(str::to_owned).into();
@@ -226,12 +243,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let mut judged = contest.run(&set, &split)?;
     judged.set_floor(&set, &explainable.flights)?;
     contest.trace(&set, &split, &mut judged)?;
-    if context.is_verbose() {
-        context.say(format!("\n{}", judged.comparison));
-    } else {
-        context.say(format!("\n{}", judged.comparison.in_short()));
-        context.say("\nOther measures, manoeuvres, regimes, shares and prediction intervals: on the page, and here with --verbose");
-    }
+    tell(context, &judged.comparison);
     let provenance = [
         ("data".to_owned(), format!("built-in truth helicopter, seed {}, {minutes} min; hidden: {hidden}", context.seed())),
         ("locked".to_owned(), LOCKED.join(", ")),
