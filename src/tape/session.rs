@@ -519,14 +519,18 @@ mod tests {
         Ok((graph, loss, output))
     }
 
-    /// Two convolutions of short sequences, whose weights are more than all that a sample holds.
+    /// Convolutions of short sequences, whose weights are more than all that a sample holds, scratch included.
     fn short_sequences<T: Real>() -> Result<(Graph<T>, Var, Var)> {
         let mut graph = Graph::<T>::new();
         let (x, target) = (graph.input_with_gradient("x", &[9, 32])?, graph.input("target", &[11, 32])?);
         let (first, bias) = (graph.parameter("first", &[5, 32, 64])?, graph.parameter("bias", &[64])?);
         let second = graph.parameter("second", &[3, 64, 32])?;
         let leaky = Conv1d { padding: (3, 3), epilogue: Epilogue::Leaky { leak: 0.01, dropout: 0.3 } };
-        let hidden = graph.apply(leaky, &[x, first, bias])?;
+        let mut hidden = graph.apply(leaky, &[x, first, bias])?;
+        for layer in 0..6 {
+            let weight = graph.parameter(&format!("layer {layer}"), &[5, 64, 64])?;
+            hidden = graph.apply(Conv1d { padding: (2, 2), epilogue: Epilogue::Tanh }, &[hidden, weight])?;
+        }
         let output = graph.apply(Conv1d { padding: (1, 1), epilogue: Epilogue::Tanh }, &[hidden, second])?;
         let loss = graph.apply(SquaredError { scale: 1.0 }, &[output, target])?;
         Ok((graph, loss, output))
@@ -542,7 +546,7 @@ mod tests {
         let (graph, loss, output) = short_sequences::<f64>()?;
         let plan = Plan::train(&graph, loss, &[output])?;
         let at_once = [&plan.forward, &plan.backward].map(|steps| steps.iter().filter(|step| step.micro_batched).count());
-        assert_eq!((at_once, plan.large_weights.len()), ([2, 2], 0));
+        assert_eq!((at_once, plan.large_weights.len()), ([8, 8], 0));
         assert!(!Plan::infer(&graph, &[output])?.forward.iter().any(|step| step.micro_batched), "a prediction is of one sample");
         samples_are_as_they_are_alone(&graph, loss, output)
     }
