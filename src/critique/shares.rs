@@ -261,14 +261,11 @@ impl Shares {
         let percent = |share: Share| format!("{:.0} %", 100.0 * share.share);
         let (physics, network, neither) = (percent(physics?), network?, percent(neither?));
         let of = if self.reference == MEAN { "the variance of the measurements" } else { "the reference model's error" };
-        Some(match network.share < 0.0 {
-            false => {
-                format!("Of {of}, named physics explains {physics}, the network a further {}, neither {neither}.", percent(network))
-            }
-            true => format!(
-                "Of {of}, named physics explains {physics}; the network makes it worse by {:.0} %, so that {neither} are left.",
-                -100.0 * network.share
-            ),
+        let of_physics = format!("Of {of}, named physics explains {physics}");
+        Some(match network.share {
+            share if share.abs() < 0.005 => format!("{of_physics}; the network changes less than 1 %, and {neither} are left."),
+            share if share > 0.0 => format!("{of_physics}, the network a further {}, neither {neither}.", percent(network)),
+            share => format!("{of_physics}; the network makes it worse by {:.0} %, so that {neither} are left.", -100.0 * share),
         })
     }
 }
@@ -373,6 +370,7 @@ mod tests {
         let found = of(&flights, None, &perfect)?;
         assert!(found.physics.all().into_iter().all(|share| close(share, 1.0)));
         assert!(found.network.all().into_iter().chain(found.neither.all()).all(|share| close(share, 0.0)));
+        assert!(found.sentence().is_some_and(|text| text.ends_with("100 %; the network changes less than 1 %, and 0 % are left.")));
         let base = Row { name: "base".into(), predicted: missing(&measured, |_, _| 1.0) };
         let harmful = Stages { physics: missing(&measured, |_, _| 1.0), with_linear: None, hybrid: missing(&measured, |_, _| 1.5) };
         let found = of(&flights, Some(&base), &harmful)?;
