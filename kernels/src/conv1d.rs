@@ -113,7 +113,7 @@ pub fn forward_rows<T: Real>(
         let y = sequences::Output { y, dropout: epilogue.dropout };
         return sequences::forward_rows(isa, geometry, &[x], (weight, bias), epilogue.activation, (first, &mut [y]), scratch);
     }
-    let (packed, _) = panels(isa, geometry, sizes, weight, scratch);
+    let (packed, _) = panels(isa, geometry, sizes, (weight, false), scratch);
     T::conv1d_forward(isa, Forward { geometry, x, packed, bias, epilogue, first, y });
 }
 

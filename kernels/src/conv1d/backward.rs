@@ -5,7 +5,7 @@
 //! dW[j, c, o] = Σ_t dz[t, o]·x[clamp(t + j − left), c],   db = Σ_t dz
 //! ```
 
-use super::packing::panels_of_adjoint;
+use super::packing::panels;
 use super::{Geometry, Weight, ends_len, sequences, winograd};
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows, Store};
@@ -30,7 +30,7 @@ pub fn backward_input<T: Real>(
         return sequences::backward_input(isa, geometry, &[dz], weight, &mut [dx], write, scratch);
     }
     let (ends, rest) = scratch.split_at_mut(ends_len(1, geometry, inputs, outputs));
-    let (packed, _) = panels_of_adjoint(isa, geometry, (inputs, outputs), weight, rest);
+    let (packed, _) = panels(isa, geometry, (inputs, outputs), (weight, true), rest);
     T::conv1d_backward_input(isa, BackwardInput { geometry, dz, packed, dx, write, ends });
 }
 

@@ -49,40 +49,24 @@ pub fn pack_transposed<T: Real>(
     T::conv1d_pack(isa, Pack { geometry, inputs, outputs, weight, packed, transposed: true });
 }
 
-/// The weight packed for [`forward`](super::forward), in the scratch where it is not yet, and the rest of the scratch.
+/// The weight packed for [`forward`](super::forward), or for [`backward_input`](super::backward_input) if `transposed`, in the scratch where it is not yet; and
+/// the rest of the scratch.
 pub(super) fn panels<'a, T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
-    sizes: (usize, usize),
-    weight: Weight<'a, T>,
+    (inputs, outputs): (usize, usize),
+    (weight, transposed): (Weight<'a, T>, bool),
     scratch: &'a mut [T],
 ) -> (&'a [T], &'a mut [T]) {
-    match weight {
-        Weight::Packed(packed) => (packed, scratch),
-        Weight::Plain(weight) => {
-            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, sizes.0, sizes.1));
-            pack(isa, geometry, sizes, weight, packed);
-            (packed, rest)
-        }
-    }
-}
-
-/// The same for [`backward_input`](super::backward_input).
-pub(super) fn panels_of_adjoint<'a, T: Real>(
-    isa: InstructionSet,
-    geometry: Geometry,
-    sizes: (usize, usize),
-    weight: Weight<'a, T>,
-    scratch: &'a mut [T],
-) -> (&'a [T], &'a mut [T]) {
-    match weight {
-        Weight::Packed(packed) => (packed, scratch),
-        Weight::Plain(weight) => {
-            let (packed, rest) = scratch.split_at_mut(packed_len(geometry, sizes.1, sizes.0));
-            pack_transposed(isa, geometry, sizes, weight, packed);
-            (packed, rest)
-        }
-    }
+    let weight = match weight {
+        Weight::Packed(packed) => return (packed, scratch),
+        Weight::Plain(weight) => weight,
+    };
+    let (reads, writes) = if transposed { (outputs, inputs) } else { (inputs, outputs) };
+    let (packed, rest) = scratch.split_at_mut(packed_len(geometry, reads, writes));
+    let pack = if transposed { pack_transposed } else { pack };
+    pack(isa, geometry, (inputs, outputs), weight, packed);
+    (packed, rest)
 }
 
 pub(crate) struct Pack<'a, T> {

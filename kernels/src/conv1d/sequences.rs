@@ -9,7 +9,7 @@
 //! nothing.
 
 use super::epilogue::{Epilogue, Finish};
-use super::packing::{panels, panels_of_adjoint};
+use super::packing::panels;
 use super::{Geometry, Weight, ends_len, winograd};
 use crate::activation::Activation;
 use crate::dropout::Mask;
@@ -70,7 +70,7 @@ pub(super) fn forward_rows<'a, T: Real>(
     assert!(first + rows <= geometry.output_rows(x.rows()), "conv1d: rows of y");
     assert!(bias.is_none_or(|bias| bias.len() == sizes.1), "conv1d: length of the bias");
     let epilogue = Epilogue { activation, dropout: *dropout };
-    let (packed, scratch) = panels(isa, geometry, sizes, weight, scratch);
+    let (packed, scratch) = panels(isa, geometry, sizes, (weight, false), scratch);
     T::conv1d_forward_sequences(isa, ForwardSequences { geometry, xs, packed, bias, epilogue, first, ys, scratch });
 }
 
@@ -153,7 +153,7 @@ pub fn backward_input<'a, T: Real>(
     assert!(dzs.iter().all(|other| (other.rows(), other.cols()) == (after, outputs)), "conv1d: rows of dz");
     assert!(dxs.iter().all(|other| (other.rows(), other.cols()) == (n, inputs)), "conv1d: rows of dx");
     let (ends, rest) = scratch.split_at_mut(ends_len(dzs.len(), geometry, inputs, outputs));
-    let (packed, scratch) = panels_of_adjoint(isa, geometry, (inputs, outputs), weight, rest);
+    let (packed, scratch) = panels(isa, geometry, (inputs, outputs), (weight, true), rest);
     T::conv1d_backward_input_sequences(isa, BackwardInputSequences { geometry, dzs, packed, dxs, write, ends, scratch });
 }
 
