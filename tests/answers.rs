@@ -434,7 +434,7 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
     let common = [data.as_str(), "--dataset", &dataset, "-m", &model];
     let said = run(place.path(), &[&["calibrate"], &common[..], &["-o", "model.toml", "--json", "calibration.json"]].concat())?;
     assert!(said.contains("WRONG SIGN") && said.contains("wrong sign (anti-damping)"), "{said}");
-    assert_eq!(said.matches("  note: ").count(), 9, "one line for 34 notes on single flights: {said}");
+    assert_eq!(said.matches("  note: ").count(), 10, "one line for 34 notes on single flights: {said}");
     let signs = json(place.path(), "calibration.json")?["signs"].as_array().cloned().unwrap_or_default();
     let wrong: Vec<&Value> = signs.iter().filter(|sign| sign["finding"] == "wrong").map(|sign| &sign["name"]).collect();
     assert_eq!(wrong, ["b_x", "b_y"], "{signs:?}");
@@ -444,12 +444,13 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
     let found = json(place.path(), "diagnosis.json")?;
     for channel in ["wx_dot", "wz_dot"] {
         let fall = &found["locked"]["mse_fall"][channel];
-        assert!(fall[1].as_f64().is_some_and(|low| low > 0.1), "the interval is wholly positive: {channel} {fall}");
+        assert!(fall[1].as_f64().is_some_and(|low| low > 0.0), "the interval is wholly positive: {channel} {fall}");
     }
     assert_eq!(found["confirmation"], "confirmed");
     assert!(
         told.contains("Verdict: effects missing. The model lacks")
-            && told.contains("above all `rotor_acceleration`, `dihedral_speedstab`"),
+            && told.contains("then `rotor_acceleration`")
+            && !told.contains("`wind`"),
         "{told}"
     );
     assert!(!told.contains("nothing to add") && told.contains("wy_dot changes by"), "{told}");
@@ -461,6 +462,28 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
         assert_eq!(unknown["suggested_formula"].is_string(), low > 0.0, "{unknown}");
     }
     let tried = found["unknown"][0]["tried"]["formula"].as_str().unwrap_or_default();
-    assert!(!tried.is_empty() && told.contains(&format!("`{tried}`, does not hold on 126 s")), "{told}");
+    assert!(!tried.is_empty() && told.contains(&format!("`{tried}`, does not hold on 251 s")), "{told}");
+    Ok(())
+}
+
+#[test]
+fn a_battery_that_was_put_in_anew_is_named_and_no_wind_indoors() -> Result<()> {
+    let Some(data) = crazyflie() else { return Ok(()) };
+    let place = folder()?;
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie");
+    let [data, dataset, model] =
+        [data, fixtures.join("samples.toml"), fixtures.join("bare.toml")].map(|path| path.display().to_string());
+    let common = ["loop", &data, "--dataset", &dataset, "-m", &model, "-o", "amended.toml", "--lock", "random2"];
+    let told = run(place.path(), &common)?;
+    fits(&told);
+    let amended = Model::read(place.path().join("amended.toml"))?;
+    for kind in ["rotor_acceleration", "dihedral_speedstab", "blowback_climb"] {
+        assert!(amended.effect(kind).is_some(), "{kind}: {told}");
+    }
+    assert!(amended.effect("wind").is_none(), "{told}");
+    // Two flights on one battery and two on the next: alike within a pair, apart between them.
+    let pitch = &amended.effect("trim_shift").ok_or_else(|| Error::Undetermined(told.clone()))?.coefficients[1];
+    let of = |run: usize| pitch.in_flight(&format!("random1/random1_20251017_run{run}"));
+    assert!((of(1) - of(2)).abs() < 0.5 && (of(3) - of(4)).abs() < 0.5 && (of(1) - of(3)).abs() > 1.5, "{told}");
     Ok(())
 }

@@ -149,6 +149,36 @@ fn accelerations_are_derived_when_all_six_are_absent_and_this_is_said() -> Outco
 }
 
 #[test]
+fn controls_are_held_to_the_band_of_derived_accelerations_where_that_is_asked_for_and_else_it_is_said() -> Outcome {
+    let sheet = Sheet::canonical(400);
+    let slow: Vec<f64> = sheet.get("u1").to_vec();
+    let quick = slow.iter().enumerate().map(|(row, u1)| u1 + if row % 2 == 0 { 0.5 } else { -0.5 }).collect();
+    let sheet = sheet.with("u1", quick);
+    let bare = sheet.clone().without_all(&V_DOT).without_all(&W_DOT);
+    let said = "some control moves faster than accelerations derived up to 10 Hz can show";
+    let as_it_is = read_one(&bare.csv(), "")?;
+    assert_says(&as_it_is.notes.join("\n"), &[said, "smooth_controls = true"]);
+    assert_eq!(only(&as_it_is).column(Column::U1), sheet.get("u1"));
+    let smooth = read_one(&bare.csv(), "smooth_controls = true")?;
+    let notes = smooth.notes.join("\n");
+    assert_says(&notes, &["the controls are smoothed", "-3 dB at 10 Hz", "not for a network that is to stream"]);
+    assert!(!notes.contains(said), "{notes}");
+    // What alternates from row to row is gone, what is slow is left.
+    let error = difference(&only(&smooth).column(Column::U1)[30..370], &slow[30..370]);
+    assert!(error < 0.01, "{error}");
+    // Controls that are slow enough are not worth a word; recorded accelerations need nothing of the kind.
+    let canonical = Sheet::canonical(400);
+    let notes = read_one(&canonical.clone().without_all(&V_DOT).without_all(&W_DOT).csv(), "")?.notes.join("\n");
+    assert!(!notes.contains(said), "{notes}");
+    assert_says(
+        &refusal(read_one(&canonical.csv(), "smooth_controls = true")),
+        &["smooth_controls", "angular accelerations are derived"],
+    );
+    assert_says(&refusal(read_one(&bare.csv(), "smooth_controls = 1")), &["`smooth_controls`", "true or false"]);
+    Ok(())
+}
+
+#[test]
 fn a_quaternion_may_stand_in_place_of_the_angles() -> Outcome {
     let sheet = Sheet::canonical(120);
     let parts: Vec<[f64; 4]> =

@@ -1,7 +1,7 @@
 //! Rotors one by one (`[[rotor]]` of a model file): read and written, refused with a reason, their numbers calibrated back, and an effect of theirs
 //! named where it was hidden.
 //!
-//! Seeds 71 to 79; searches are deterministic.
+//! Seeds 71 to 79, 711 and 712; searches are deterministic.
 #![cfg(feature = "files")]
 
 mod flights;
@@ -209,6 +209,25 @@ fn numbers_of_rotors_are_calibrated_back() -> Result<()> {
             "{kind}: {} in {low} to {high}, true {value}",
             coefficient.value
         );
+    }
+    Ok(())
+}
+
+#[test]
+fn what_a_multirotor_lacks_is_named_where_it_was_hidden() -> Result<()> {
+    for (hidden, seed) in [("trim_shift", 711), ("blowback_climb", 712)] {
+        let mut truth = quadrotor(Some((hidden, 0.5)))?;
+        // Of each flight as if the battery had been put in anew.
+        let own = truth.effects.last_mut().into_iter().flat_map(|effect| &mut effect.coefficients);
+        for (place, values) in own.filter_map(|coefficient| coefficient.by_flight.as_mut()).enumerate() {
+            let shift = |flight: u32| [3.0, -2.5, 2.0, -3.5][(flight as usize + place) % 4] / if place == 2 { 4.0 } else { 1.0 };
+            values.extend((0..4).map(|flight| (format!("made_up/{flight}"), shift(flight))));
+        }
+        let flights = flown(&truth, seed, 0.3)?;
+        let split = Split::for_search(&flights, seed);
+        let options = Options { seed, ..Options::default() };
+        let found = diagnose(&flights, &read(QUADROTOR)?, &split.training, &split.test, "test", &options)?;
+        assert_eq!(found.diagnosis.accepted, [hidden], "{}", found.diagnosis);
     }
     Ok(())
 }

@@ -245,11 +245,12 @@ fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64,
     if targets == Targets::Derived {
         done.common_notes.insert("the accelerations in the logs were derived from v and w, as dataset.toml says".into());
     }
+    let cutoff_hz = schema.cutoff_hz.unwrap_or(DEFAULT_CUTOFF_HZ.min(HIGHEST_CUTOFF / step_s));
+    let mut last = None;
     for (kind, first, of) in [("linear", Column::VxDot, Column::Vx), ("angular", Column::WxDot, Column::Wx)] {
         if columns.get(first).is_some() {
             continue;
         }
-        let cutoff_hz = schema.cutoff_hz.unwrap_or(DEFAULT_CUTOFF_HZ.min(HIGHEST_CUTOFF / step_s));
         let differentiator = Differentiator::new(step_s, cutoff_hz)?;
         for axis in 0..3 {
             let values = columns.canonical[of as usize + axis].as_deref().unwrap_or_default();
@@ -262,8 +263,68 @@ fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64,
             "{kind} accelerations are derived from {symbol} by a zero-phase differentiator (-3 dB at {cutoff_hz} Hz)"
         ));
         targets = Targets::Derived;
+        last = Some((kind, differentiator));
+    }
+    match &last {
+        // Velocities move slowly; it is the angular accelerations that a quick stick moves.
+        Some(("angular", differentiator)) => hold_to_band(columns, schema, differentiator, cutoff_hz, done)?,
+        _ if schema.smooth_controls => {
+            let expected = "a log whose angular accelerations are derived: only such are without what is fast";
+            return Err(table.fault("`smooth_controls` of dataset.toml, and `wx_dot wy_dot wz_dot` in the log", expected));
+        }
+        _ => (),
     }
     Ok(targets)
+}
+
+/// Of a control's variance, how much may lie where derived accelerations show nothing.
+const BEYOND_BAND: f64 = 0.05;
+
+/// Deriving is a low-pass for the accelerations; the same for the controls, where the description asks for it, else a note if they need it. Numbers of
+/// a control come out too small where it moves in a band in which the accelerations cannot answer.
+fn hold_to_band(
+    columns: &mut Columns,
+    schema: &Schema,
+    differentiator: &Differentiator,
+    cutoff_hz: f64,
+    done: &mut Assembled,
+) -> Result<()> {
+    let mut beyond = false;
+    for column in [Column::U1, Column::U2, Column::U3, Column::U4] {
+        let Some(values) = &mut columns.canonical[column as usize] else { continue };
+        let whole = without_gaps(values);
+        let smooth = differentiator.band(&whole)?;
+        if schema.smooth_controls {
+            // A cell without a value stays without one.
+            values.iter_mut().zip(smooth).filter(|(value, _)| value.is_finite()).for_each(|(value, smooth)| *value = smooth);
+            continue;
+        }
+        let rest = whole.iter().zip(&smooth).map(|(value, smooth)| (value - smooth).powi(2)).sum::<f64>();
+        let mean = whole.iter().sum::<f64>() / whole.len() as f64;
+        beyond |= rest > BEYOND_BAND * whole.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    }
+    if schema.smooth_controls {
+        done.common_notes.insert(format!(
+            "the controls are smoothed to the band of the derived accelerations (-3 dB at {cutoff_hz} Hz, zero phase), as dataset.toml says: \
+             for numbers of physics, not for a network that is to stream"
+        ));
+    } else if beyond {
+        done.common_notes.insert(format!(
+            "some control moves faster than accelerations derived up to {cutoff_hz} Hz can show, so its numbers come out too small; \
+             `smooth_controls = true` in dataset.toml holds controls to that band"
+        ));
+    }
+    Ok(())
+}
+
+/// The same with the value before in the place of what is no number.
+fn without_gaps(values: &[f64]) -> Vec<f64> {
+    let mut last = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
+    let mut filled = |&value: &f64| {
+        last = if value.is_finite() { value } else { last };
+        last
+    };
+    values.iter().map(&mut filled).collect()
 }
 
 /// Which samples the filter keeps; all without one. The clock is the time of the first sample and the step, s.

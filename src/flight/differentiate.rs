@@ -91,6 +91,18 @@ impl Differentiator {
         Ok(derivative)
     }
 
+    /// What is left of a column in the band of derived accelerations: the derivative of its running integral, by trapezoids.
+    ///
+    /// # Errors
+    /// As [`Differentiator::derivative`].
+    pub fn band(&self, values: &[f64]) -> Result<Vec<f64>> {
+        let mut integral = vec![0.0; values.len()];
+        for at in 1..values.len() {
+            integral[at] = integral[at - 1] + 0.5 * self.step_s * (values[at - 1] + values[at]);
+        }
+        self.derivative(&integral)
+    }
+
     /// Near an end: the window is widened by as much as the record cuts off.
     fn one_sided(&self, values: &[f64], at: usize) -> Result<f64> {
         let available = (at.min(values.len() - 1 - at) as f64).min(self.half_width);
@@ -166,6 +178,23 @@ mod tests {
             let differentiator = Differentiator::new(STEP_S, cutoff_hz)?;
             prop_assert!((differentiator.gain(cutoff_hz) - FRAC_1_SQRT_2).abs() <= Tolerance::Approximate.relative_f64());
             prop_assert!((differentiator.gain(cutoff_hz / 100.0) - 1.0).abs() <= Tolerance::Approximate.relative_f64());
+        }
+
+        #[test]
+        fn a_column_is_held_to_the_band_in_which_its_derivative_shows(
+            cutoff_hz in 2.0..25.0f64, frequency_hz in 0.2..30.0f64, phase in 0.0..6.0f64, level in -5.0..5.0f64,
+        ) {
+            let differentiator = Differentiator::new(STEP_S, cutoff_hz)?;
+            let turn = 2.0 * PI * frequency_hz;
+            let wave: Vec<f64> = (0..600).map(|sample: i32| level + f64::sin(turn * STEP_S * f64::from(sample) + phase)).collect();
+            let found = differentiator.band(&wave)?;
+            // What trapezoids make of the integral of a sine, times what the differentiator makes of it.
+            let half = 0.5 * turn * STEP_S;
+            let gain = differentiator.gain(frequency_hz) * half / half.tan();
+            let reach = (differentiator.reach_s() / STEP_S).round() as usize;
+            for sample in reach..600 - reach {
+                prop_assert!((found[sample] - level - gain * (wave[sample] - level)).abs() < 1e-9);
+            }
         }
 
         #[test]

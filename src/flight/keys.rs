@@ -53,6 +53,14 @@ impl Keys {
         }
     }
 
+    pub fn flag(&mut self, key: &'static str) -> Result<Option<bool>> {
+        match self.take(key) {
+            None => Ok(None),
+            Some(Value::Boolean(flag)) => Ok(Some(flag)),
+            Some(other) => Err(self.fault(key, other.to_string(), "true or false".into())),
+        }
+    }
+
     pub fn number(&mut self, key: &'static str, least: f64) -> Result<Option<f64>> {
         let number = match self.take(key) {
             None => return Ok(None),

@@ -15,12 +15,9 @@ use crate::formula::Value;
 pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Result<Option<String>> {
     let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
     for rule in rules {
-        for name in &rule.columns {
-            let Some(index) = table.index(name) else {
-                let known = table.names.join(", ");
-                let found = "no such column, though a repair rule of dataset.toml names it";
-                return Err(table.cell_of_header(name, found, format!("one of {known}")));
-            };
+        let places: Vec<usize> = rule.columns.iter().map(|name| place(table, name)).collect::<Result<_>>()?;
+        let repeated = if rule.held { repeated(table, &places) } else { Vec::new() };
+        for (name, index) in rule.columns.iter().zip(places) {
             let values = &mut table.columns[index];
             let mut bad: Vec<bool> = values.iter().map(|value| !value.is_finite()).collect();
             for formula in &rule.valid {
@@ -28,6 +25,7 @@ pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Res
                 // Not equal to one, so that a comparison with NaN counts as bad.
                 bad.iter_mut().zip(holds).for_each(|(bad, holds)| *bad |= holds != 1.0);
             }
+            bad.iter_mut().zip(&repeated).for_each(|(bad, repeated)| *bad |= repeated);
             let count = bridge(values, &bad, rule.max_gap_s / step_s);
             found += count.found;
             longest = longest.max(count.longest_bridged);
@@ -51,6 +49,20 @@ pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Res
         sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
     }
     Ok(Some(sentences.join("; ")))
+}
+
+fn place(table: &RawTable, name: &str) -> Result<usize> {
+    table.index(name).ok_or_else(|| {
+        let found = "no such column, though a repair rule of dataset.toml names it";
+        table.cell_of_header(name, found, format!("one of {}", table.names.join(", ")))
+    })
+}
+
+/// Rows in which every one of these columns has the value of the row before.
+fn repeated(table: &RawTable, places: &[usize]) -> Vec<bool> {
+    let rows = places.first().map_or(0, |&place| table.columns[place].len());
+    let same = |row: usize| places.iter().all(|&place| table.columns[place][row] == table.columns[place][row - 1]);
+    (0..rows).map(|row| row > 0 && same(row)).collect()
 }
 
 #[derive(Default)]
@@ -95,13 +107,28 @@ mod tests {
         let values = vec![nan, 1.0, nan, 9999.0, 4.0, 5.0, -1.0, nan, nan, 9.0];
         let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
         let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
-        let rule = Repair { columns: vec!["m1".into()], valid, max_gap_s: 0.02 };
+        let rule = Repair { columns: vec!["m1".into()], valid, held: false, max_gap_s: 0.02 };
         let note = repair(&mut table, &[rule], 0.01)?;
         let found = &table.columns[0];
         assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert!(found[0].is_nan() && found[6..9].iter().all(|value| value.is_nan()));
         let expected = "bad cells interpolated linearly, longest run 0.020 s: 2 of `m1`; bad cells left without a value: 4 of `m1`";
         assert_eq!(note.as_deref(), Some(expected));
+        Ok(())
+    }
+
+    #[test]
+    fn rows_that_repeat_all_columns_of_a_rule_are_bridged_and_what_stands_still_alone_is_not() -> Result<()> {
+        let wx = vec![0.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 5.0, 9.0];
+        let wy = vec![2.0, 2.0, 2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0, 8.0];
+        let mut table = RawTable { names: vec!["wx".into(), "wy".into()], columns: vec![wx, wy], ..RawTable::default() };
+        let rule = Repair { columns: vec!["wx".into(), "wy".into()], valid: Vec::new(), held: true, max_gap_s: 0.02 };
+        let note = repair(&mut table, &[rule], 0.01)?;
+        // Row 2 repeats row 1; in row 4 wx stands still and wy does not; rows 6 to 8 are longer than can be bridged.
+        assert_eq!(table.columns[0][..6], [0.0, 1.0, 2.0, 3.0, 3.0, 5.0]);
+        assert_eq!(table.columns[1][..6], [2.0, 2.0, 3.0, 4.0, 6.0, 6.0]);
+        assert!(table.columns.iter().all(|values| values[6..9].iter().all(|value| value.is_nan()) && values[9].is_finite()));
+        assert!(note.is_some_and(|note| note.contains("1 of `wx`, 1 of `wy`; bad cells left without a value: 3 of `wx`")));
         Ok(())
     }
 }

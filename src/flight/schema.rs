@@ -18,13 +18,14 @@
 //! | `minimum_length_s` | pieces that `use` or gaps leave shorter than this are left out, with a note |
 //! | `resample_hz` | rate to resample to |
 //! | `cutoff_hz` | −3 dB frequency of the differentiator where accelerations are derived |
+//! | `smooth_controls` | `true`: controls are held to the band of the derived accelerations |
 //! | `manoeuvre` | `"folder"` (default), or `{ separator = "_", part = 1 }` of the file's name |
 //! | `[classes]` | manoeuvre class = flights, by name: classes that neither folders nor names of files tell; before `manoeuvre` |
 //! | `damaged` | `"refuse"` (default) or `"stop"`: a binary log that ends within a message, or is damaged, is read up to there, with a note |
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
-//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `max_gap_s`: bad cells to interpolate linearly |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `max_gap_s`: bad cells to interpolate linearly |
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::{Axes, QuaternionOrder};
@@ -80,6 +81,8 @@ pub(crate) struct Repair {
     pub columns: Vec<String>,
     /// All must be true of `value`, else the cell is bad. NaN is bad always.
     pub valid: Vec<Formula>,
+    /// Whether a row that repeats the row before in all these columns is bad: the recorder held it where a packet was lost.
+    pub held: bool,
     /// Longest run of bad cells that is bridged, s.
     pub max_gap_s: f64,
 }
@@ -117,6 +120,8 @@ pub(crate) struct Schema {
     pub resample_hz: Option<f64>,
     /// −3 dB frequency of the differentiator; `None` for its default, lowered where the rate demands it.
     pub cutoff_hz: Option<f64>,
+    /// Whether the controls go through the low-pass that deriving is for the accelerations.
+    pub smooth_controls: bool,
     pub manoeuvre: Manoeuvre,
     /// Class by flight, as a person writes it; goes before `manoeuvre`.
     pub classes: BTreeMap<String, String>,
@@ -150,6 +155,7 @@ impl Default for Schema {
             minimum_length_s: 0.0,
             resample_hz: None,
             cutoff_hz: None,
+            smooth_controls: false,
             manoeuvre: Manoeuvre::Folder,
             classes: BTreeMap::new(),
             damaged: Damaged::Refuse,
@@ -201,6 +207,7 @@ impl Schema {
             minimum_length_s: keys.number("minimum_length_s", 0.0)?.unwrap_or(0.0),
             resample_hz: keys.number("resample_hz", f64::MIN_POSITIVE)?,
             cutoff_hz: keys.number("cutoff_hz", f64::MIN_POSITIVE)?,
+            smooth_controls: keys.flag("smooth_controls")?.unwrap_or(false),
             quaternion: keys.choice("quaternion", &QuaternionOrder::NAMES)?.unwrap_or_default(),
             stated,
             exclude: keys.texts("exclude")?.unwrap_or_default(),
@@ -251,13 +258,14 @@ impl Schema {
         for mut rule in keys.sections("repair")? {
             let columns = rule.texts("columns")?.unwrap_or_default();
             let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
+            let held = rule.flag("held")?.unwrap_or(false);
             let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
             let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
-                let expected = "`columns` and `max_gap_s`; `valid` if NaN is not the only sign of a bad cell";
+                let expected = "`columns` and `max_gap_s`; `valid` or `held` if NaN is not the only sign of a bad cell";
                 return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
             };
             rule.finish()?;
-            schema.repairs.push(Repair { columns, valid, max_gap_s });
+            schema.repairs.push(Repair { columns, valid, held, max_gap_s });
         }
         keys.finish()?;
         Ok(schema)

@@ -1,7 +1,7 @@
 //! Forces and moments of the air on fuselage, fin and tail rotor. The main rotor is in `thrust` and `rotor`.
 
 use super::super::definition::{Definition, Notes, change, coefficient, spread};
-use super::{ANY, HELICOPTER};
+use super::{ANY, HELICOPTER, MULTIROTOR};
 use crate::flight::Channel;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -90,7 +90,15 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "every heading, and banks in which the heave damping meets the wind",
-            confusable_with: &["quad_drag", "vel_cross", "tilt_misalign", "sensor_bias", "weathercock", "dihedral_speedstab"],
+            confusable_with: &[
+                "quad_drag",
+                "vel_cross",
+                "tilt_misalign",
+                "sensor_bias",
+                "weathercock",
+                "dihedral_speedstab",
+                "trim_shift",
+            ],
             would_tell_apart: "a slow pirouette in hover, and the same straight flight up and down the wind",
             fault_of_log: Some(
                 "a heading that is wrong, or velocities in axes that are turned: either follows the nose, wind does not",
@@ -168,10 +176,33 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "accelerations from hover, forwards and sideways",
-            confusable_with: &["wind", "cg_offset", "rotor_drag"],
+            confusable_with: &["wind", "cg_offset", "rotor_drag", "blowback_climb"],
             would_tell_apart: "trimmed flight at several speeds in all four directions",
             fault_of_log: None,
             source: "flapping by advance ratio: Gavrilets, da1/dmu; L_v -5.5, M_u 2.75: Walker & Tischler 2021; of multirotors: Hoffmann et al., AIAA 2007-6461",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "blowback_climb",
+        meaning: "rotors blow back less while they climb and more while they sink",
+        coefficients: &[
+            coefficient("l_vw", "rad/m²", "roll by side speed and descent").within(-30.0, 30.0).usually(-3.0, 3.0),
+            coefficient("m_uw", "rad/m²", "pitch by forward speed and descent").within(-30.0, 30.0).usually(-3.0, 3.0),
+        ],
+        parameters: &[],
+        terms: &[],
+        swaps: &[
+            change("rotor_roll", "rotor_roll + l_vw * air_vy * air_vz"),
+            change("rotor_pitch", "rotor_pitch + m_uw * air_vx * air_vz"),
+        ],
+        notes: Some(Notes {
+            vehicles: MULTIROTOR,
+            excitation: "climbs and descents while flying forwards and sideways",
+            confusable_with: &["dihedral_speedstab"],
+            would_tell_apart: "level flight, then climbs and descents at the same forward speed",
+            fault_of_log: None,
+            source: "flapping goes with 4/3 of the collective pitch and the air through the disc from below: Bramwell's Helicopter Dynamics, 2nd ed., ch. 3",
             searched: true,
         }),
     },

@@ -1,7 +1,7 @@
 //! Mass and its distribution: products of inertia, centre of mass, fuel, displaced air.
 
-use super::super::definition::{Definition, Notes, coefficient};
-use super::{ANY, HELICOPTER};
+use super::super::definition::{Definition, Notes, coefficient, spread};
+use super::{ANY, HELICOPTER, MULTIROTOR};
 use crate::flight::Channel;
 
 pub(super) const DEFINITIONS: &[Definition] = &[
@@ -57,10 +57,35 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "collective over half of its range",
-            confusable_with: &["ctrl_cross", "dihedral_speedstab"],
+            confusable_with: &["ctrl_cross", "dihedral_speedstab", "trim_shift"],
             would_tell_apart: "collective steps with the cyclic held",
             fault_of_log: None,
             source: "moment m T times the offset: 1 cm is 0.45 N m in hover",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "trim_shift",
+        meaning: "each flight has moments of its own: a battery or a load that was put in anew, a rotor that was changed or bent",
+        coefficients: &[
+            coefficient("roll", "rad/s²", "roll at 1 g of thrust").within(-60.0, 60.0).usually(-5.0, 5.0).each_flight(2.0),
+            coefficient("pitch", "rad/s²", "pitch at 1 g of thrust").within(-60.0, 60.0).usually(-5.0, 5.0).each_flight(2.0),
+            coefficient("yaw", "rad/s²", "yaw at 1 g of thrust").within(-60.0, 60.0).usually(-1.0, 1.0).each_flight(0.5),
+        ],
+        parameters: &[spread()],
+        terms: &[
+            (Channel::WxDot, Some("roll"), "-thrust / 9.80665"),
+            (Channel::WyDot, Some("pitch"), "-thrust / 9.80665"),
+            (Channel::WzDot, Some("yaw"), "-thrust / 9.80665"),
+        ],
+        swaps: &[],
+        notes: Some(Notes {
+            vehicles: MULTIROTOR,
+            excitation: "several flights, with the battery changed in between",
+            confusable_with: &["wind", "cg_offset"],
+            would_tell_apart: "hover on four headings: wind turns with the heading, the centre of mass does not",
+            fault_of_log: Some("controls that are off by a constant of each flight: their mean in hover would move with it"),
+            source: "moment m T times the offset over the moment of inertia: 0.1 mm turns a Crazyflie by 2.7 rad/s²",
             searched: true,
         }),
     },

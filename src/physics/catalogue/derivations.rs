@@ -226,6 +226,34 @@ fn droop_and_inflow_answer_a_step_of_the_collective() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn a_shifted_trim_is_a_centre_of_mass_off_the_thrust_and_its_flights_go_by_name() -> Result<()> {
+    let mut state = [0.0; 16];
+    state[Column::U4 as usize] = 0.6;
+    let offset = [0.004, -0.003];
+    let [ix, iy, _] = INERTIA;
+    // Moment m T d over the moment of inertia, at a thrust of 1 g; upright thrust is negative.
+    let moment = |distance: f64, inertia: f64| 4.58 * GRAVITY_M_S2 * distance / inertia;
+    let shift = effect("trim_shift", &[moment(offset[1], ix), -moment(offset[0], iy), 0.0])?;
+    assert_near(&added(shift.clone(), state)?, &added(effect("cg_offset", &offset)?, state)?, EXACT);
+    let mut of_flights = shift;
+    if let Some(values) = &mut of_flights.coefficients[1].by_flight {
+        values.insert("one".into(), 2.5);
+    }
+    let found = added(of_flights, state)?[Channel::WyDot.index()];
+    assert!((found - 2.5 * (20.0 * 0.6 + 0.51) / GRAVITY_M_S2).abs() < EXACT, "{found}");
+    Ok(())
+}
+
+#[test]
+fn rotors_blow_back_more_in_descent() -> Result<()> {
+    let mut state = [0.0; 16];
+    put(&mut state, Column::Vx, [2.0, 3.0, -1.5]);
+    let found = added(effect("blowback_climb", &[-1.0, 4.0])?, state)?;
+    assert_near(&found, &[0.0, 0.0, 0.0, 3.0 * 1.5, -4.0 * 2.0 * 1.5, 0.0], EXACT);
+    Ok(())
+}
+
 /// Momentum theory of a rotor whose blades lift, per mass: thrust = pitch - slope * (v + climb) = g / v_h² * v * hypot(speed, v + climb).
 struct Rotor {
     hover_m_s: f64,
