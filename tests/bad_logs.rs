@@ -119,6 +119,26 @@ fn a_stick_that_is_cut_off_is_told_from_one_at_its_end() -> Outcome {
 }
 
 #[test]
+fn rows_that_repeat_a_packet_are_told_from_rates_that_stand_still_by_rounding() -> Outcome {
+    let rates = [Column::Wx, Column::Wy, Column::Wz];
+    let told = |change: &dyn Fn(usize, &mut Vec<f64>)| -> Result<Option<String>, Error> {
+        let flights = flights(|columns| rates.into_iter().for_each(|rate| change(rate as usize, &mut columns[rate as usize])))?;
+        let report = check(&DataSet { flights, ..DataSet::default() }, None);
+        let found = report.findings.into_iter().find(|finding| finding.name == "repeated_rows");
+        assert!(found.as_ref().is_none_or(|finding| finding.verdict == Severity::Warning));
+        Ok(found.map(|finding| finding.message))
+    };
+    let lost = told(&|_, values| (7..values.len()).step_by(10).for_each(|row| values[row] = values[row - 1]))?;
+    assert!(
+        lost.as_ref().is_some_and(|message| message.contains("up to 10 % of the rows") && message.contains("held = true")),
+        "{lost:?}"
+    );
+    assert_eq!(told(&|_, values| values.iter_mut().for_each(|value| *value = (*value / 0.2).round() * 0.2))?, None);
+    assert_eq!(told(&|_, _| ())?, None);
+    Ok(())
+}
+
+#[test]
 fn dropped_samples_that_were_filled_are_counted() -> Outcome {
     assert_named("dropouts", "for up to 0.5", |columns| {
         for column in Column::ALL.into_iter().filter(|column| !column.name().starts_with('u')) {

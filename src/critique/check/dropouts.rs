@@ -1,5 +1,5 @@
 //! Samples that a recorder dropped and filled: all that is measured stands still for a while and then jumps, or to the end of the flight; or all sticks
-//! leap to one value, stay, and leap back. A single column that stands still is the business of `streams`.
+//! leap to one value, stay, and leap back; or single rows that repeat the rates of the row before. A single column that stands still is the business of `streams`.
 
 use super::finding::{Finding, Severity, finding};
 use super::flights::{CONTROLS, MOST, in_flights, named};
@@ -22,6 +22,13 @@ const LEAP: f64 = 10.0;
 const OF_RANGE: f64 = 0.05;
 /// Lost for this share of a flight, samples make effects of their own.
 const MUCH: f64 = 0.03;
+
+/// Rows that repeat the rates of the row before are told from this share of a flight on, …
+const REPEATED: f64 = 0.02;
+/// … where so many of the rows in which one axis stands are rows in which all three do, …
+const TOGETHER: f64 = 0.75;
+/// … so many times as often as if axes stood still by themselves, as rounded ones do.
+const BY_CHANCE: f64 = 3.0;
 
 const STATE: [Column; 9] =
     [Column::Roll, Column::Pitch, Column::Yaw, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
@@ -51,7 +58,48 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
             lost.how()
         )
     });
-    held.into_iter().chain(ends).chain(sticks).collect()
+    held.into_iter().chain(ends).chain(sticks).chain(repeated(flights)).collect()
+}
+
+/// Flights in which rows repeat the rates of the row before because packets were lost. A warning: nothing is wrong with the rest of such a log.
+fn repeated(flights: &[Flight]) -> Option<Finding> {
+    let found: Vec<(usize, f64)> =
+        flights.iter().enumerate().filter_map(|(index, flight)| Some((index, repeated_share(flight)?))).collect();
+    let most = found.iter().map(|(_, share)| *share).reduce(f64::max)?;
+    let names: Vec<&str> = found.iter().map(|(index, _)| flights[*index].name.as_str()).collect();
+    let message = format!(
+        "in {}: up to {:.0} % of the rows repeat all rates of the row before: packets that were lost, and the last one held; a [[repair]] rule \
+         with `held = true` for the columns of a packet bridges them",
+        named(&names),
+        100.0 * most
+    );
+    Some(finding("repeated_rows", Severity::Warning, message, None))
+}
+
+/// Share of a flight's rows that hold the rates of the row before in the place of those that were lost.
+fn repeated_share(flight: &Flight) -> Option<f64> {
+    let rates = [Column::Wx, Column::Wy, Column::Wz].map(|column| flight.column(column));
+    let stands = |sample: usize| rates.map(|values| values[sample] == values[sample - 1]);
+    let longest = ((LONG_S / flight.step_s).ceil() as usize).max(2);
+    // Rows in which each axis stands, and all; a rest that is longer is another matter.
+    let (mut rows, mut single, mut all, mut run) = (0_usize, [0_usize; 3], 0_usize, 0_usize);
+    for sample in 1..flight.len() {
+        let standing = stands(sample);
+        if standing == [true; 3] {
+            run += 1;
+            continue;
+        }
+        let held = if run < longest { run } else { 0 };
+        rows += 1 + held;
+        all += held;
+        single.iter_mut().zip(standing).for_each(|(count, stands)| *count += held + usize::from(stands));
+        run = 0;
+    }
+    flight.rest();
+    let share = |count: usize| count as f64 / rows as f64;
+    let by_chance: f64 = single.map(share).iter().product();
+    let together = all as f64 >= TOGETHER * single.into_iter().min().unwrap_or(0) as f64;
+    (share(all) >= REPEATED && together && share(all) >= BY_CHANCE * by_chance).then(|| share(all))
 }
 
 impl Lost {
