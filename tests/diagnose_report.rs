@@ -83,6 +83,7 @@ fn found() -> Diagnosis {
                 sign: None,
                 held: false,
                 rms_over_flights: None,
+                by_flight: Default::default(),
                 influence: None,
             }],
             parameters: Vec::new(),

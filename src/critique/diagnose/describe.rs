@@ -177,6 +177,7 @@ fn told_of(effect: &Effect, definition: Option<&Definition>, is_usual: bool, fal
             sign: None,
             held: false,
             rms_over_flights: rms,
+            by_flight: coefficient.by_flight.clone().unwrap_or_default(),
             influence: None,
         }
     };

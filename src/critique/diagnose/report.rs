@@ -66,6 +66,9 @@ pub struct Number {
     /// For a property of each flight: root mean square over the flights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_over_flights: Option<f64>,
+    /// The same flight by flight.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub by_flight: BTreeMap<String, f64>,
     /// The flight on which it hangs most, if it hangs on one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub influence: Option<Influence>,

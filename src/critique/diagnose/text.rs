@@ -353,6 +353,7 @@ mod tests {
             sign,
             held,
             rms_over_flights: None,
+            by_flight: Default::default(),
             influence: None,
         };
         use crate::physics::SignFinding::{NotDetermined, Physical};
@@ -392,6 +393,7 @@ mod tests {
             sign: None,
             held: false,
             rms_over_flights: None,
+            by_flight: Default::default(),
             influence: None,
         };
         let step = |place: usize| Step {

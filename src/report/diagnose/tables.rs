@@ -143,6 +143,7 @@ fn range_rows(step: &Step) -> Vec<RangeRow> {
         value: number.value,
         ci95: number.ci95,
         usual: number.expected,
+        by_flight: number.by_flight.iter().map(|(flight, value)| (flight.clone(), *value)).collect(),
     });
     let of_parameters = step.parameters.iter().filter(|parameter| !parameter.fixed).map(|parameter| RangeRow {
         name: parameter.name.clone(),
@@ -150,6 +151,7 @@ fn range_rows(step: &Step) -> Vec<RangeRow> {
         value: parameter.value,
         ci95: parameter.profile,
         usual: None,
+        by_flight: Vec::new(),
     });
     of_coefficients.chain(of_parameters).collect()
 }

@@ -37,6 +37,8 @@ pub enum Look {
     Hollow,
     /// A dot.
     Dot,
+    /// The outline of a dot.
+    Ring,
 }
 
 /// A name of the legend.
@@ -226,6 +228,7 @@ impl Key {
             Look::Faint => format!("<rect class=\"f{series} thin\" x=\"4\" y=\"1\" width=\"18\" height=\"10\"/>"),
             Look::Hollow => format!("<rect class=\"h{series}\" x=\"4\" y=\"1\" width=\"18\" height=\"10\"/>"),
             Look::Dot => format!("<circle class=\"f{series}\" cx=\"13\" cy=\"6\" r=\"4\"/>"),
+            Look::Ring => format!("<circle class=\"h{series}\" cx=\"13\" cy=\"6\" r=\"3\"/>"),
         }
     }
 }

@@ -18,6 +18,8 @@ pub struct RangeRow {
     pub ci95: Option<[f64; 2]>,
     /// What is usual.
     pub usual: Option<[f64; 2]>,
+    /// Flights that have a value of their own.
+    pub by_flight: Vec<(String, f64)>,
 }
 
 const STEP: f64 = 22.0;
@@ -25,12 +27,14 @@ const NAME: usize = 15;
 
 /// Numbers with their intervals over a band of what is usual, each row on an axis of its own that holds zero, number and band; a panel an effect.
 pub fn ranges(title: &str, caption: &str, effects: &[(String, Vec<RangeRow>)]) -> Figure {
+    let own = effects.iter().flat_map(|(_, rows)| rows).any(|row| !row.by_flight.is_empty());
+    let own = own.then_some(("each flight that has its own", 1, Look::Ring));
     let keys = [("found, with its 95 % interval", 1, Look::Dot), ("usual, where it is known", 0, Look::Faint)];
     Figure {
         title: title.to_owned(),
         caption: caption.to_owned(),
         panels: effects.iter().map(|(effect, rows)| panel(effect, rows)).collect(),
-        keys: keys.map(|(name, series, look)| Key { name: name.into(), series, look }).into(),
+        keys: keys.into_iter().chain(own).map(|(name, series, look)| Key { name: name.into(), series, look }).collect(),
         linked: false,
     }
 }
@@ -40,6 +44,15 @@ fn said(row: &RangeRow) -> String {
     significant(row.value, 3) + &unit
 }
 
+fn own(row: &RangeRow) -> impl Iterator<Item = f64> {
+    row.by_flight.iter().map(|(_, value)| *value)
+}
+
+fn ring(x: f64, y: f64, says: &str) -> String {
+    let says = crate::report::escape::escape(says);
+    format!("<circle class=\"h1\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\"><title>{says}</title></circle>\n")
+}
+
 fn panel(effect: &str, rows: &[RangeRow]) -> Panel {
     let names = rows.iter().map(|row| row.name.chars().count().min(NAME)).max().unwrap_or(0) as f64 * CHARACTER + 18.0;
     let numbers = rows.iter().map(|row| said(row).chars().count()).max().unwrap_or(0) as f64 * CHARACTER + 12.0;
@@ -47,8 +60,13 @@ fn panel(effect: &str, rows: &[RangeRow]) -> Panel {
     let mut data = Vec::new();
     for (place, row) in rows.iter().enumerate() {
         let top = 24.0 + STEP * place as f64;
-        let (low, high) =
-            ends([0.0, row.value].into_iter().chain(row.usual.into_iter().flatten()).chain(row.ci95.into_iter().flatten()));
+        let (low, high) = ends(
+            [0.0, row.value]
+                .into_iter()
+                .chain(row.usual.into_iter().flatten())
+                .chain(row.ci95.into_iter().flatten())
+                .chain(own(row)),
+        );
         let room = 0.06 * (high - low);
         let (x, y) = (Scale::linear(low - room, high + room), Scale::linear(0.0, 1.0));
         let area = Area { left: names, top, width: WIDTH - names - numbers - RIGHT, height: STEP - 4.0, x, y };
@@ -62,6 +80,10 @@ fn panel(effect: &str, rows: &[RangeRow]) -> Panel {
         body += &line("zero", [area.at_x(0.0), top + 2.0], [area.at_x(0.0), top + area.height - 2.0]);
         if let Some([from, to]) = row.ci95 {
             body += &line("wh", [area.at_x(from), middle], [area.at_x(to), middle]);
+        }
+        for (flight, value) in &row.by_flight {
+            body += &ring(area.at_x(*value), middle, &format!("{flight}: {}", significant(*value, 3)));
+            data.push(Datum { series: flight.clone(), x: row.name.clone(), y: *value, interval: None });
         }
         let outside = row.usual.is_some_and(|[from, to]| row.value < from || row.value > to);
         let usual = row.usual.map_or_else(String::new, |[from, to]| format!(", usual {from} to {to}"));
@@ -105,15 +127,17 @@ mod tests {
             value,
             ci95: Some([0.4, 0.6]),
             usual,
+            by_flight: vec![("a < b".into(), 0.7), ("c".into(), -0.2)],
         };
         let figure =
             ranges("t", "c", &[("drag".into(), vec![row(0.5, Some([0.1, 1.0])), row(0.5, Some([0.6, 1.0])), row(0.5, None)])]);
         let panel = &figure.panels[0];
         assert_eq!(well_formed(&figure.svg()), Ok(()));
         assert_eq!(
-            ["circle class=\"f1\"", "circle class=\"f2\"", "class=\"band\""].map(|what| panel.body.matches(what).count()),
-            [2, 1, 2]
+            ["circle class=\"f1\"", "circle class=\"f2\"", "class=\"band\"", "circle class=\"h1\""]
+                .map(|what| panel.body.matches(what).count()),
+            [2, 1, 2, 6]
         );
-        assert_eq!(panel.data.len(), 5);
+        assert_eq!(panel.data.len(), 11);
     }
 }
