@@ -414,23 +414,21 @@ fn too_little_data_is_said_in_a_sentence() -> Result<()> {
     Ok(())
 }
 
-/// The flights of a Crazyflie, where they are at hand: beside the project, never in it.
-fn crazyflie() -> Option<PathBuf> {
+/// The flights of a Crazyflie, where they are at hand (beside the project, never in it), and two files of its fixtures.
+fn crazyflie(dataset: &str, model: &str) -> Option<[String; 3]> {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data/crazyflie");
-    if data.is_dir() {
-        return Some(data);
+    if !data.is_dir() {
+        eprintln!("skipped: the Crazyflie flights are not at {}", data.display());
+        return None;
     }
-    eprintln!("skipped: the Crazyflie flights are not at {}", data.display());
-    None
+    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie");
+    Some([data, fixtures.join(dataset), fixtures.join(model)].map(|path| path.display().to_string()))
 }
 
 #[test]
 fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
-    let Some(data) = crazyflie() else { return Ok(()) };
+    let Some([data, dataset, model]) = crazyflie("dataset.toml", "model.toml") else { return Ok(()) };
     let place = folder()?;
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie");
-    let [data, dataset, model] =
-        [data, fixtures.join("dataset.toml"), fixtures.join("model.toml")].map(|path| path.display().to_string());
     let common = [data.as_str(), "--dataset", &dataset, "-m", &model];
     let said = run(place.path(), &[&["calibrate"], &common[..], &["-o", "model.toml", "--json", "calibration.json"]].concat())?;
     assert!(said.contains("WRONG SIGN") && said.contains("wrong sign (anti-damping)"), "{said}");
@@ -468,11 +466,8 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
 
 #[test]
 fn a_battery_that_was_put_in_anew_is_named_and_no_wind_indoors() -> Result<()> {
-    let Some(data) = crazyflie() else { return Ok(()) };
+    let Some([data, dataset, model]) = crazyflie("samples.toml", "bare.toml") else { return Ok(()) };
     let place = folder()?;
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie");
-    let [data, dataset, model] =
-        [data, fixtures.join("samples.toml"), fixtures.join("bare.toml")].map(|path| path.display().to_string());
     let common = ["loop", &data, "--dataset", &dataset, "-m", &model, "-o", "amended.toml", "--lock", "random2"];
     let told = run(place.path(), &common)?;
     fits(&told);

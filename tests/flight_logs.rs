@@ -179,6 +179,21 @@ fn controls_are_held_to_the_band_of_derived_accelerations_where_that_is_asked_fo
 }
 
 #[test]
+fn the_two_descriptions_of_the_crazyflie_read_the_same_columns_in_the_same_way() -> Outcome {
+    let fixture = |name: &str| -> Result<toml::Table, Box<dyn std::error::Error>> {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/crazyflie").join(name);
+        Ok(std::fs::read_to_string(path)?.parse()?)
+    };
+    let (whole, mut samples) = (fixture("dataset.toml")?, fixture("samples.toml")?);
+    assert!(samples.remove("cutoff_hz").is_some() && samples.remove("smooth_controls").is_some());
+    // What bridges rows that were repeated comes on top.
+    let repairs = samples.get_mut("repair").and_then(|repairs| repairs.as_array_mut()).ok_or("no repair")?;
+    repairs.retain(|rule| rule.get("held").is_none());
+    assert_eq!(samples, whole);
+    Ok(())
+}
+
+#[test]
 fn a_quaternion_may_stand_in_place_of_the_angles() -> Outcome {
     let sheet = Sheet::canonical(120);
     let parts: Vec<[f64; 4]> =

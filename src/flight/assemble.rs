@@ -246,7 +246,7 @@ fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64,
         done.common_notes.insert("the accelerations in the logs were derived from v and w, as dataset.toml says".into());
     }
     let cutoff_hz = schema.cutoff_hz.unwrap_or(DEFAULT_CUTOFF_HZ.min(HIGHEST_CUTOFF / step_s));
-    let mut last = None;
+    let mut of_angular = None;
     for (kind, first, of) in [("linear", Column::VxDot, Column::Vx), ("angular", Column::WxDot, Column::Wx)] {
         if columns.get(first).is_some() {
             continue;
@@ -263,16 +263,14 @@ fn derive(table: &RawTable, columns: &mut Columns, schema: &Schema, step_s: f64,
             "{kind} accelerations are derived from {symbol} by a zero-phase differentiator (-3 dB at {cutoff_hz} Hz)"
         ));
         targets = Targets::Derived;
-        last = Some((kind, differentiator));
+        of_angular = (of == Column::Wx).then_some(differentiator);
     }
-    match &last {
-        // Velocities move slowly; it is the angular accelerations that a quick stick moves.
-        Some(("angular", differentiator)) => hold_to_band(columns, schema, differentiator, cutoff_hz, done)?,
-        _ if schema.smooth_controls => {
-            let expected = "a log whose angular accelerations are derived: only such are without what is fast";
-            return Err(table.fault("`smooth_controls` of dataset.toml, and `wx_dot wy_dot wz_dot` in the log", expected));
-        }
-        _ => (),
+    // Velocities move slowly; it is the angular accelerations that a quick stick moves.
+    if let Some(differentiator) = of_angular {
+        hold_to_band(columns, schema, &differentiator, cutoff_hz, done)?;
+    } else if schema.smooth_controls {
+        let expected = "a log whose angular accelerations are derived: only such are without what is fast";
+        return Err(table.fault("`smooth_controls` of dataset.toml, and `wx_dot wy_dot wz_dot` in the log", expected));
     }
     Ok(targets)
 }

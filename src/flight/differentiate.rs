@@ -91,7 +91,8 @@ impl Differentiator {
         Ok(derivative)
     }
 
-    /// What is left of a column in the band of derived accelerations: the derivative of its running integral, by trapezoids.
+    /// What is left of a column in the band of derived accelerations, in its own unit, one value a sample: the derivative of its running
+    /// integral, by trapezoids.
     ///
     /// # Errors
     /// As [`Differentiator::derivative`].
