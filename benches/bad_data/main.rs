@@ -4,6 +4,7 @@
 //!     cargo bench --features cli --bench bad_data -- run OUT.jsonl [SEEDS] [WHAT…]     everything, resumable
 //!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   what is not in `reserved.rs`, on development seeds
 //!     cargo bench --features cli --bench bad_data -- table OUT.jsonl                   the tables
+//!     cargo bench --features cli --bench bad_data -- write FOLDER CORRUPTION PART SEED [HIDDEN]   the flights of one case, as a folder
 //!     cargo bench --features cli --bench bad_data -- sound                             only that each corruption changes what it is to change
 //!
 //! SEEDS is how many, 10 and 2 if it is not given, or some of them: `501..504`; WHAT are corruptions, or `clean` for data with nothing wrong. Each case is a line of
@@ -21,6 +22,7 @@ mod mend;
 mod reserved;
 mod run;
 mod second;
+mod sixth;
 mod sound;
 mod tables;
 mod third;
@@ -36,6 +38,10 @@ fn main() -> phyture::Result<()> {
         ["run", out, words @ ..] => asked(out, words, run::REPORTED),
         ["development", out, words @ ..] => asked(out, words, run::DEVELOPMENT),
         ["table", out] => tables::print(Path::new(out)),
+        ["write", folder, id, part, seed, hidden @ ..] => {
+            let seed = seed.parse().map_err(|_| phyture::Error::Undetermined(format!("`{seed}` is no seed")))?;
+            run::write_case(Path::new(folder), id, part, seed, hidden.first().copied())
+        }
         ["list"] => {
             sound::list();
             Ok(())

@@ -9,6 +9,7 @@ use crate::further::FURTHER;
 use crate::mend::through_files;
 use crate::reserved::RESERVED;
 use crate::second::SECOND;
+use crate::sixth::SIXTH;
 use crate::third::THIRD;
 use phyture::critique::check::{self, CheckReport, check};
 use phyture::critique::diagnose::{Options, diagnose};
@@ -63,13 +64,14 @@ const SHARE: f64 = 0.5;
 /// What is only reported.
 const RESERVED_HALF: &str = "reserved";
 /// All corruptions, by the round in which they were written.
-pub const HALVES: [(&str, &[Corruption]); 7] = [
+pub const HALVES: [(&str, &[Corruption]); 8] = [
     ("development", corruptions::DEVELOPMENT),
     ("further", FURTHER),
     ("second", SECOND),
     ("third", THIRD),
     ("fourth", FOURTH),
     ("fifth", FIFTH),
+    ("sixth", SIXTH),
     (RESERVED_HALF, RESERVED),
 ];
 
@@ -113,7 +115,7 @@ pub struct Mended {
 /// One case.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Line {
-    /// `development`, `further`, `second`, `third`, `fourth`, `fifth`, `reserved`, `uncorrupted` or `clean`.
+    /// `development`, `further`, `second`, `third`, `fourth`, `fifth`, `sixth`, `reserved`, `uncorrupted` or `clean`.
     pub half: String,
     /// Identifier; of a clean set what flies in it.
     pub corruption: String,
@@ -390,6 +392,18 @@ impl Bench<'_> {
         judge(&mut line, &simulate(&simulation)?, false);
         self.write(&line)
     }
+}
+
+/// Writes the flights of one case as CSV files into a folder, to look at with the program itself.
+pub fn write_case(folder: &Path, id: &str, part: &str, seed: u64, hidden: Option<&str>) -> Result<()> {
+    let unknown = |what: String| Error::Undetermined(what);
+    let mut every = HALVES.iter().flat_map(|(_, list)| list.iter());
+    let corruption = every.find(|corruption| corruption.id == id).ok_or_else(|| unknown(format!("no corruption `{id}`")))?;
+    let part = [Part::All, Part::Half, Part::One].into_iter().find(|each| each.name() == part);
+    let part = part.ok_or_else(|| unknown("the part is none of all, half and one".into()))?;
+    let Corrupted { set, .. } = corrupted(&simulated(seed, MINUTES, hidden)?, corruption, part, seed)?;
+    phyture::flight::write::data_set_csv(folder, &set.flights)?;
+    model().write(folder.join("model.toml"))
 }
 
 /// Runs a plan, or of it only what is asked for: identifiers of corruptions, and `clean`.

@@ -219,10 +219,9 @@ pub(super) fn accepted(step: &Step) -> CandidateReport {
     }
 }
 
-/// What is said of an effect that only stands in for something else.
-pub(super) fn taken_back(found: &Found) -> CandidateReport {
-    let reason = "stands in for a stronger dependence that is in no effect of the catalogue".into();
-    CandidateReport { status: Status::SamePhysics, reason, ..accepted(&found.step) }
+/// What is said of an effect that was found and is not named, and why.
+pub(super) fn taken_back(found: &Found, reason: &str) -> CandidateReport {
+    CandidateReport { status: Status::SamePhysics, reason: reason.into(), ..accepted(&found.step) }
 }
 
 /// What is said of an effect that was accepted and is needless beside the later ones, with the shares that it still removes by channel.

@@ -69,7 +69,7 @@ pub(super) fn failure(flights: &[Flight], measured: &Measured<'_>, unknown: &[Un
 }
 
 /// Variance of a measured column over spans; `None` where it does not vary.
-fn variance(flights: &[Flight], spans: &[Span], column: Column) -> Option<f64> {
+pub(super) fn variance(flights: &[Flight], spans: &[Span], column: Column) -> Option<f64> {
     let values = || {
         spans.iter().flat_map(|span| {
             let whole = flights.get(span.flight).map_or(&[][..], |flight| flight.column(column));

@@ -43,6 +43,7 @@ mod significance;
 mod signs;
 mod stepwise_stlsq;
 mod suggest;
+mod support;
 mod text;
 mod verdict;
 mod watch;

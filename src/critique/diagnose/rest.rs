@@ -42,6 +42,9 @@ fn least(unknown: &Unknown) -> f64 {
     if of_loop.contains(&first) { LEAST_OF_LOOP } else { 0.0 }
 }
 
+/// What is said of an effect that only stands in for something else.
+pub(super) const STANDS_IN: &str = "stands in for a stronger dependence that is in no effect of the catalogue";
+
 /// What an effect took from a channel's mean squared error, and what is left there.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Share {

@@ -5,7 +5,7 @@ use super::candidate::{Candidate, candidates, is_found};
 use super::confirm::confirm;
 use super::describe::{accepted, summary, taken_back};
 use super::engine::{Engine, permuted_folds};
-use super::failure::{Measured, failure};
+use super::failure::{Measured, failure, variance};
 use super::forward::has_many;
 use super::found::Found;
 use super::gates::{
@@ -14,10 +14,11 @@ use super::gates::{
 use super::gram::blocks;
 use super::own::prediction_errors;
 use super::report::{CandidateReport, Diagnosis, Method, Verdict};
-use super::rest::{Share, channel, dependences, stands_in};
+use super::rest::{STANDS_IN, Share, channel, dependences, stands_in};
 use super::search::{Options, Search};
 use super::significance::Flips;
 use super::signs::wrong_signs;
+use super::support::doubt;
 use super::{sentences, signs, suggest};
 use crate::critique::unknown::Unknown;
 use crate::error::{Error, Result};
@@ -167,10 +168,10 @@ impl Search<'_> {
         let unknown_of = |model: &Model| dependences(ground.flights, model, ground.searched, ground.block_s, self.options.seed);
         self.options.watch.at("what the rest of the error depends on")?;
         let mut unknown = unknown_of(&fitted(&found))?;
-        let stand_ins = self.stand_ins(&found, before, &unknown)?;
-        if !stand_ins.is_empty() {
-            left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
-            self.without(&mut found, &stand_ins, before)?;
+        let unfounded = self.unfounded(ground, &found, &unknown)?;
+        if !unfounded.is_empty() {
+            left.splice(0..0, unfounded.reports(&found));
+            self.without(&mut found, &unfounded.names(), before)?;
             unknown = unknown_of(&fitted(&found))?;
         }
         self.options.watch.at("intervals of the numbers")?;
@@ -200,13 +201,14 @@ impl Search<'_> {
         left.extend(self.reports(&refused, &[]));
         self.options.watch.at("what the rest of the error depends on")?;
         let unknown = dependences(ground.flights, &model, ground.searched, ground.block_s, self.options.seed)?;
-        let stand_ins = self.stand_ins(&found, ground.before, &unknown)?;
-        if stand_ins.is_empty() {
+        let unfounded = self.unfounded(ground, &found, &unknown)?;
+        if unfounded.is_empty() {
             return Ok(Heard { found, left, unknown, roads: Some(roads), at_once: true });
         }
-        left.splice(0..0, found.iter().filter(|found| stand_ins.contains(&found.step.effect)).map(taken_back));
-        let fitted = self.refitted(&model, &stand_ins)?;
-        let needed = needed.iter().filter(|judged| !stand_ins.contains(&judged.effect));
+        left.splice(0..0, unfounded.reports(&found));
+        let names = unfounded.names();
+        let fitted = self.refitted(&model, &names)?;
+        let needed = needed.iter().filter(|judged| !names.contains(&judged.effect));
         let mut found: Vec<Found> = needed.filter_map(|judged| self.needed(judged, &fitted)).collect();
         let model = fitted.model;
         self.judge_signs(&model, &mut found);
@@ -259,28 +261,56 @@ impl Search<'_> {
         Ok(Outcome { diagnosis, model: after })
     }
 
-    /// Effects that only stand in for a dependence outside the catalogue, by what the models before and after predict.
-    fn stand_ins(&self, found: &[Found], before: &Model, unknown: &[Unknown]) -> Result<Vec<String>> {
-        let Some(last) = found.last().filter(|_| !unknown.is_empty()) else { return Ok(Vec::new()) };
+    /// Effects that only stand in for a dependence outside the catalogue, or beside which too much stays unexplained, by what the models before and
+    /// after predict.
+    fn unfounded(&self, ground: &Ground<'_>, found: &[Found], unknown: &[Unknown]) -> Result<Unfounded> {
+        let Some(last) = found.last() else { return Ok(Unfounded::default()) };
         let rows = self.engine.rows().max(1) as f64;
         let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
-        // What an earlier search had found is in the model that was given: it, too, is held against what is left without it.
-        let mut bare = before.clone();
-        bare.effects.retain(|effect| !found.iter().any(|found| found.step.effect == effect.name));
-        if bare.effects.len() < before.effects.len() {
-            bare = self.engine.pass(&bare, &[])?.base.model;
-        }
-        let [whole, left] = [mse(&bare)?, mse(&last.model)?];
-        let is_one = |found: &&Found| {
+        let left = mse(&last.model)?;
+        let whole = if unknown.is_empty() { left } else { mse(&self.bare(ground.before, found)?)? };
+        let variance = PerChannel::from_fn(|channel| variance(ground.flights, ground.searched, channel.column()).unwrap_or(f64::NAN));
+        let why = |found: &Found| {
             let shares = PerChannel::from_fn(|channel| Share {
                 by_all: whole[channel] - left[channel],
                 by_itself: found.took(channel, left[channel]),
                 left: left[channel],
             });
-            let effect = found.model.effect(&found.step.effect);
-            effect.is_some_and(|effect| stands_in(effect, &found.channels, &shares, unknown))
+            let effect = found.model.effect(&found.step.effect)?;
+            let stands = !unknown.is_empty() && stands_in(effect, &found.channels, &shares, unknown);
+            stands.then_some(STANDS_IN).or_else(|| doubt(&effect.kind, &found.channels, &shares, &variance))
         };
-        Ok(found.iter().filter(is_one).map(|found| found.step.effect.clone()).collect())
+        Ok(Unfounded(found.iter().filter_map(|found| Some((found.step.effect.clone(), why(found)?))).collect()))
+    }
+
+    /// The model that was given without what was found: what an earlier search had found is in it, and, too, is held against what is left without it.
+    fn bare(&self, before: &Model, found: &[Found]) -> Result<Model> {
+        let mut bare = before.clone();
+        bare.effects.retain(|effect| !found.iter().any(|found| found.step.effect == effect.name));
+        if bare.effects.len() < before.effects.len() {
+            bare = self.engine.pass(&bare, &[])?.base.model;
+        }
+        Ok(bare)
+    }
+}
+
+/// Effects that were found and are not named, and why.
+#[derive(Default)]
+struct Unfounded(Vec<(String, &'static str)>);
+
+impl Unfounded {
+    fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    fn names(&self) -> Vec<String> {
+        self.0.iter().map(|(name, _)| name.clone()).collect()
+    }
+
+    /// What is said of them.
+    fn reports(&self, found: &[Found]) -> Vec<CandidateReport> {
+        let of = |name: &str| found.iter().find(|found| found.step.effect == name);
+        self.0.iter().filter_map(|(name, why)| Some(taken_back(of(name)?, why))).collect()
     }
 }
 
@@ -353,8 +383,11 @@ mod tests {
             suggested_formula: None,
             skeleton: String::new(),
         };
-        assert!(search.stand_ins(&found, &before, std::slice::from_ref(&unknown))?.is_empty());
-        assert!(search.stand_ins(&found, &model(), &[unknown])?.is_empty(), "and of this search");
+        let bare = model();
+        for (before, whose) in [(&before, "of an earlier search"), (&bare, "of this search")] {
+            let ground = Ground { flights: &flights, searched: &spans, locked: &[], part: "test", block_s: 10.0, before };
+            assert!(search.unfounded(&ground, &found, std::slice::from_ref(&unknown))?.is_empty(), "{whose}");
+        }
         Ok(())
     }
 
