@@ -514,7 +514,7 @@ fn a_sign_or_unit_or_delay_of_one_stream_in_some_flights_is_named_with_these() {
             of.contains(&column).then(|| (0..values.len()).map(at).collect())
         }
     };
-    assert_odd(&[1], "targets_offset", "the targets come later than the velocity", late(&V_DOT, 5));
+    assert_odd(&[1], "targets_offset", "the linear accelerations come later than the velocity", late(&V_DOT, 5));
     let sticks = [Column::U1, Column::U2, Column::U3, Column::U4];
     assert_odd(&[0, 2], "control_delay", "in 2 of 4 flights (0, 2): the controls come late by about 80 ms", late(&sticks, 8));
 }

@@ -856,7 +856,10 @@ fn vibration(log: &mut Log, chance: &mut Chance) {
     let turn = std::f64::consts::TAU * HERTZ * log.step_s;
     for (column, size) in LINEAR.into_iter().zip([3.0, 3.0, 5.0]) {
         let phase = std::f64::consts::TAU * chance.uniform();
-        log.of_column(column).iter_mut().enumerate().for_each(|(sample, value)| *value += size * (phase + turn * sample as f64).sin());
+        log.of_column(column)
+            .iter_mut()
+            .enumerate()
+            .for_each(|(sample, value)| *value += size * (phase + turn * sample as f64).sin());
     }
 }
 

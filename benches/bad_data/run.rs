@@ -11,7 +11,7 @@ use crate::reserved::RESERVED;
 use crate::second::SECOND;
 use crate::sixth::SIXTH;
 use crate::third::THIRD;
-use phyture::critique::check::{self, CheckReport, check};
+use phyture::critique::check::{self, CheckReport, check, mend};
 use phyture::critique::diagnose::{Options, diagnose};
 use phyture::flight::split::Split;
 use phyture::flight::{DataSet, Flight};
@@ -259,16 +259,17 @@ fn recognise(line: &mut Line, corruption: &Corruption, set: &DataSet, hit: &[Str
     line.flights_named = hit.iter().any(holds) && !others.filter(|name| !hit.contains(name)).any(|name| holds(&name));
 }
 
-/// The same flights with what `check` says to set; `None` where it says nothing that a file can hold.
+/// The same flights with what `check` says to set, round after round, as `check --suggest` does; `None` where it says nothing that a file can hold.
 fn mended(line: &Line, report: &CheckReport, set: &DataSet) -> Option<Mended> {
-    let suggestion = report.suggestion(&set.source).filter(|suggestion| !suggestion.mends.is_empty())?;
-    let description = suggestion.text;
+    let flights = &set.flights;
+    let made = mend(set, report, Some(&model()), |text| through_files(flights, Some(text)))?;
     let mut after = Line { seed: line.seed, ..Line::default() };
-    match through_files(&set.flights, Some(&description)) {
-        Ok(set) => drop(judge(&mut after, &set, true)),
-        Err(error) => after.verdict = format!("error: {error}"),
+    match &made.set {
+        Some(set) => drop(judge(&mut after, set, true)),
+        None => after.verdict = "error: the flights cannot be read with it".into(),
     }
     let is_free = after.faults.is_empty() && !after.verdict.starts_with("error");
+    let description = made.suggestion.text;
     Some(Mended { description, is_free, verdict: after.verdict, accepted: after.accepted, rmse: after.rmse })
 }
 

@@ -112,7 +112,7 @@ fn of_part(
     cuts: Cuts,
     done: &mut Assembled,
 ) -> Result<()> {
-    if let Some(note) = repair::repair(&mut table, &schema.repairs, part.step_s)? {
+    if let Some(note) = repair::repair(&mut table, schema, part.step_s)? {
         done.own_notes.push(format!("`{name}`: {note}"));
     }
     let mut columns = convert(&table, schema, part.step_s)?;
@@ -146,6 +146,9 @@ fn of_part(
     let used = rows_in_use(&columns, &absent, schema, samples, (start_s, step_s));
     let mut used = used.map_err(|error| error.standing_in(&format!("{}, `use` of dataset.toml", table.path.display())))?;
     used.iter_mut().enumerate().for_each(|(sample, used)| *used &= whole.contains(&sample));
+    if !schema.repairs.is_empty() {
+        without_lost_ends(&mut used, &columns, name, done);
+    }
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();
@@ -360,6 +363,23 @@ fn runs(used: &[bool]) -> Vec<Range<usize>> {
 }
 
 /// Refuses a row in use with a cell that no rule could repair, or a formula that gives no number.
+/// Rows at the ends of a log that repair rules left without a value are not used: there is nothing to bridge them to.
+fn without_lost_ends(used: &mut [bool], columns: &Columns, name: &str, done: &mut Assembled) {
+    let is_lost =
+        |row: &usize| columns.canonical.iter().flatten().any(|values| values.get(*row).is_some_and(|value| value.is_nan()));
+    let first = (0..used.len()).take_while(is_lost).count();
+    let last = (first..used.len()).rev().take_while(is_lost).count();
+    if first + last == 0 {
+        return;
+    }
+    let end = used.len() - last;
+    used[..first].fill(false);
+    used[end..].fill(false);
+    done.own_notes.push(format!(
+        "`{name}`: {first} rows at the start and {last} at the end, bad cells without a good one beyond, are left out"
+    ));
+}
+
 fn check_used(table: &RawTable, columns: &Columns, run: &Range<usize>, row_of: &dyn Fn(usize) -> usize) -> Result<()> {
     let canonical = Column::ALL.into_iter().filter_map(|column| columns.get(column).map(|values| (column.name(), values)));
     for (name, values) in canonical.chain(columns.extra.iter().map(|(name, values)| (name.as_str(), values.as_slice()))) {

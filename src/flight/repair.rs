@@ -1,6 +1,6 @@
 //! Known-bad cells of sensor columns, bridged by rules that the dataset description states, and counted. Nothing else is mended.
 
-use super::schema::Repair;
+use super::schema::{Repair, Schema};
 use super::table::RawTable;
 use crate::error::Result;
 use crate::formula::Value;
@@ -12,11 +12,11 @@ use crate::formula::Value;
 ///
 /// # Errors
 /// [`Error::Cell`](crate::Error::Cell) if a rule's column is not in the file.
-pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Result<Option<String>> {
+pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Result<Option<String>> {
     let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
-    for rule in rules {
+    for rule in &schema.repairs {
         let places: Vec<usize> = rule.columns.iter().map(|name| place(table, name)).collect::<Result<_>>()?;
-        let repeated = if rule.held { repeated(table, &places) } else { Vec::new() };
+        let together = together(table, rule, &places);
         for (name, index) in rule.columns.iter().zip(places) {
             let values = &mut table.columns[index];
             let mut bad: Vec<bool> = values.iter().map(|value| !value.is_finite()).collect();
@@ -25,8 +25,11 @@ pub(super) fn repair(table: &mut RawTable, rules: &[Repair], step_s: f64) -> Res
                 // Not equal to one, so that a comparison with NaN counts as bad.
                 bad.iter_mut().zip(holds).for_each(|(bad, holds)| *bad |= holds != 1.0);
             }
-            bad.iter_mut().zip(&repeated).for_each(|(bad, repeated)| *bad |= repeated);
-            let count = bridge(values, &bad, rule.max_gap_s / step_s);
+            bad.iter_mut().zip(&together).for_each(|(bad, together)| *bad |= together);
+            if let Some(least) = rule.spike {
+                spikes(values, least).for_each(|row| bad[row] = true);
+            }
+            let count = bridge(values, &bad, rule.max_gap_s / step_s, schema.turn_of(name));
             found += count.found;
             longest = longest.max(count.longest_bridged);
             if count.bridged > 0 {
@@ -58,11 +61,23 @@ fn place(table: &RawTable, name: &str) -> Result<usize> {
     })
 }
 
-/// Rows in which every one of these columns has the value of the row before.
-fn repeated(table: &RawTable, places: &[usize]) -> Vec<bool> {
+/// Rows that are bad in all columns of a rule: each has the value of the row before, or is 0.
+fn together(table: &RawTable, rule: &Repair, places: &[usize]) -> Vec<bool> {
     let rows = places.first().map_or(0, |&place| table.columns[place].len());
-    let same = |row: usize| places.iter().all(|&place| table.columns[place][row] == table.columns[place][row - 1]);
-    (0..rows).map(|row| row > 0 && same(row)).collect()
+    let all = |is_so: &dyn Fn(&[f64]) -> bool| places.iter().all(|&place| is_so(&table.columns[place]));
+    let is_held = |row: usize| rule.held && row > 0 && all(&|values| values[row] == values[row - 1]);
+    let is_zero = |row: usize| rule.zero && all(&|values| values[row] == 0.0);
+    (0..rows).map(|row| is_held(row) || is_zero(row)).collect()
+}
+
+/// Cells that lie farther than `least` beyond both their neighbours, on the same side.
+fn spikes(values: &[f64], least: f64) -> impl Iterator<Item = usize> {
+    let sticks_out = move |three: &&[f64]| {
+        let [from, to] = [three[1] - three[0], three[1] - three[2]];
+        from * to > 0.0 && from.abs().min(to.abs()) > least
+    };
+    let rows: Vec<usize> = (1..).zip(values.windows(3)).filter(|(_, three)| sticks_out(three)).map(|(row, _)| row).collect();
+    rows.into_iter()
 }
 
 #[derive(Default)]
@@ -72,7 +87,8 @@ struct Count {
     longest_bridged: usize,
 }
 
-fn bridge(values: &mut [f64], bad: &[bool], longest: f64) -> Count {
+/// Bridges runs of at most `longest` samples; in a column in which a `turn` is nothing, the short way round.
+fn bridge(values: &mut [f64], bad: &[bool], longest: f64, turn: Option<f64>) -> Count {
     let mut count = Count::default();
     let mut start = 0;
     while let Some(offset) = bad[start..].iter().position(|&bad| bad) {
@@ -83,8 +99,10 @@ fn bridge(values: &mut [f64], bad: &[bool], longest: f64) -> Count {
         // A hundredth of a sample for the rounding of the quotient.
         if first > 0 && end < values.len() && length as f64 <= longest + 0.01 {
             let (before, after) = (values[first - 1], values[end]);
+            let change = turn.map_or(after - before, |turn| after - before - turn * ((after - before) / turn).round());
             for (step, value) in values[first..end].iter_mut().enumerate() {
-                *value = before + (after - before) * (step + 1) as f64 / (length + 1) as f64;
+                let bridged = before + change * (step + 1) as f64 / (length + 1) as f64;
+                *value = turn.map_or(bridged, |turn| bridged - turn * (bridged / turn).round());
             }
             count.bridged += length;
             count.longest_bridged = count.longest_bridged.max(length);
@@ -99,6 +117,16 @@ fn bridge(values: &mut [f64], bad: &[bool], longest: f64) -> Count {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn rule(columns: &[&str]) -> Repair {
+        let columns = columns.iter().map(|&name| name.to_owned()).collect();
+        Repair { columns, valid: Vec::new(), held: false, zero: false, spike: None, max_gap_s: 0.02 }
+    }
+
+    fn with(rule: Repair) -> Schema {
+        Schema { repairs: vec![rule], ..Schema::default() }
+    }
+
     use crate::formula::Formula;
 
     #[test]
@@ -107,8 +135,8 @@ mod tests {
         let values = vec![nan, 1.0, nan, 9999.0, 4.0, 5.0, -1.0, nan, nan, 9.0];
         let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
         let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
-        let rule = Repair { columns: vec!["m1".into()], valid, held: false, max_gap_s: 0.02 };
-        let note = repair(&mut table, &[rule], 0.01)?;
+        let rule = Repair { valid, ..rule(&["m1"]) };
+        let note = repair(&mut table, &with(rule), 0.01)?;
         let found = &table.columns[0];
         assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert!(found[0].is_nan() && found[6..9].iter().all(|value| value.is_nan()));
@@ -122,13 +150,35 @@ mod tests {
         let wx = vec![0.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 5.0, 9.0];
         let wy = vec![2.0, 2.0, 2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0, 8.0];
         let mut table = RawTable { names: vec!["wx".into(), "wy".into()], columns: vec![wx, wy], ..RawTable::default() };
-        let rule = Repair { columns: vec!["wx".into(), "wy".into()], valid: Vec::new(), held: true, max_gap_s: 0.02 };
-        let note = repair(&mut table, &[rule], 0.01)?;
+        let rule = Repair { held: true, ..rule(&["wx", "wy"]) };
+        let note = repair(&mut table, &with(rule), 0.01)?;
         // Row 2 repeats row 1; in row 4 wx stands still and wy does not; rows 6 to 8 are longer than can be bridged.
         assert_eq!(table.columns[0][..6], [0.0, 1.0, 2.0, 3.0, 3.0, 5.0]);
         assert_eq!(table.columns[1][..6], [2.0, 2.0, 3.0, 4.0, 6.0, 6.0]);
         assert!(table.columns.iter().all(|values| values[6..9].iter().all(|value| value.is_nan()) && values[9].is_finite()));
         assert!(note.is_some_and(|note| note.contains("1 of `wx`, 1 of `wy`; bad cells left without a value: 3 of `wx`")));
+        Ok(())
+    }
+
+    #[test]
+    fn rows_of_zeros_are_bridged_round_the_turn_and_single_zeros_are_values() -> Result<()> {
+        let (yaw, x) = (vec![3.0, 3.1, 0.0, 0.0, -3.0, 0.0], vec![5.0, 0.0, 0.0, 0.0, 2.0, 1.0]);
+        let mut table = RawTable { names: vec!["yaw".into(), "x".into()], columns: vec![yaw, x], ..RawTable::default() };
+        repair(&mut table, &with(Repair { zero: true, ..rule(&["yaw", "x"]) }), 0.01)?;
+        // From 3.1 to −3.0 is 0.18 round the turn; what is left of the second step is on the other side.
+        let expected = [3.0, 3.1, 3.1 + 0.183_185 / 3.0, -3.0 - 0.183_185 / 3.0, -3.0, 0.0];
+        let near = table.columns[0].iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-5);
+        assert!(near, "{:?}", table.columns[0]);
+        assert_eq!(table.columns[1][1], 0.0, "yaw was there");
+        Ok(())
+    }
+
+    #[test]
+    fn what_sticks_out_is_a_spike_and_a_step_is_none() -> Result<()> {
+        let wx = vec![0.0, 9.0, 0.2, 0.3, 7.0, 7.1, 7.2, -1.0, 7.4];
+        let mut table = RawTable { names: vec!["wx".into()], columns: vec![wx], ..RawTable::default() };
+        repair(&mut table, &with(Repair { spike: Some(4.0), ..rule(&["wx"]) }), 0.01)?;
+        assert_eq!(table.columns[0], [0.0, 0.1, 0.2, 0.3, 7.0, 7.1, 7.2, 7.3, 7.4]);
         Ok(())
     }
 }

@@ -25,7 +25,7 @@
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
-//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `max_gap_s`: bad cells to interpolate linearly |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly |
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::{Axes, QuaternionOrder};
@@ -83,6 +83,10 @@ pub(crate) struct Repair {
     pub valid: Vec<Formula>,
     /// Whether a row that repeats the row before in all these columns is bad: the recorder held it where a packet was lost.
     pub held: bool,
+    /// Whether a row in which all these columns hold 0 is bad: that is written where nothing was received.
+    pub zero: bool,
+    /// A cell that lies farther than this beyond both its neighbours, on the same side, is bad; in the unit of the file.
+    pub spike: Option<f64>,
     /// Longest run of bad cells that is bridged, s.
     pub max_gap_s: f64,
 }
@@ -259,13 +263,16 @@ impl Schema {
             let columns = rule.texts("columns")?.unwrap_or_default();
             let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
             let held = rule.flag("held")?.unwrap_or(false);
+            let zero = rule.flag("zero")?.unwrap_or(false);
+            let spike = rule.number("spike", f64::MIN_POSITIVE)?;
             let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
             let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
-                let expected = "`columns` and `max_gap_s`; `valid` or `held` if NaN is not the only sign of a bad cell";
+                let expected =
+                    "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
                 return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
             };
             rule.finish()?;
-            schema.repairs.push(Repair { columns, valid, held, max_gap_s });
+            schema.repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s });
         }
         keys.finish()?;
         Ok(schema)
@@ -291,6 +298,16 @@ impl Schema {
     pub fn not_of_canonical_columns(&self) -> BTreeSet<&str> {
         let keys = self.stated.keys().filter_map(|key| key.split('.').next());
         keys.filter(|key| !OF_CANONICAL_COLUMNS.contains(key)).collect()
+    }
+
+    /// A full turn in the unit of a column of the file, if that is an angle which wraps round: a straight line over a wrap is no bridge.
+    pub fn turn_of(&self, of_file: &str) -> Option<f64> {
+        let is_read = |angle: &&str| match self.columns.get(*angle) {
+            None => *angle == of_file,
+            Some(sources) => sources.iter().any(|source| source == of_file),
+        };
+        let angle = ["roll", "yaw"].into_iter().find(is_read)?;
+        Some(std::f64::consts::TAU / self.factor(angle))
     }
 
     /// Factor to SI of a canonical column.

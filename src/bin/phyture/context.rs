@@ -137,6 +137,12 @@ impl<'a> Context<'a> {
         Ok(set)
     }
 
+    /// The same flights as another description reads them; nothing is said.
+    pub fn flights_described(data: &Data, text: &str) -> Result<DataSet> {
+        let options = ReadOptions { described: Some(text.into()), split_at_gaps: data.split_at_gaps, ..ReadOptions::default() };
+        without(data_set(&data.data, &options)?, data)
+    }
+
     /// The model of a file; without one that of a `model.toml` beside the flights, which is said; without that the paper's baseline
     /// for the vehicle of the paper, which is a warning, as the vehicle is a guess.
     pub fn model(&self, path: Option<&Path>, data: &Data) -> Result<Model> {

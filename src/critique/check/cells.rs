@@ -1,4 +1,5 @@
-//! Cells that cannot be: for moments, values far outside of what their column does in all flights. Nothing is mended here; the finding prints the
+//! Cells that cannot be: for moments, values far outside of what their column does in all flights, or single ones that stick out from both neighbours as no
+//! state of an aircraft can. Nothing is mended here; the finding prints the
 //! rule for `dataset.toml` that does.
 
 use super::finding::{Finding, Severity, Subject};
@@ -20,6 +21,18 @@ const STRETCHED: f64 = 200.0;
 /// Controls are about [-1, 1]: a stick that is seldom moved is no spike below this, beside its usual range.
 const LARGEST_CONTROL: f64 = 1.5;
 
+/// A single cell sticks out where its distance from the middle of its neighbours is so many times that of the cells around it, …
+const STICKS_OUT: f64 = 8.0;
+/// … so many times what nearly all cells of the flight keep, …
+const BEYOND_USUAL: f64 = 10.0;
+const NEARLY_ALL: f64 = 0.95;
+/// … this part of the column's usual range, and the neighbours differ by this part of it at most.
+const OF_RANGE: f64 = 0.02;
+const RETURNED: f64 = 0.25;
+/// States that no force moves there and back in a sample, and that do not wrap round.
+const STATES: [Column; 10] =
+    [Column::X, Column::Y, Column::Z, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
+
 /// A column's spikes: how many cells, in which flights, and the usual range.
 struct Spikes {
     cells: usize,
@@ -35,8 +48,14 @@ pub(super) fn spikes(flights: &[Flight]) -> Vec<(Finding, Vec<usize>)> {
         .into_iter()
         .filter(present)
         .filter_map(|column| {
-            let spikes = of_column(flights, column)?;
-            Some((finding(column, &spikes, flights), spikes.flights))
+            let far = of_column(flights, column);
+            let single = if STATES.contains(&column) { single(flights, column) } else { None };
+            // Of those that stick out most lie far outside as well.
+            if let Some(single) = single.filter(|single| far.as_ref().is_none_or(|far| far.cells <= 2 * single.cells)) {
+                return Some((finding_on_single(column, &single, flights), single.flights));
+            }
+            let far = far?;
+            Some((finding(column, &far, flights), far.flights))
         })
         .collect()
 }
@@ -74,6 +93,68 @@ fn of_column(flights: &[Flight], column: Column) -> Option<Spikes> {
         flight.rest();
     }
     (spikes.cells > 0).then_some(spikes)
+}
+
+/// Single cells that stick out: how many, in which flights, and the least distance.
+struct Single {
+    cells: usize,
+    flights: Vec<usize>,
+    least: f64,
+}
+
+fn single(flights: &[Flight], column: Column) -> Option<Single> {
+    let [low, high] = usual(flights, column)?;
+    let mut found = Single { cells: 0, flights: Vec::new(), least: f64::INFINITY };
+    for (index, flight) in flights.iter().enumerate() {
+        let own = sticking_out(flight.column(column), OF_RANGE * (high - low));
+        flight.rest();
+        if let Some(least) = own.iter().copied().reduce(f64::min) {
+            found.cells += own.len();
+            found.flights.push(index);
+            found.least = found.least.min(least);
+        }
+    }
+    (found.cells > 0).then_some(found)
+}
+
+/// By how much each cell that sticks out lies beyond the nearer of its neighbours.
+fn sticking_out(values: &[f64], least: f64) -> Vec<f64> {
+    let off: Vec<f64> = values.windows(3).map(|three| three[1] - 0.5 * (three[0] + three[2])).collect();
+    let mut sizes: Vec<f64> = off.iter().map(|off| off.abs()).collect();
+    sizes.sort_unstable_by(f64::total_cmp);
+    let Some(usual) = sizes.get((NEARLY_ALL * sizes.len() as f64) as usize) else { return Vec::new() };
+    let is_out = |at: usize| {
+        let size = off[at].abs();
+        // Next to it half of the distance shows, in both.
+        let around = [at.wrapping_sub(3), at.wrapping_sub(2), at + 2, at + 3].into_iter().filter_map(|other| off.get(other));
+        let around = around.fold(0.0_f64, |most, other| most.max(other.abs()));
+        let returns = (values[at + 2] - values[at]).abs() < RETURNED * size;
+        size > least && size > BEYOND_USUAL * usual && size > STICKS_OUT * around && returns
+    };
+    let beyond = |at: usize| (values[at + 1] - values[at]).abs().min((values[at + 1] - values[at + 2]).abs());
+    (0..off.len()).filter(|at| is_out(*at)).map(beyond).collect()
+}
+
+fn finding_on_single(column: Column, single: &Single, flights: &[Flight]) -> Finding {
+    let name = column.name();
+    let where_to: Vec<&str> = single.flights.iter().map(|&flight| flights[flight].name.as_str()).collect();
+    let message = format!(
+        "{} off from both neighbours by {:.3} and more, a spike that no force makes, in {}",
+        if single.cells == 1 { format!("1 cell of {name} is") } else { format!("{} cells of {name} are", single.cells) },
+        single.least,
+        named(&where_to)
+    );
+    let rule = format!(
+        "[[repair]] columns = [\"{name}\"], spike = {:.4}, max_gap_s = {:.3}, with the file's name and in its units",
+        0.7 * single.least,
+        // Between two spikes a good cell sticks out the other way.
+        3.5 * single.flights.first().map_or(0.01, |&flight| flights[flight].step_s)
+    );
+    Finding {
+        measured: Some(single.cells as f64),
+        expected: Some(0.0),
+        ..super::finding::finding(&format!("spikes_{name}"), Severity::Fault, message, Some(&rule))
+    }
 }
 
 /// The range that a column keeps to, but for a two-hundredth of its samples at either end, or a tenth where these stretch it; `None` where it does not

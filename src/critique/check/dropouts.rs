@@ -7,21 +7,21 @@ use super::robust::median;
 use crate::flight::{Column, Flight};
 
 /// A rest of all measurements from here on, s, is no chance.
-const LONG_S: f64 = 0.05;
+pub(super) const LONG_S: f64 = 0.05;
 /// The rest ends with a jump that is so many times the usual change from sample to sample …
-const JUMP: f64 = 3.0;
+pub(super) const JUMP: f64 = 3.0;
 /// … in so many columns.
-const JUMPING: usize = 2;
+pub(super) const JUMPING: usize = 2;
 /// A rest of all measurements at the end of a flight, s.
 const LAST_S: f64 = 1.0;
 /// A rest of all sticks between leaps, s, …
 const STICKS_S: f64 = 0.3;
 /// … that are so many times their usual change …
-const LEAP: f64 = 10.0;
+pub(super) const LEAP: f64 = 10.0;
 /// … and this part of their range.
 const OF_RANGE: f64 = 0.05;
 /// Lost for this share of a flight, samples make effects of their own.
-const MUCH: f64 = 0.03;
+pub(super) const MUCH: f64 = 0.03;
 
 /// Rows that repeat the rates of the row before are told from this share of a flight on, …
 const REPEATED: f64 = 0.02;
@@ -197,7 +197,7 @@ fn of_flight(index: usize, flight: &Flight) -> Option<Lost> {
 }
 
 /// The median change from sample to sample, of those that change anything.
-fn usual_change(values: &[f64]) -> f64 {
+pub(super) fn usual_change(values: &[f64]) -> f64 {
     let changes = values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|change| *change > 0.0);
     median(changes.collect()).unwrap_or(0.0)
 }

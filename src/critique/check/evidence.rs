@@ -13,6 +13,13 @@ use super::timing::Timing;
 use super::unexplained::Left;
 use std::collections::BTreeSet;
 
+/// Of the relation between rates and angular targets.
+const RATE_TARGETS: &str = "rate_targets";
+/// Of the relation between velocity and linear targets, how a unit of the velocity is set, and how those of speeds end.
+const VELOCITY_TARGETS: &str = "velocity_targets";
+const UNIT_OF_VELOCITY: &str = "[units] velocity = \"";
+const A_SECOND: &str = "/s\"";
+
 /// Gains of all relations that are this far from 1 …
 const OTHER_TIME: f64 = 0.2;
 /// … and this near to each other say that the time runs otherwise.
@@ -109,12 +116,14 @@ impl Evidence {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }
-        let mut findings = time_step(without_consequences(findings));
+        let mut findings = with_position(time_step(without_consequences(findings)));
         let is_sound = |relation: &str| {
             let is_faulty = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.starts_with(relation);
             !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Severity::Fault)
         };
-        findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")]));
+        let is_made_of_rates = |finding: &&Finding| finding.name == RATE_TARGETS && finding.verdict == Severity::Ok;
+        let with_targets = findings.iter().find(is_made_of_rates).is_some();
+        findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")], with_targets));
         findings
     }
 
@@ -171,4 +180,18 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
 
 fn step(verdict: Severity, times: f64, message: String, set: Option<&str>) -> Finding {
     Finding { measured: Some(times), expected: Some(1.0), unit: "1".into(), ..finding(TIME_STEP, verdict, message, set) }
+}
+
+/// A velocity in another unit with which a position goes along is of a position in that unit of length.
+fn with_position(mut findings: Vec<Finding>) -> Vec<Finding> {
+    let mut of_position = findings.iter().filter(|finding| finding.name.starts_with(POSITION_RATE)).peekable();
+    let is_sound = of_position.peek().is_some() && of_position.all(|finding| finding.verdict == Severity::Ok);
+    for finding in findings.iter_mut().filter(|finding| is_sound && finding.name.starts_with(VELOCITY_TARGETS)) {
+        let unit = finding.set.as_deref().and_then(|set| set.strip_prefix(UNIT_OF_VELOCITY)?.strip_suffix(A_SECOND));
+        if let Some(unit) = unit.map(str::to_owned) {
+            finding.message.push_str(&format!("; the position, which changes as this velocity says, is in {unit} then"));
+            finding.set = Some(format!("{UNIT_OF_VELOCITY}{unit}{A_SECOND}, position = \"{unit}\""));
+        }
+    }
+    findings
 }

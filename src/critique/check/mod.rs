@@ -31,10 +31,12 @@ mod increments;
 mod jointly;
 mod limits;
 mod lines;
+mod mending;
 mod mixes;
 mod mounts;
 mod odd;
 mod on_change;
+mod packets;
 mod regression;
 mod relations;
 mod repairs;
@@ -55,9 +57,11 @@ mod timing;
 mod told;
 mod trims;
 mod unexplained;
+mod vibration;
 
 pub use excitation::{Collinearity, Excitation};
 pub use finding::{Finding, Severity, Subject};
+pub use mending::{Mending, mend};
 pub use report::CheckReport;
 #[cfg(feature = "files")]
 pub use suggestion::{Open, Suggestion};
@@ -144,12 +148,14 @@ struct Columns {
 impl Columns {
     fn of(flights: &[Flight]) -> Self {
         let of_cells = || {
-            let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = cells::spikes(flights).into_iter().unzip();
+            let single = cells::spikes(flights).into_iter().chain(packets::findings(flights));
+            let (spikes, spoilt): (Vec<Finding>, Vec<Vec<usize>>) = single.unzip();
             let found = [
                 saturation::findings(flights),
                 alternation::findings(flights),
                 dropouts::findings(flights),
                 copies::findings(flights),
+                vibration::findings(flights),
             ];
             (spikes.into_iter().chain(found.into_iter().flatten()), spoilt.into_iter().flatten().collect())
         };

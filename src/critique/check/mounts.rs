@@ -23,6 +23,7 @@ const ALIKE: f64 = 0.5;
 pub(super) const NAME: &str = "mounts";
 
 const AXES: [&str; 3] = ["x", "y", "z"];
+const RATES: &str = "rates";
 
 /// Accumulates over flights.
 pub(super) struct Mounts {
@@ -142,16 +143,19 @@ impl Mounts {
 
     /// What is turned, or that nothing is; nothing is said of a stream in which a column is known to be read wrongly, as `sound` says of velocity and
     /// rates.
-    pub fn findings(&self, sound: [bool; 2]) -> Vec<Finding> {
+    ///
+    /// `with_targets` says that the recorded angular accelerations are those of the rates: what turns the one turns the other.
+    pub fn findings(&self, sound: [bool; 2], with_targets: bool) -> Vec<Finding> {
         let of = |regression, sound: bool| turn(regression).filter(|_| sound);
         let (velocity, rates) = (of(&self.velocity, sound[0]), of(&self.rates, sound[1]));
         if let Some((angle, axis)) = velocity.as_ref().zip(rates.as_ref()).and_then(|(velocity, rates)| together(velocity, rates)) {
             return vec![attitude(angle, axis)];
         }
-        let turned = [(velocity, "velocity"), (rates, "rates")];
+        let turned = [(velocity, "velocity"), (rates, RATES)];
         let known = || turned.iter().filter_map(|(turn, stream)| Some((turn.as_ref()?, *stream)));
-        let faults =
-            known().filter(|(turn, _)| turn.convinces).filter_map(|(turn, stream)| Some(against(turn, turn.axis()?, stream)));
+        let faults = known()
+            .filter(|(turn, _)| turn.convinces)
+            .filter_map(|(turn, stream)| Some(against(turn, turn.axis()?, stream, with_targets)));
         let faults: Vec<Finding> = faults.collect();
         if !faults.is_empty() {
             return faults;
@@ -201,10 +205,31 @@ fn attitude(angle: Estimate, axis: usize) -> Finding {
     of_angle(angle, Severity::Fault, message, set)
 }
 
-fn against(turn: &Turn, axis: usize, stream: &str) -> Finding {
-    let degrees = -turn.angles[axis].value.to_degrees();
+fn against(turn: &Turn, axis: usize, stream: &str, with_targets: bool) -> Finding {
+    let angle = turn.angles[axis];
+    let degrees = -angle.value.to_degrees();
     let message = format!("the axes of the {stream} are turned by {degrees:.1}° about {} against the attitude", AXES[axis]);
-    of_angle(turn.angles[axis], Severity::Fault, message, None)
+    let set = (stream == RATES).then(|| turned_back(angle.value, axis, with_targets));
+    of_angle(angle, Severity::Fault, message, set)
+}
+
+/// The line that turns rates back, and what was made of them.
+fn turned_back(angle: f64, axis: usize, with_targets: bool) -> String {
+    let (sin, cos) = angle.sin_cos();
+    let [next, last] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| AXES[axis]);
+    let of = |end: &str| {
+        let (one, other) = (format!("w{next}{end}"), format!("w{last}{end}"));
+        let sign = |factor: f64| if factor < 0.0 { '-' } else { '+' };
+        let size = sin.abs();
+        format!(
+            "{one} = \"{cos:.4} * {one} {} {size:.4} * {other}\", {other} = \"{cos:.4} * {other} {} {size:.4} * {one}\"",
+            sign(sin),
+            sign(-sin)
+        )
+    };
+    let ends = if with_targets { vec!["", "_dot"] } else { vec![""] };
+    let columns: Vec<String> = ends.into_iter().map(of).collect();
+    format!("[columns] {}, with the file's names", columns.join(", "))
 }
 
 fn of_angle(angle: Estimate, verdict: Severity, message: String, set: Option<String>) -> Finding {

@@ -41,6 +41,11 @@ const LARGEST_RATIO: f64 = 3.0;
 const LEAST_RATIO: f64 = 1.7;
 /// … where they are so many times as far apart as the gains of each scatter.
 const APART: f64 = 8.0;
+/// … and, where two sticks have one that is alike, from this one on: their logarithms differ by less than this part, …
+const LEAST_RATIO_TOGETHER: f64 = 1.25;
+const ALIKE: f64 = 0.25;
+/// … and that of a third stick by less than this part of them.
+const KEPT: f64 = 0.3;
 /// So many axes that answer to no stick make the controls those of another motion.
 const DEAF: usize = 3;
 
@@ -180,7 +185,7 @@ impl Sticks {
         }
         if findings.is_empty() {
             findings.extend((0..4).filter_map(|stick| of_sign(stick, &known, flights)));
-            findings.extend((0..4).filter_map(|stick| of_size(stick, &known, flights)));
+            findings.extend(of_size(&known, flights));
             let moves: Vec<&(usize, Regressions)> = judged().collect();
             findings.extend((0..4).filter_map(|stick| of_rest(stick, &moves, flights)));
             findings.extend(findings.is_empty().then(|| foreign(&known, &moves, flights)).flatten());
@@ -255,44 +260,87 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Opt
     (!fewer.is_empty()).then(|| in_flights(&format!("sign_{name}"), &fewer, &message, flights))
 }
 
-/// A stick whose gain in some flights is a multiple of that in the others, and whose travel is that much smaller: what takes the gain away from a
+/// Sticks whose gain in some flights is a multiple of that in the others, and whose travel is that much smaller: what takes the gain away from a
 /// rotor, a vortex ring or stall, leaves the stick its travel. Gains of one aircraft scatter from flight to flight; two groups far apart, each close
-/// together, are two ways of writing.
-fn of_size(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Option<Finding> {
-    let mut certain: Vec<Sized> = known
-        .iter()
-        .filter(|(_, answers)| answers.is_certain(stick, stick))
-        .map(|(flight, answers)| Sized {
-            flight: *flight,
-            gain: answers.gains[stick][stick].value.abs().ln(),
-            strength: answers.strength(stick, stick).ln(),
+/// together, are two ways of writing. So are smaller ratios of two sticks, alike and in the same flights, where another stick keeps its gain: another rotor
+/// speed or air density changes that one, too.
+fn of_size(known: &[(usize, &Answers)], flights: &[Flight]) -> Vec<Finding> {
+    let splits: [Option<Groups>; 4] = std::array::from_fn(|stick| Groups::of(stick, known));
+    let is_together = |stick: usize, own: &Groups| {
+        let alike = |other: &Groups| own.fewer == other.fewer && (own.ratio - other.ratio).abs() < ALIKE * own.ratio.abs();
+        let partner = (0..4).find(|&other| other != stick && splits[other].as_ref().is_some_and(alike));
+        partner.is_some_and(|partner| {
+            let rest = (0..4).filter(|other| ![stick, partner].contains(other));
+            own.ratio.abs() > LEAST_RATIO_TOGETHER.ln() && rest.into_iter().any(|other| own.keeps(other, known))
         })
-        .collect();
-    certain.sort_unstable_by(|one, other| one.gain.total_cmp(&other.gain));
-    let split = (1..certain.len()).max_by(|one, other| {
-        let gap = |at: usize| certain[at].gain - certain[at - 1].gain;
-        gap(*one).total_cmp(&gap(*other))
-    })?;
-    let (small, large) = certain.split_at(split);
-    let middle = |group: &[Sized], of: fn(&Sized) -> f64| median(group.iter().map(of).collect());
-    let [low, high] = [middle(small, |one| one.gain)?, middle(large, |one| one.gain)?];
-    let scatter = small.iter().map(|one| (one.gain - low).abs()).chain(large.iter().map(|one| (one.gain - high).abs()));
-    let scatter = median(scatter.collect())?;
-    let (apart, gap) = (high - low, large[0].gain - small[split - 1].gain);
-    let travel = middle(large, |one| one.strength)? - middle(small, |one| one.strength)?;
-    if apart < LEAST_RATIO.ln() || gap < 0.5 * apart || apart < APART * scatter || travel.abs() > 0.5 * apart {
-        return None;
+    };
+    let is_other = |stick: usize, groups: &Groups| groups.is_far() || is_together(stick, groups);
+    let of = |stick: usize| {
+        let groups = splits[stick].as_ref().filter(|groups| is_other(stick, groups))?;
+        let (name, ratio) = (STICKS[stick], groups.ratio.exp());
+        let message = format!(
+            "{name} has {ratio:.2} times the gain of the other flights: in other units there, or scaled, as by a switch of rates"
+        );
+        Some(in_flights(&format!("gain_{name}"), &groups.fewer, &message, flights))
+    };
+    (0..4).filter_map(of).collect()
+}
+
+/// Two groups of flights with gains of a stick of their own.
+struct Groups {
+    /// The smaller one, in order.
+    fewer: Vec<usize>,
+    /// Logarithm of its gain over that of the others.
+    ratio: f64,
+}
+
+impl Groups {
+    fn of(stick: usize, known: &[(usize, &Answers)]) -> Option<Self> {
+        let mut certain: Vec<Sized> = known
+            .iter()
+            .filter(|(_, answers)| answers.is_certain(stick, stick))
+            .map(|(flight, answers)| Sized {
+                flight: *flight,
+                gain: answers.gains[stick][stick].value.abs().ln(),
+                strength: answers.strength(stick, stick).ln(),
+            })
+            .collect();
+        certain.sort_unstable_by(|one, other| one.gain.total_cmp(&other.gain));
+        let split = (1..certain.len()).max_by(|one, other| {
+            let gap = |at: usize| certain[at].gain - certain[at - 1].gain;
+            gap(*one).total_cmp(&gap(*other))
+        })?;
+        let (small, large) = certain.split_at(split);
+        let middle = |group: &[Sized], of: fn(&Sized) -> f64| median(group.iter().map(of).collect());
+        let [low, high] = [middle(small, |one| one.gain)?, middle(large, |one| one.gain)?];
+        let scatter = small.iter().map(|one| (one.gain - low).abs()).chain(large.iter().map(|one| (one.gain - high).abs()));
+        let scatter = median(scatter.collect())?;
+        let (apart, gap) = (high - low, large[0].gain - small[split - 1].gain);
+        let travel = middle(large, |one| one.strength)? - middle(small, |one| one.strength)?;
+        if gap < 0.5 * apart || apart < APART * scatter || travel.abs() > 0.5 * apart {
+            return None;
+        }
+        let (fewer, ratio) = if large.len() <= small.len() { (large, apart) } else { (small, -apart) };
+        let mut fewer: Vec<usize> = fewer.iter().map(|one| one.flight).collect();
+        fewer.sort_unstable();
+        Some(Self { fewer, ratio })
     }
-    // What is flown in it can take half of a stick's gain in one flight.
-    if small.len().min(large.len()) < FEWEST && apart < LARGEST_RATIO.ln() {
-        return None;
+
+    /// Whether the ratio says enough by itself. What is flown in it can take half of a stick's gain in one flight.
+    fn is_far(&self) -> bool {
+        let least = if self.fewer.len() < FEWEST { LARGEST_RATIO } else { LEAST_RATIO };
+        self.ratio.abs() > least.ln()
     }
-    let (fewer, ratio) = if large.len() <= small.len() { (large, apart.exp()) } else { (small, (-apart).exp()) };
-    let mut indices: Vec<usize> = fewer.iter().map(|one| one.flight).collect();
-    indices.sort_unstable();
-    let name = STICKS[stick];
-    let message = format!("{name} has {ratio:.2} times the gain of the other flights: in other units there, or scaled");
-    Some(in_flights(&format!("gain_{name}"), &indices, &message, flights))
+
+    /// Whether another stick has the same gain in these flights as in the others.
+    fn keeps(&self, stick: usize, known: &[(usize, &Answers)]) -> bool {
+        let gain = |is_of: bool| {
+            let of =
+                known.iter().filter(|(flight, answers)| self.fewer.contains(flight) == is_of && answers.is_certain(stick, stick));
+            median(of.map(|(_, answers)| answers.gains[stick][stick].value.abs().ln()).collect())
+        };
+        gain(true).zip(gain(false)).is_some_and(|(own, others)| (own - others).abs() < KEPT * self.ratio.abs())
+    }
 }
 
 /// What a flight says of the gain of a stick: the logarithms of the gain and of how far it moves its axis.

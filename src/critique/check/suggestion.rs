@@ -54,14 +54,42 @@ impl CheckReport {
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
         let (mut mends, mut open) = (Vec::new(), Vec::new());
+        let mut faults: Vec<&Finding> = faults.collect();
+        faults.sort_by_key(|finding| Tier::of(finding));
+        let mut reached = None;
         for finding in faults {
-            let name = finding.name.clone();
+            let (name, tier) = (finding.name.clone(), Tier::of(finding));
+            if reached.is_some_and(|reached| reached < tier) && finding.set.is_some() {
+                open.push(Open { name, reason: "what is mended first may be its cause; `check` says whether it stays".into() });
+                continue;
+            }
             match draft.add(finding) {
-                Ok(()) => mends.push(name),
+                Ok(()) => {
+                    mends.push(name);
+                    reached = Some(tier);
+                }
                 Err(reason) => open.push(Open { name, reason }),
             }
         }
         Some(Suggestion { text: draft.made.text().to_owned(), mends, open })
+    }
+}
+
+/// What is mended before what: wrong cells make whole columns look wrong, and wrong columns make flights look odd.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Tier {
+    Cells,
+    Columns,
+    Flights,
+}
+
+impl Tier {
+    fn of(finding: &Finding) -> Self {
+        match finding.set.as_deref() {
+            Some(line) if line.starts_with("[[repair]]") => Self::Cells,
+            Some(line) if line.starts_with("leave_out") => Self::Flights,
+            _ => Self::Columns,
+        }
     }
 }
 
@@ -217,6 +245,10 @@ impl<'a> Draft<'a> {
             let so_far = Column::from_name(single).and_then(|column| self.schema.late.get(&column).copied());
             return Ok(vec![entry(word, so_far.unwrap_or(0.0))]);
         }
+        let is_moved = |column: &&&str| self.set.contains_key(&("late", (**column).to_owned()));
+        if let Some(column) = columns.iter().find(is_moved) {
+            return Err(format!("another finding moves `{column}` already"));
+        }
         let single = columns.iter().filter_map(|column| Some(entry(column, stated_s(column)?)));
         Ok([entry(word, stated_s(word).unwrap_or(0.0))].into_iter().chain(single).collect())
     }
@@ -289,19 +321,17 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// A rule for cells of a column as the program has it as one for those of the file.
+    /// A rule for cells of columns as the program has them as one for those of the file.
     fn rule(&self, mut rule: Table) -> Result<Table, String> {
         let Some(Value::Array(columns)) = rule.get("columns") else { return Err("a rule without columns".into()) };
-        let [Value::String(name)] = &columns[..] else { return Err("a rule for several columns".into()) };
-        let (own, sign) = self.of_file(name).ok_or_else(|| self.not_of_file(name))?;
-        let factor = sign * self.schema.factor(own);
-        let column = match self.schema.columns.get(own).map(Vec::as_slice) {
-            None => own.to_owned(),
-            Some([column]) if Formula::parse(column).map_or(true, |formula| formula.names() == [column.as_str()]) => column.clone(),
-            Some(_) => {
-                return Err(format!("`columns.{own}` of dataset.toml is a formula or a list; the rule is for the columns in it"));
-            }
-        };
+        let names: Vec<&str> = columns.iter().filter_map(Value::as_str).collect();
+        let (mut of_file, mut factors) = (Vec::new(), Vec::new());
+        for name in names {
+            let (own, sign) = self.of_file(name).ok_or_else(|| self.not_of_file(name))?;
+            factors.push(sign * self.schema.factor(own));
+            of_file.push(Value::String(self.cells_of(own)?));
+        }
+        let factor = factors.first().copied().unwrap_or(1.0);
         if let Some(Value::Array(valid)) = rule.get_mut("valid").filter(|_| factor != 1.0) {
             for comparison in valid {
                 let text = comparison.as_str().unwrap_or_default();
@@ -310,8 +340,25 @@ impl<'a> Draft<'a> {
                 *comparison = Value::String(whole.map_err(|error| error.to_string())?.to_string());
             }
         }
-        rule.insert("columns".into(), Value::Array(vec![Value::String(column)]));
+        if let Some(Value::Float(spike)) = rule.get_mut("spike") {
+            *spike /= factor.abs();
+        }
+        if factors.iter().any(|other| *other != factor) && (rule.contains_key("valid") || rule.contains_key("spike")) {
+            return Err("a rule with numbers for columns in different units".into());
+        }
+        rule.insert("columns".into(), Value::Array(of_file));
         Ok(rule)
+    }
+
+    /// The column of the file that one of the log in its own axes is read from.
+    fn cells_of(&self, own: &str) -> Result<String, String> {
+        match self.schema.columns.get(own).map(Vec::as_slice) {
+            None => Ok(own.to_owned()),
+            Some([column]) if Formula::parse(column).map_or(true, |formula| formula.names() == [column.as_str()]) => {
+                Ok(column.clone())
+            }
+            Some(_) => Err(format!("`columns.{own}` of dataset.toml is a formula or a list; the rule is for the columns in it")),
+        }
     }
 
     /// The column of a log in its own axes that a column of the program is but for its unit and this sign; `None` if it is made of several.

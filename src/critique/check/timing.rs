@@ -147,8 +147,8 @@ const PAIRS: [Pair; 4] = [
     },
     Pair {
         name: "targets_offset",
-        late: "the targets come later than the velocity",
-        early: "the targets come earlier than the velocity",
+        late: "the linear accelerations come later than the velocity",
+        early: "the linear accelerations come earlier than the velocity",
         second: "acceleration",
         applies: |motion| motion.recorded,
         error: |motion, piece, shift| {

@@ -37,9 +37,9 @@ pub(super) fn doubt(
     };
     let all = |is_so: &dyn Fn((bool, bool)) -> bool| !channels.is_empty() && channels.iter().all(|channel| is_so(bars(channel)));
     match () {
-        () if all(&|(weak, _)| weak) => {
-            Some("most of the error of its channels is of nothing that has a name here, and it removes less than a tenth of that: it may be the shadow of that")
-        }
+        () if all(&|(weak, _)| weak) => Some(
+            "most of the error of its channels is of nothing that has a name here, and it removes less than a tenth of that: it may be the shadow of that",
+        ),
         () if CURVES.contains(&kind) && all(&|(weak, bent)| weak || bent) => Some(
             "much of the error of its channels stays, and it removes less than half of that: a stick whose record errs (noise, another gain for a while, \
              something added behind it) looks curved, too",

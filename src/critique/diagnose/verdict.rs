@@ -269,7 +269,8 @@ impl Search<'_> {
         let mse = |model| Ok::<_, Error>(prediction_errors(&self.engine, model)?.map(|errors| errors.iter().sum::<f64>() / rows));
         let left = mse(&last.model)?;
         let whole = if unknown.is_empty() { left } else { mse(&self.bare(ground.before, found)?)? };
-        let variance = PerChannel::from_fn(|channel| variance(ground.flights, ground.searched, channel.column()).unwrap_or(f64::NAN));
+        let variance =
+            PerChannel::from_fn(|channel| variance(ground.flights, ground.searched, channel.column()).unwrap_or(f64::NAN));
         let why = |found: &Found| {
             let shares = PerChannel::from_fn(|channel| Share {
                 by_all: whole[channel] - left[channel],
