@@ -89,6 +89,71 @@ fn an_offset_is_mended_in_the_units_of_the_file() -> Outcome {
     assert_mended(&of_wx(f64::to_degrees)?, "[units]\nrates = \"deg/s\"\n", "wx = ")
 }
 
+/// Rows in which nothing was received, in runs of 0.1 s.
+fn lost(row: usize) -> bool {
+    row % 500 >= 100 && row % 500 < 110
+}
+
+#[test]
+fn a_pose_that_falls_to_zero_or_freezes_is_bridged() -> Outcome {
+    let pose = [Column::X, Column::Y, Column::Z, Column::Roll, Column::Pitch, Column::Yaw];
+    let filled = |with: fn(&[f64], usize) -> f64| {
+        flights(|columns| {
+            for column in pose {
+                let values = &mut columns[column as usize];
+                (1..values.len()).filter(|row| lost(*row)).for_each(|row| values[row] = with(values, row));
+            }
+        })
+    };
+    assert_mended(&filled(|_, _| 0.0)?, "", "zero = true")?;
+    assert_mended(&filled(|values, row| values[row - 1])?, "", "held = true")
+}
+
+#[test]
+fn rates_that_stick_out_are_bridged_in_the_units_of_the_file() -> Outcome {
+    let spiked = |factor: f64| {
+        flights(|columns| {
+            for (place, rate) in [Column::Wx, Column::Wy, Column::Wz].into_iter().enumerate() {
+                let values = &mut columns[rate as usize];
+                values.iter_mut().for_each(|value| *value *= factor);
+                values.iter_mut().skip(40 + 70 * place).step_by(300).for_each(|value| *value += 9.0 * factor);
+            }
+        })
+    };
+    assert_mended(&spiked(1.0)?, "", "spike = 6.")?;
+    assert_mended(&spiked(1.0_f64.to_degrees())?, "[units]\nrates = \"deg/s\"\n", "spike = 3")
+}
+
+#[test]
+fn a_position_of_east_north_up_and_rates_of_a_tilted_sensor_are_mended() -> Outcome {
+    let position = flights(|columns| {
+        columns.swap(Column::X as usize, Column::Y as usize);
+        columns[Column::Z as usize].iter_mut().for_each(|value| *value = -*value);
+    })?;
+    assert_mended(&position, "", "x = \"y\"")?;
+    let (sin, cos) = 0.17_f64.sin_cos();
+    let tilted = flights(|columns| {
+        for (x, z) in [(Column::Wx, Column::Wz), (Column::WxDot, Column::WzDot)] {
+            for row in 0..columns[0].len() {
+                let [wx, wz] = [x, z].map(|column| columns[column as usize][row]);
+                columns[x as usize][row] = cos * wx - sin * wz;
+                columns[z as usize][row] = sin * wx + cos * wz;
+            }
+        }
+    })?;
+    assert_mended(&tilted, "", "wz_dot = ")
+}
+
+#[test]
+fn units_of_velocity_and_position_are_mended_together() -> Outcome {
+    let scaled = flights(|columns| {
+        for column in [Column::X, Column::Y, Column::Z, Column::Vx, Column::Vy, Column::Vz] {
+            columns[column as usize].iter_mut().for_each(|value| *value *= 1000.0);
+        }
+    })?;
+    assert_mended(&scaled, "", "position = \"mm\"")
+}
+
 #[test]
 fn flights_without_a_fault_ask_for_nothing() -> Outcome {
     let folder = tempfile::tempdir()?;
@@ -116,6 +181,34 @@ fn a_stick_that_is_cut_off_is_told_from_one_at_its_end() -> Outcome {
     assert_named("cut_off_u1", "u1 is cut off at 0.15", |columns| {
         columns[Column::U1 as usize].iter_mut().for_each(|value| *value = value.clamp(-0.15, 0.15));
     })
+}
+
+#[test]
+fn a_switch_of_rates_is_told() -> Outcome {
+    let scaled = |columns: [Column; 2]| {
+        let flights = some(
+            |index| index % 2 == 0,
+            |all| columns.into_iter().for_each(|column| all[column as usize].iter_mut().for_each(|value| *value /= 0.6)),
+        )?;
+        Ok::<_, Error>(check(&DataSet { flights, ..DataSet::default() }, None))
+    };
+    let report = scaled([Column::U1, Column::U2])?;
+    let told =
+        |name: &str| report.findings.iter().any(|finding| finding.name == name && finding.message.contains("switch of rates"));
+    assert!(told("gain_u1") && told("gain_u2"), "{report}");
+    Ok(())
+}
+
+#[test]
+fn vibration_is_a_warning_with_its_frequency() -> Outcome {
+    let flights = flights(|columns| {
+        let values = &mut columns[Column::VzDot as usize];
+        values.iter_mut().enumerate().for_each(|(row, value)| *value += 4.0 * (std::f64::consts::TAU * 0.23 * row as f64).sin());
+    })?;
+    let report = check(&DataSet { flights, ..DataSet::default() }, None);
+    let found = report.findings.iter().find(|finding| finding.name == "vibration_vz_dot").ok_or("no vibration")?;
+    assert!(found.verdict == Severity::Warning && found.message.contains("at 22.7 Hz"), "{}", found.message);
+    Ok(())
 }
 
 #[test]

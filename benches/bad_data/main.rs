@@ -2,7 +2,7 @@
 //!
 //!     cargo bench --features cli --bench bad_data                                      a few cases, some minutes
 //!     cargo bench --features cli --bench bad_data -- run OUT.jsonl [SEEDS] [WHAT…]     everything, resumable
-//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   what is not in `reserved.rs`, on development seeds
+//!     cargo bench --features cli --bench bad_data -- development OUT.jsonl [SEEDS] [WHAT…]   the same on development seeds
 //!     cargo bench --features cli --bench bad_data -- table OUT.jsonl                   the tables
 //!     cargo bench --features cli --bench bad_data -- write FOLDER CORRUPTION PART SEED [HIDDEN]   the flights of one case, as a folder
 //!     cargo bench --features cli --bench bad_data -- sound                             only that each corruption changes what it is to change
@@ -19,9 +19,9 @@ mod fifth;
 mod fourth;
 mod further;
 mod mend;
-mod reserved;
 mod run;
 mod second;
+mod seventh;
 mod sixth;
 mod sound;
 mod tables;

@@ -1,5 +1,5 @@
 //! What must hold of the corruptions themselves: no name twice, as many of each kind in the first two lists, and each changes the flights that
-//! it is applied to. No check is run here, so what is reserved may be looked at so far.
+//! it is applied to. No check is run here, so a list may be looked at so far before it is reported.
 
 use crate::change::{Chance, Change, Corruption, Kind, Log, Part};
 use crate::corruptions::DEVELOPMENT;

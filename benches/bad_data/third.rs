@@ -1,6 +1,5 @@
 //! Corruptions that were written down on 2026-11-24, after `second` had been looked at, unseen of the checks; reported on 2026-11-24 on seeds 85000
-//! and 85001, and on 2026-11-25 on 85002 and 85003, and looked at since: they are for development now. What is reserved today stands in
-//! `reserved`. Each differs from those of the lists before in what goes wrong or in what it hits.
+//! and 85001, and on 2026-11-25 on 85002 and 85003, and looked at since: they are for development now. Each differs from those of the lists before in what goes wrong or in what it hits.
 
 use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Change, Corruption, Kind, LINEAR, Log, POSITION, Part, RATES, VELOCITY};
 use phyture::flight::attitude::{cross, euler_rates, euler_to_quaternion, rotate, rotate_back, rotation_body_to_inertial};

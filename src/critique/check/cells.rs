@@ -29,9 +29,9 @@ const NEARLY_ALL: f64 = 0.95;
 /// … this part of the column's usual range, and the neighbours differ by this part of it at most.
 const OF_RANGE: f64 = 0.02;
 const RETURNED: f64 = 0.25;
-/// States that no force moves there and back in a sample, and that do not wrap round.
-const STATES: [Column; 10] =
-    [Column::X, Column::Y, Column::Z, Column::Pitch, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
+/// States that no force moves there and back in a sample. Angles wrap round, and pitch turns back at the vertical.
+const STATES: [Column; 9] =
+    [Column::X, Column::Y, Column::Z, Column::Vx, Column::Vy, Column::Vz, Column::Wx, Column::Wy, Column::Wz];
 
 /// A column's spikes: how many cells, in which flights, and the usual range.
 struct Spikes {
@@ -121,8 +121,11 @@ fn single(flights: &[Flight], column: Column) -> Option<Single> {
 fn sticking_out(values: &[f64], least: f64) -> Vec<f64> {
     let off: Vec<f64> = values.windows(3).map(|three| three[1] - 0.5 * (three[0] + three[2])).collect();
     let mut sizes: Vec<f64> = off.iter().map(|off| off.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    let Some(usual) = sizes.get((NEARLY_ALL * sizes.len() as f64) as usize) else { return Vec::new() };
+    let place = (NEARLY_ALL * sizes.len() as f64) as usize;
+    if place >= sizes.len() {
+        return Vec::new();
+    }
+    let usual = *sizes.select_nth_unstable_by(place, f64::total_cmp).1;
     let is_out = |at: usize| {
         let size = off[at].abs();
         // Next to it half of the distance shows, in both.

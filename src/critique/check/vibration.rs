@@ -66,11 +66,12 @@ fn line(values: &[f64], step_s: f64) -> Option<Line> {
     let every = blocks.len().div_ceil(BLOCKS).max(1);
     let looked_at: Vec<&[f64]> = blocks.into_iter().step_by(every).collect();
     let (mut power, mut variance) = (vec![0.0; BLOCK / 2], 0.0);
+    let turns = turns();
     for block in &looked_at {
         let mean = block.iter().sum::<f64>() / BLOCK as f64;
         let windowed: Vec<f64> = block.iter().enumerate().map(|(at, value)| (value - mean) * window(at)).collect();
         variance += block.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / BLOCK as f64;
-        power.iter_mut().enumerate().for_each(|(bin, power)| *power += squared(&windowed, bin));
+        power.iter_mut().enumerate().for_each(|(bin, power)| *power += squared(&windowed, bin, &turns));
     }
     let bin_hz = 1.0 / (BLOCK as f64 * step_s);
     let first = ((SLOWEST_HZ / bin_hz).ceil() as usize).max(SPREAD + 1);
@@ -90,11 +91,18 @@ fn window(at: usize) -> f64 {
     (PI * at as f64 / BLOCK as f64).sin().powi(2)
 }
 
+/// Cosine and sine of each BLOCKth of a turn.
+fn turns() -> [(f64, f64); BLOCK] {
+    std::array::from_fn(|at| {
+        let (sin, cos) = (TAU * at as f64 / BLOCK as f64).sin_cos();
+        (cos, sin)
+    })
+}
+
 /// Squared magnitude of a bin of the discrete Fourier transform.
-fn squared(values: &[f64], bin: usize) -> f64 {
-    let turn = TAU * bin as f64 / BLOCK as f64;
+fn squared(values: &[f64], bin: usize, turns: &[(f64, f64); BLOCK]) -> f64 {
     let (re, im) = values.iter().enumerate().fold((0.0, 0.0), |(re, im), (at, value)| {
-        let (sin, cos) = (turn * at as f64).sin_cos();
+        let (cos, sin) = turns[bin * at % BLOCK];
         (re + value * cos, im + value * sin)
     });
     re * re + im * im
