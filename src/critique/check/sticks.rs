@@ -267,7 +267,7 @@ fn of_sign(stick: usize, known: &[(usize, &Answers)], flights: &[Flight]) -> Opt
 fn of_size(known: &[(usize, &Answers)], flights: &[Flight]) -> Vec<Finding> {
     let splits: [Option<Groups>; 4] = std::array::from_fn(|stick| Groups::of(stick, known));
     let is_together = |stick: usize, own: &Groups| {
-        let alike = |other: &Groups| own.fewer == other.fewer && (own.ratio - other.ratio).abs() < ALIKE * own.ratio.abs();
+        let alike = |other: &Groups| own.is_alike(other);
         let partner = (0..4).find(|&other| other != stick && splits[other].as_ref().is_some_and(alike));
         partner.is_some_and(|partner| {
             let rest = (0..4).filter(|other| ![stick, partner].contains(other));
@@ -288,8 +288,10 @@ fn of_size(known: &[(usize, &Answers)], flights: &[Flight]) -> Vec<Finding> {
 
 /// Two groups of flights with gains of a stick of their own.
 struct Groups {
-    /// The smaller one, in order.
+    /// The smaller one, in order, …
     fewer: Vec<usize>,
+    /// … and the others.
+    others: Vec<usize>,
     /// Logarithm of its gain over that of the others.
     ratio: f64,
 }
@@ -320,10 +322,27 @@ impl Groups {
         if gap < 0.5 * apart || apart < APART * scatter || travel.abs() > 0.5 * apart {
             return None;
         }
-        let (fewer, ratio) = if large.len() <= small.len() { (large, apart) } else { (small, -apart) };
-        let mut fewer: Vec<usize> = fewer.iter().map(|one| one.flight).collect();
-        fewer.sort_unstable();
-        Some(Self { fewer, ratio })
+        let flights = |group: &[Sized]| {
+            let mut flights: Vec<usize> = group.iter().map(|one| one.flight).collect();
+            flights.sort_unstable();
+            flights
+        };
+        let [low, high] = [flights(small), flights(large)];
+        let is_high = high.len() <= low.len();
+        let (fewer, others, ratio) = if is_high { (high, low, apart) } else { (low, high, -apart) };
+        Some(Self { fewer, others, ratio })
+    }
+
+    /// Whether another stick has the same ratio between the same flights. In some of them one of the two may not be told, and which group is the smaller one may differ.
+    fn is_alike(&self, other: &Self) -> bool {
+        let is_turned = self.ratio * other.ratio < 0.0;
+        let [fewer, others] = if is_turned { [&other.others, &other.fewer] } else { [&other.fewer, &other.others] };
+        let is_apart = |own: &[usize], theirs: &[usize]| own.iter().all(|flight| !theirs.contains(flight));
+        let is_shared = |own: &[usize], theirs: &[usize]| own.iter().any(|flight| theirs.contains(flight));
+        is_apart(&self.fewer, others)
+            && is_apart(&self.others, fewer)
+            && is_shared(&self.fewer, fewer)
+            && (self.ratio.abs() - other.ratio.abs()).abs() < ALIKE * self.ratio.abs()
     }
 
     /// Whether the ratio says enough by itself. What is flown in it can take half of a stick's gain in one flight.
@@ -391,5 +410,24 @@ fn joined(names: &[&str]) -> String {
     match names {
         [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
         names => names.join(", "),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_sticks_are_switched_together_whichever_group_is_the_smaller() {
+        let groups = |fewer: &[usize], others: &[usize], ratio: f64| Groups { fewer: fewer.into(), others: others.into(), ratio };
+        let one = groups(&[0, 2], &[1, 3, 5], -0.5);
+        assert!(
+            one.is_alike(&groups(&[1, 3], &[0, 2, 4], 0.52)),
+            "the other way round, and flights that one of them does not tell"
+        );
+        assert!(one.is_alike(&groups(&[0, 2], &[1, 3], -0.45)));
+        assert!(!one.is_alike(&groups(&[0, 2], &[1, 3], -0.9)), "another ratio");
+        assert!(!one.is_alike(&groups(&[0, 3], &[1, 2], -0.5)), "other flights");
+        assert!(!one.is_alike(&groups(&[0, 2], &[1, 3], 0.5)), "the other way");
     }
 }
