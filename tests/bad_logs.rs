@@ -5,7 +5,7 @@ mod corrupted;
 
 use corrupted::{Columns, Outcome, flights as some};
 use phyture::Error;
-use phyture::critique::check::{Severity, check};
+use phyture::critique::check::{Severity, check, mend};
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::write::data_set_csv;
 use phyture::flight::{Column, DataSet, Flight, Targets};
@@ -48,6 +48,29 @@ fn two_faults_at_once_are_mended_by_what_is_suggested() -> Outcome {
     for line in ["velocity = \"ft/s\"", "u1 = \"u2\"", "u2 = \"u1\""] {
         assert!(text.lines().any(|own| own == line), "{line} is not in\n{text}");
     }
+    Ok(())
+}
+
+#[test]
+fn a_round_that_cannot_be_read_leaves_the_suggestion_of_the_one_before() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let twice = flights(|columns| {
+        columns[Column::Wx as usize].iter_mut().skip(40).step_by(300).for_each(|value| *value += 9.0);
+        columns.swap(Column::U1 as usize, Column::U2 as usize);
+    })?;
+    data_set_csv(folder.path(), &twice)?;
+    let set = data_set(folder.path(), &ReadOptions::default())?;
+    let report = check(&set, None);
+    let read = |text: &str| data_set(folder.path(), &ReadOptions { described: Some(text.into()), ..ReadOptions::default() });
+    let whole = mend(&set, &report, None, read).ok_or("nothing mends it")?;
+    assert!(whole.is_free() && whole.rounds == 2 && whole.suggestion.text.contains("u1 = \"u2\""), "{whole:?}");
+    let mut reads = 0;
+    let halved = mend(&set, &report, None, |text| {
+        reads += 1;
+        if reads == 1 { read(text) } else { Err(Error::Undetermined("not readable".into())) }
+    });
+    let halved = halved.ok_or("nothing mends it")?;
+    assert!(!halved.is_free() && halved.rounds == 1 && !halved.suggestion.text.contains("u1"), "{}", halved.suggestion.text);
     Ok(())
 }
 

@@ -121,8 +121,8 @@ impl Evidence {
             let is_faulty = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.starts_with(relation);
             !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Severity::Fault)
         };
-        let is_made_of_rates = |finding: &&Finding| finding.name == RATE_TARGETS && finding.verdict == Severity::Ok;
-        let with_targets = findings.iter().find(is_made_of_rates).is_some();
+        let is_made_of_rates = |finding: &Finding| finding.name == RATE_TARGETS && finding.verdict == Severity::Ok;
+        let with_targets = findings.iter().any(is_made_of_rates);
         findings.extend(self.mounts.findings([is_sound("position_rate"), is_sound("attitude_rate")], with_targets));
         findings
     }

@@ -58,24 +58,23 @@ pub fn mend(
     let is_of_use = |suggestion: &Suggestion| !suggestion.mends.is_empty();
     let suggestion = report.suggestion(&set.source).filter(is_of_use)?;
     let mut made = Mending { suggestion, rounds: 1, report: None, set: None };
-    while let Ok(again) = read(&made.suggestion.text) {
+    let Ok(mut again) = read(&made.suggestion.text) else { return Some(made) };
+    loop {
         let seen = check(&again, model);
         let next = if seen.fault { seen.suggestion(&again.source).filter(is_of_use) } else { None };
-        let open = next.as_ref().map_or_else(|| faults(&seen), |_| Vec::new());
+        let open = faults(&seen);
         (made.report, made.set) = (Some(seen), Some(again));
-        match next.filter(|next| made.rounds < ROUNDS && next.text != made.suggestion.text) {
-            Some(mut next) => {
-                next.mends.splice(0..0, made.suggestion.mends);
-                made.suggestion = next;
-                made.rounds += 1;
-            }
-            None => {
-                made.suggestion.open.retain(|known| open.contains(&known.name));
-                break;
-            }
-        }
+        let next = next.filter(|next| made.rounds < ROUNDS && next.text != made.suggestion.text);
+        // What cannot be read is not suggested.
+        let Some((mut next, read)) = next.and_then(|next| read(&next.text).ok().map(|set| (next, set))) else {
+            made.suggestion.open.retain(|known| open.contains(&known.name));
+            return Some(made);
+        };
+        next.mends.splice(0..0, made.suggestion.mends);
+        made.suggestion = next;
+        made.rounds += 1;
+        again = read;
     }
-    Some(made)
 }
 
 fn faults(report: &CheckReport) -> Vec<String> {
