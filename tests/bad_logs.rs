@@ -349,8 +349,8 @@ fn an_attitude_that_is_off_is_told_from_a_gyro_that_is_turned() -> Outcome {
 }
 
 #[test]
-fn a_clock_that_runs_fast_is_named_with_its_rate() -> Outcome {
-    assert_named("clock_controls", "a clock of its own, +0.", |columns| {
+fn a_clock_of_its_own_is_named_with_its_rate() -> Outcome {
+    assert_named("clock_controls", "a clock of its own, 0.", |columns| {
         for stick in [Column::U1, Column::U2, Column::U3, Column::U4] {
             let values = &mut columns[stick as usize];
             let last = values.len() - 1;
@@ -531,5 +531,89 @@ fn controls_that_were_joined_a_sample_late_in_some_logs_are_moved_back_there() -
     std::fs::write(path.join("dataset.toml"), text.ok_or("nothing is suggested")?)?;
     let mended = data_set(path, &ReadOptions::default())?;
     assert_eq!(stamps(mended.flights), []);
+    Ok(())
+}
+
+/// A text that mends these flights, by as many rounds as that takes.
+fn mended(flights: &[Flight]) -> Result<String, Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    data_set_csv(folder.path(), flights)?;
+    let set = data_set(folder.path(), &ReadOptions::default())?;
+    let read = |text: &str| data_set(folder.path(), &ReadOptions { described: Some(text.into()), ..ReadOptions::default() });
+    let made = mend(&set, &check(&set, None), None, read).ok_or("nothing mends it")?;
+    assert!(made.is_free(), "{}\n{:?}", made.suggestion.text, made.report.map(|report| report.to_string()));
+    Ok(made.suggestion.text)
+}
+
+#[test]
+fn controls_with_a_clock_of_their_own_are_moved_back_by_a_drift() -> Outcome {
+    let slow = flights(|columns| {
+        for control in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = columns[control as usize].clone();
+            let ahead = |row: usize| values[(row + row / 150).min(values.len() - 1)];
+            columns[control as usize] = (0..values.len()).map(ahead).collect();
+        }
+    })?;
+    let text = mended(&slow)?;
+    let drift = text.lines().find_map(|line| line.strip_prefix("controls = ")).ok_or_else(|| text.clone())?;
+    assert!((drift.parse::<f64>()? + 1.0 / 150.0).abs() < 4e-4, "{text}");
+    Ok(())
+}
+
+#[test]
+fn rates_behind_a_filter_are_led_by_their_own_change() -> Outcome {
+    let filtered = flights(|columns| {
+        for rate in [Column::Wx, Column::Wy, Column::Wz] {
+            let mut state = columns[rate as usize][0];
+            for value in &mut columns[rate as usize] {
+                state += (*value - state) * 0.1;
+                *value = state;
+            }
+        }
+    })?;
+    let text = mended(&filtered)?;
+    assert!(text.contains("wx = \"wx + 0.0"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn a_pose_that_was_frozen_for_long_is_cut_out() -> Outcome {
+    let frozen = flights(|columns| {
+        for column in [Column::X, Column::Y, Column::Z, Column::Roll, Column::Pitch, Column::Yaw] {
+            for start in (700..columns[column as usize].len().saturating_sub(200)).step_by(900) {
+                let last = columns[column as usize][start];
+                columns[column as usize][start..start + 130].fill(last);
+            }
+        }
+    })?;
+    assert_mended(&frozen, "", "longer = \"cut\"")
+}
+
+#[test]
+fn accelerations_that_are_mostly_noise_are_derived_anew() -> Outcome {
+    let noisy = flights(|columns| {
+        for (place, target) in [Column::WxDot, Column::WyDot, Column::WzDot].into_iter().enumerate() {
+            // Differences of a white sequence, as of the numbers of a congruential generator.
+            let mut state = 1 + place as u64;
+            let mut white = || {
+                state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (state >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
+            };
+            let mut before = white();
+            for value in &mut columns[target as usize] {
+                let next = white();
+                *value += 12.0 * (next - before);
+                before = next;
+            }
+        }
+    })?;
+    let folder = tempfile::tempdir()?;
+    data_set_csv(folder.path(), &noisy)?;
+    let (fault, text) = suggested(folder.path())?;
+    let text = text.filter(|_| !fault).ok_or("nothing is suggested")?;
+    std::fs::write(folder.path().join("dataset.toml"), text)?;
+    assert_eq!(suggested(folder.path())?, (false, None));
+    let set = data_set(folder.path(), &ReadOptions::default())?;
+    assert!(set.flights.iter().all(|flight| flight.targets == Targets::Derived));
     Ok(())
 }

@@ -6,13 +6,14 @@ use super::convert::{Columns, check_finite, convert, source};
 use super::derived::{Derived, derived};
 use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
 use super::late::in_step;
+use super::repair::{Repaired, repair};
 use super::resample::Resampler;
 use super::schema::Schema;
 use super::source::Read;
 use super::table::RawTable;
 use super::taint::tainted;
 use super::timing::{Clock, Part, parts};
-use super::{Column, Flight, Targets, attitude, repair};
+use super::{Column, Flight, Targets, attitude};
 use crate::error::Result;
 use crate::formula::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -54,9 +55,10 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     let unit = schema.stated.get("units.t").map(String::as_str);
     let clock = Clock { unit, resampled: schema.resample_hz.is_some(), split: cuts.split_at_gaps };
     let parts = parts(&table, &time_name, &time_s, clock)?;
+    let log_start_s = time_s.first().copied().unwrap_or_default();
     let mut done = Assembled { files: table.read.iter().cloned().collect(), ..Assembled::default() };
     if let [whole] = parts.as_slice() {
-        of_part(table, &time_s, whole, Identity { name, manoeuvre, alone: true }, schema, cuts, &mut done)?;
+        of_part(table, &time_s, whole, Identity { name, manoeuvre, alone: true, log_start_s }, schema, cuts, &mut done)?;
     } else {
         for part in &parts {
             if part.gap_before_s > 0.0 {
@@ -69,7 +71,7 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
             }
             let times = time_s.get(part.rows.clone()).unwrap_or_default();
             let rows = table.slice(part.rows.clone());
-            of_part(rows, times, part, Identity { name, manoeuvre, alone: false }, schema, cuts, &mut done)?;
+            of_part(rows, times, part, Identity { name, manoeuvre, alone: false, log_start_s }, schema, cuts, &mut done)?;
         }
     }
     if let [only] = done.flights.as_mut_slice() {
@@ -85,6 +87,8 @@ struct Identity<'a> {
     name: &'a str,
     manoeuvre: &'a str,
     alone: bool,
+    /// When the log begins, s.
+    log_start_s: f64,
 }
 
 /// Rows below which a piece has no step of its own, so that no file of it could be read.
@@ -107,12 +111,13 @@ fn of_part(
     mut table: RawTable,
     time_s: &[f64],
     part: &Part,
-    Identity { name, manoeuvre, alone }: Identity,
+    Identity { name, manoeuvre, alone, log_start_s }: Identity,
     schema: &Schema,
     cuts: Cuts,
     done: &mut Assembled,
 ) -> Result<()> {
-    if let Some(note) = repair::repair(&mut table, schema, part.step_s)? {
+    let Repaired { note, cut } = repair(&mut table, schema, part.step_s)?;
+    if let Some(note) = note {
         done.own_notes.push(format!("`{name}`: {note}"));
     }
     let mut columns = convert(&table, schema, part.step_s)?;
@@ -133,9 +138,10 @@ fn of_part(
         None => sample,
     };
     let recorded = columns.get(Column::Vx).map_or(0, <[f64]>::len);
-    let (whole, with_them) = in_step(&mut columns, &schema.late, step_s, recorded);
+    let late = schema.late.iter().map(|(column, late)| (*column, late.after(part.start_s - log_start_s))).collect();
+    let (whole, with_them) = in_step(&mut columns, &late, step_s, recorded);
     if !schema.late.is_empty() {
-        let moved: Vec<String> = schema.late.iter().map(|(column, late_s)| format!("{} {late_s:.3} s", column.name())).collect();
+        let moved: Vec<String> = schema.late.iter().map(|(column, late)| format!("{} {late}", column.name())).collect();
         let with_them = if with_them.is_empty() { String::new() } else { format!("; with them {}", with_them.join(", ")) };
         done.common_notes.insert(format!("moved back in time, as dataset.toml says: {}{with_them}", moved.join(", ")));
     }
@@ -147,7 +153,15 @@ fn of_part(
     let mut used = used.map_err(|error| error.standing_in(&format!("{}, `use` of dataset.toml", table.path.display())))?;
     used.iter_mut().enumerate().for_each(|(sample, used)| *used &= whole.contains(&sample));
     if !schema.repairs.is_empty() {
-        without_lost_ends(&mut used, &columns, name, done);
+        let lost = lost_rows(&columns, samples);
+        without_cut_rows(
+            &mut used,
+            &lost,
+            &|rows| cuts_near(&cut, row_of(rows.start)..row_of(rows.end - 1) + 1, schema, part),
+            name,
+            done,
+        );
+        without_lost_ends(&mut used, &lost, name, done);
     }
     let runs = runs(&used);
     if !schema.rows.is_empty() {
@@ -362,17 +376,47 @@ fn runs(used: &[bool]) -> Vec<Range<usize>> {
     runs
 }
 
-/// Refuses a row in use with a cell that no rule could repair, or a formula that gives no number.
+/// Rows in which some column has no value.
+fn lost_rows(columns: &Columns, samples: usize) -> Vec<bool> {
+    let all = columns.canonical.iter().flatten().chain(columns.extra.values());
+    let mut lost = vec![false; samples];
+    all.for_each(|values| lost.iter_mut().zip(values).for_each(|(lost, value)| *lost |= value.is_nan()));
+    lost
+}
+
+/// Rows around a cell that are without a value with it: a resampler and a moved stream reach so far.
+const REACH: usize = 3;
+
+/// Whether a rule cuts at one of these rows of the file, or so near that streams that were moved could have come from there.
+fn cuts_near(cut: &[bool], rows: Range<usize>, schema: &Schema, part: &Part) -> bool {
+    let latest_s = schema.late.values().fold(0.0, |most: f64, late| most.max(late.most_s(part.step_s * cut.len() as f64)));
+    let near = REACH + (latest_s / part.step_s).ceil() as usize;
+    let rows = rows.start.saturating_sub(near).min(cut.len())..(rows.end + near).min(cut.len());
+    cut[rows].contains(&true)
+}
+
+/// Runs of rows without a value are not used where a rule `cuts`: the flight is cut there.
+fn without_cut_rows(used: &mut [bool], lost: &[bool], cuts: &dyn Fn(&Range<usize>) -> bool, name: &str, done: &mut Assembled) {
+    let of_cut: Vec<Range<usize>> = runs(lost).into_iter().filter(cuts).collect();
+    of_cut.iter().for_each(|run| used[run.clone()].fill(false));
+    if !of_cut.is_empty() {
+        done.own_notes.push(format!(
+            "`{name}`: cut at {} runs of bad cells that are too long to be bridged, {} of {} samples",
+            of_cut.len(),
+            of_cut.iter().map(ExactSizeIterator::len).sum::<usize>(),
+            used.len()
+        ));
+    }
+}
+
 /// Rows at the ends of a log that repair rules left without a value are not used: there is nothing to bridge them to.
-fn without_lost_ends(used: &mut [bool], columns: &Columns, name: &str, done: &mut Assembled) {
-    let is_lost =
-        |row: &usize| columns.canonical.iter().flatten().any(|values| values.get(*row).is_some_and(|value| value.is_nan()));
-    let first = (0..used.len()).take_while(is_lost).count();
-    let last = (first..used.len()).rev().take_while(is_lost).count();
-    if first + last == 0 {
+fn without_lost_ends(used: &mut [bool], lost: &[bool], name: &str, done: &mut Assembled) {
+    let first = lost.iter().take_while(|lost| **lost).count();
+    let last = lost[first..].iter().rev().take_while(|lost| **lost).count();
+    let end = used.len() - last;
+    if used[..first].iter().chain(&used[end..]).all(|used| !used) {
         return;
     }
-    let end = used.len() - last;
     used[..first].fill(false);
     used[end..].fill(false);
     done.own_notes.push(format!(
@@ -380,6 +424,7 @@ fn without_lost_ends(used: &mut [bool], columns: &Columns, name: &str, done: &mu
     ));
 }
 
+/// Refuses a row in use with a cell that no rule could repair, or a formula that gives no number.
 fn check_used(table: &RawTable, columns: &Columns, run: &Range<usize>, row_of: &dyn Fn(usize) -> usize) -> Result<()> {
     let canonical = Column::ALL.into_iter().filter_map(|column| columns.get(column).map(|values| (column.name(), values)));
     for (name, values) in canonical.chain(columns.extra.iter().map(|(name, values)| (name.as_str(), values.as_slice()))) {

@@ -8,6 +8,8 @@ use toml::{Table, Value};
 
 /// Largest time by which a stream can be late or early, s.
 const LATEST_S: f64 = 1.0;
+/// Fastest that its delay can grow, s for each second: a clock that is wrong by more is no clock.
+const FASTEST_DRIFT: f64 = 0.1;
 
 /// A TOML table whose keys are taken one by one; what is left at the end is unknown.
 pub(super) struct Keys {
@@ -75,9 +77,19 @@ impl Keys {
         Err(self.fault(key, number.to_string(), expected))
     }
 
-    /// Times by stream: a group's word first, a single column's time over it.
+    /// Times by stream, s.
     pub fn times(&mut self) -> Result<BTreeMap<Column, f64>> {
-        let mut late = BTreeMap::new();
+        self.by_stream(LATEST_S, "a time", " s")
+    }
+
+    /// How times by stream grow, s for each second.
+    pub fn drifts(&mut self) -> Result<BTreeMap<Column, f64>> {
+        self.by_stream(FASTEST_DRIFT, "a drift", " s for each second")
+    }
+
+    /// Numbers by stream, none larger than `most`: a group's word first, a single column's over it.
+    fn by_stream(&mut self, most: f64, what: &str, unit: &str) -> Result<BTreeMap<Column, f64>> {
+        let mut numbers = BTreeMap::new();
         for single in [false, true] {
             for group in units::GROUPS {
                 let words: &[&'static str] = if single { group.columns } else { &[group.name] };
@@ -85,15 +97,15 @@ impl Keys {
                     let columns: &[&'static str] = if single { &[word] } else { group.columns };
                     let columns: Vec<Column> = columns.iter().filter_map(|column| Column::from_name(column)).collect();
                     // Time and quaternions are no canonical columns; `finish` refuses them.
-                    let Some(late_s) = (if columns.is_empty() { None } else { self.number(word, -LATEST_S)? }) else { continue };
-                    if late_s > LATEST_S {
-                        return Err(self.fault(word, late_s.to_string(), format!("a time from -{LATEST_S} to {LATEST_S} s")));
+                    let Some(number) = (if columns.is_empty() { None } else { self.number(word, -most)? }) else { continue };
+                    if number > most {
+                        return Err(self.fault(word, number.to_string(), format!("{what} from -{most} to {most}{unit}")));
                     }
-                    late.extend(columns.into_iter().map(|column| (column, late_s)));
+                    numbers.extend(columns.into_iter().map(|column| (column, number)));
                 }
             }
         }
-        Ok(late)
+        Ok(numbers)
     }
 
     pub fn choice<T: Copy>(&mut self, key: &'static str, choices: &[(&'static str, T)]) -> Result<Option<T>> {
@@ -111,6 +123,7 @@ impl Keys {
             "columns" => "columns.",
             "units" => "units.",
             "late" => "late.",
+            "drift" => "drift.",
             "late_in" => "late_in.",
             _ => "repair.",
         };

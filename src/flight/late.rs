@@ -1,40 +1,76 @@
-//! Streams that come late: each is moved back in time by whole samples. By how much is stated in `[late]` of the description; finding it out is not
-//! this file's business.
+//! Streams that come late: each is moved back in time by whole samples. By how much is stated in `[late]` and `[drift]` of the description; finding it
+//! out is not this file's business.
 
 use super::Column;
 use super::convert::Columns;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
+use std::fmt;
 use std::ops::Range;
 
-/// Moves columns that come late by so many seconds (early, if negative) to where they belong, to the nearest sample, and with them the further columns
+/// By how much a stream comes later than the rest: at a time t since the log's first row by s + drift · t, s (negative: earlier).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Late {
+    /// At the first row, s.
+    pub s: f64,
+    /// How that grows, s for each second.
+    pub drift: f64,
+}
+
+impl Late {
+    /// The same where rows are counted from another one, so many seconds later.
+    pub fn after(self, since_s: f64) -> Self {
+        Self { s: self.s + self.drift * since_s, ..self }
+    }
+
+    /// The largest delay within so many seconds, either way, s.
+    pub fn most_s(self, duration_s: f64) -> f64 {
+        self.s.abs().max((self.s + self.drift * duration_s).abs())
+    }
+
+    /// How many rows later stands what belongs to this row: it was written at t' = t + s + drift · t'.
+    fn rows(self, row: usize, step_s: f64) -> isize {
+        ((self.s / step_s + self.drift * row as f64) / (1.0 - self.drift)).round() as isize
+    }
+}
+
+impl fmt::Display for Late {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.3} s", self.s)?;
+        if self.drift == 0.0 { Ok(()) } else { write!(f, " and {:+.3} ms each second", 1e3 * self.drift) }
+    }
+}
+
+/// Moves columns that come late by so much (early, if negative) to where they belong, to the nearest sample, and with them the further columns
 /// that nothing else is made of. Returns the rows that then have a value of every stream (what stands in the others is the nearest there is), and
 /// the names of the further columns.
 pub(super) fn in_step(
     columns: &mut Columns,
-    late: &BTreeMap<Column, f64>,
+    late: &BTreeMap<Column, Late>,
     step_s: f64,
     rows: usize,
 ) -> (Range<usize>, Vec<String>) {
-    let samples = |late_s: &f64| (late_s / step_s).round() as isize;
-    let moved = |values: &[f64], by: isize| -> Vec<f64> {
-        let last = rows.saturating_sub(1);
-        (0..rows).map(|row| values[row.saturating_add_signed(by).min(last)]).collect()
+    let last = rows.saturating_sub(1);
+    let moved = |values: &[f64], late: Late| -> Vec<f64> {
+        (0..rows).map(|row| values[row.saturating_add_signed(late.rows(row, step_s)).min(last)]).collect()
     };
     let mut whole = 0..rows;
-    for (&column, late_s) in late {
+    for (&column, &late) in late {
         let Some(values) = &mut columns.canonical[column as usize] else { continue };
-        let by = samples(late_s);
-        *values = moved(values, by);
-        whole = whole.start.max((-by).max(0) as usize).min(rows)..whole.end.min(rows.saturating_sub(by.max(0) as usize));
+        *values = moved(values, late);
+        let is_there = |row: &usize| row.checked_add_signed(late.rows(*row, step_s)).is_some_and(|from| from <= last);
+        let first = (0..rows).find(is_there).unwrap_or(rows);
+        let end = (first..rows).rev().find(is_there).map_or(first, |row| row + 1);
+        whole = whole.start.max(first)..whole.end.min(end);
     }
     let mut with_them = Vec::new();
     for (name, values) in &mut columns.extra {
         let Some(made) = columns.made.get(name) else { continue };
-        let by: BTreeSet<isize> = made.iter().map(|column| late.get(column).map_or(0, samples)).collect();
-        if let (Some(&by), 1) = (by.first(), by.len())
-            && by != 0
+        let mut of_made = made.iter().map(|column| late.get(column).copied().unwrap_or_default());
+        if let Some(first) = of_made.next()
+            && first != Late::default()
+            && of_made.all(|other| other == first)
         {
-            *values = moved(values, by);
+            *values = moved(values, first);
             with_them.push(name.clone());
         }
     }
@@ -55,7 +91,8 @@ mod tests {
         columns.canonical[Column::Vx as usize] = ramp(0.0);
         columns.canonical[Column::Wx as usize] = ramp(3.0);
         columns.canonical[Column::U1 as usize] = ramp(-2.0);
-        let late = BTreeMap::from([(Column::Wx, 0.3), (Column::U1, -0.2)]);
+        let constant = |s: f64| Late { s, drift: 0.0 };
+        let late = BTreeMap::from([(Column::Wx, constant(0.3)), (Column::U1, constant(-0.2))]);
         let (rows, with_them) = in_step(&mut columns, &late, 0.1, 10);
         assert_eq!((rows.clone(), with_them), (2..7, vec!["rotor".to_owned()]));
         for row in rows {
@@ -64,6 +101,23 @@ mod tests {
             // One of which something is made that is in time, and one of which nothing is, stay.
             assert_eq!([columns.extra["battery"][row], columns.extra["wind"][row]], [row as f64 + 2.0; 2]);
         }
-        assert_eq!(in_step(&mut columns, &BTreeMap::from([(Column::Vx, 1.0)]), 0.01, 10).0.len(), 0);
+        assert_eq!(in_step(&mut columns, &BTreeMap::from([(Column::Vx, constant(1.0))]), 0.01, 10).0.len(), 0);
+    }
+
+    #[test]
+    fn a_stream_with_a_clock_of_its_own_is_stretched() {
+        let (rows, step_s) = (2000, 0.01);
+        for drift in [-0.005, 0.0, 0.02] {
+            let late = Late { s: 0.05, drift };
+            // What is written at t' belongs to t' − late(t').
+            let written = |row: usize| row as f64 * step_s - late.s - drift * row as f64 * step_s;
+            let mut columns =
+                Columns { canonical: Default::default(), extra: BTreeMap::new(), made: BTreeMap::new(), quaternion: false };
+            columns.canonical[Column::U3 as usize] = Some((0..rows).map(written).collect());
+            let (whole, _) = in_step(&mut columns, &BTreeMap::from([(Column::U3, late)]), step_s, rows);
+            assert!(whole.len() as f64 > 0.97 * rows as f64 && whole.end < rows, "{drift}: {whole:?}");
+            let values = columns.get(Column::U3).expect("set above");
+            assert!(whole.into_iter().all(|row| (values[row] - row as f64 * step_s).abs() < 0.006), "{drift}");
+        }
     }
 }

@@ -1,19 +1,30 @@
 //! Known-bad cells of sensor columns, bridged by rules that the dataset description states, and counted. Nothing else is mended.
 
-use super::schema::{Repair, Schema};
+use super::schema::{Longer, Repair, Schema};
 use super::table::RawTable;
 use crate::error::Result;
 use crate::formula::Value;
+use std::ops::Range;
+
+/// What was done to a table.
+#[derive(Debug)]
+pub(super) struct Repaired {
+    /// In words; `None` if no cell was bad.
+    pub note: Option<String>,
+    /// By row, whether a rule that cuts left a cell of it without a value.
+    pub cut: Vec<bool>,
+}
 
 /// Applies the rules: runs of bad cells up to the rule's length are interpolated linearly between their good neighbours; bad
 /// cells that cannot be (longer runs, ends of the record) become NaN, to be refused if a row in use holds them.
 ///
-/// Returns what was found and done, in words; `None` if no cell was bad.
+/// Returns what was found and done, in words, and the rows at which a rule cuts the flight.
 ///
 /// # Errors
 /// [`Error::Cell`](crate::Error::Cell) if a rule's column is not in the file.
-pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Result<Option<String>> {
+pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Result<Repaired> {
     let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
+    let mut cut = vec![false; table.columns.first().map_or(0, Vec::len)];
     for rule in &schema.repairs {
         let places: Vec<usize> = rule.columns.iter().map(|name| place(table, name)).collect::<Result<_>>()?;
         let together = together(table, rule, &places);
@@ -35,13 +46,16 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
             if count.bridged > 0 {
                 bridged.push(format!("{} of `{name}`", count.bridged));
             }
+            if rule.longer == Longer::Cut {
+                count.left.iter().for_each(|run| cut[run.clone()].fill(true));
+            }
             if count.found > count.bridged {
                 left.push(format!("{} of `{name}`", count.found - count.bridged));
             }
         }
     }
     if found == 0 {
-        return Ok(None);
+        return Ok(Repaired { note: None, cut });
     }
     let mut sentences = Vec::new();
     if !bridged.is_empty() {
@@ -51,7 +65,7 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
     if !left.is_empty() {
         sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
     }
-    Ok(Some(sentences.join("; ")))
+    Ok(Repaired { note: Some(sentences.join("; ")), cut })
 }
 
 fn place(table: &RawTable, name: &str) -> Result<usize> {
@@ -85,6 +99,8 @@ struct Count {
     found: usize,
     bridged: usize,
     longest_bridged: usize,
+    /// Runs that stay without a value.
+    left: Vec<Range<usize>>,
 }
 
 /// Bridges runs of at most `longest` samples; in a column in which a `turn` is nothing, the short way round.
@@ -107,6 +123,7 @@ fn bridge(values: &mut [f64], bad: &[bool], longest: f64, turn: Option<f64>) -> 
             count.longest_bridged = count.longest_bridged.max(length);
         } else {
             values[first..end].fill(f64::NAN);
+            count.left.push(first..end);
         }
         start = end;
     }
@@ -119,7 +136,7 @@ mod tests {
 
     fn rule(columns: &[&str]) -> Repair {
         let columns = columns.iter().map(|&name| name.to_owned()).collect();
-        Repair { columns, valid: Vec::new(), held: false, zero: false, spike: None, max_gap_s: 0.02 }
+        Repair { columns, valid: Vec::new(), held: false, zero: false, spike: None, max_gap_s: 0.02, longer: Longer::Error }
     }
 
     fn with(rule: Repair) -> Schema {
@@ -135,7 +152,8 @@ mod tests {
         let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
         let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
         let rule = Repair { valid, ..rule(&["m1"]) };
-        let note = repair(&mut table, &with(rule), 0.01)?;
+        let Repaired { note, cut } = repair(&mut table, &with(rule), 0.01)?;
+        assert!(!cut.contains(&true), "this rule does not cut");
         let found = &table.columns[0];
         assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
         assert!(found[0].is_nan() && found[6..9].iter().all(|value| value.is_nan()));
@@ -150,7 +168,9 @@ mod tests {
         let wy = vec![2.0, 2.0, 2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0, 8.0];
         let mut table = RawTable { names: vec!["wx".into(), "wy".into()], columns: vec![wx, wy], ..RawTable::default() };
         let rule = Repair { held: true, ..rule(&["wx", "wy"]) };
-        let note = repair(&mut table, &with(rule), 0.01)?;
+        let rule = Repair { longer: Longer::Cut, ..rule };
+        let Repaired { note, cut } = repair(&mut table, &with(rule), 0.01)?;
+        assert_eq!((0..10).filter(|&row| cut[row]).collect::<Vec<_>>(), [6, 7, 8]);
         // Row 2 repeats row 1; in row 4 wx stands still and wy does not; rows 6 to 8 are longer than can be bridged.
         assert_eq!(table.columns[0][..6], [0.0, 1.0, 2.0, 3.0, 3.0, 5.0]);
         assert_eq!(table.columns[1][..6], [2.0, 2.0, 3.0, 4.0, 6.0, 6.0]);

@@ -12,6 +12,7 @@
 //! | `[columns]` | `vx = "v_nose"`, a column of the file, or a formula of its columns, or a list of which the first that the file can give is taken |
 //! | `[units]` | unit by column or group: `angles = "deg"`, `rates = "deg/s"`, `acceleration = "g"`, `vx = "ft/s"` |
 //! | `[late]` | seconds by which a group of `[units]`, or a column, comes later than the rest (negative: earlier): `angles = 0.04` |
+//! | `[drift]` | how that grows along a log, s for each second since its first row: a stream with a clock of its own: `controls = -0.005` |
 //! | `[[late_in]]` | `flights` and the same for those alone, on top of `[late]`: logs of one set that were joined differently |
 //! | `missing` | columns the logs lack: position, `yaw`, accelerations |
 //! | `use` | rows to use: a formula with a comparison, or a list that must all hold, in canonical and further columns and `height airspeed alpha beta g_x g_y g_z` |
@@ -25,12 +26,13 @@
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
-//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly; `longer = "cut"`: where more of them follow each other the flight is cut |
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::{Axes, QuaternionOrder};
 use super::bounds::RATES_HZ;
 use super::keys::Keys;
+use super::late::Late;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
@@ -89,6 +91,22 @@ pub(crate) struct Repair {
     pub spike: Option<f64>,
     /// Longest run of bad cells that is bridged, s.
     pub max_gap_s: f64,
+    /// What is done with a longer one.
+    pub longer: Longer,
+}
+
+/// What is done with a run of bad cells that is too long to be bridged.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Longer {
+    /// It is an error in a row that is used.
+    #[default]
+    Error,
+    /// Its rows are left out: what lies before and behind become flights of their own.
+    Cut,
+}
+
+impl Longer {
+    const NAMES: [(&'static str, Self); 2] = [("error", Self::Error), ("cut", Self::Cut)];
 }
 
 /// Streams that come late in some flights.
@@ -114,8 +132,8 @@ pub(crate) struct Schema {
     pub read: BTreeSet<String>,
     /// Factor to SI by canonical name; 1 if absent.
     pub factors: BTreeMap<&'static str, f64>,
-    /// By how much a column comes later than the rest, s.
-    pub late: BTreeMap<Column, f64>,
+    /// By how much a column comes later than the rest.
+    pub late: BTreeMap<Column, Late>,
     /// What comes on top of that in some flights.
     pub late_in: Vec<LateIn>,
     pub missing: Vec<Column>,
@@ -188,8 +206,8 @@ const TARGETS: [(&str, TargetKind); 4] = [
 const MAY_LACK: [Column; 4] = [Column::X, Column::Y, Column::Z, Column::Yaw];
 
 /// Keys that hold for columns that are canonical already, or for whole logs.
-const OF_CANONICAL_COLUMNS: [&str; 10] =
-    ["use", "minimum_length_s", "resample_hz", "late", "late_in", "manoeuvre", "classes", "exclude", "leave_out", "notes"];
+const OF_CANONICAL_COLUMNS: [&str; 11] =
+    ["use", "minimum_length_s", "resample_hz", "late", "drift", "late_in", "manoeuvre", "classes", "exclude", "leave_out", "notes"];
 
 impl Schema {
     /// Understands a `dataset.toml`; `place` is named in errors.
@@ -246,8 +264,12 @@ impl Schema {
             schema.factors = factors(units)?;
         }
         if let Some(mut late) = keys.section("late")? {
-            schema.late = late.times()?;
+            schema.late = late.times()?.into_iter().map(|(column, s)| (column, Late { s, drift: 0.0 })).collect();
             late.finish()?;
+        }
+        if let Some(mut drift) = keys.section("drift")? {
+            drift.drifts()?.into_iter().for_each(|(column, drift)| schema.late.entry(column).or_default().drift = drift);
+            drift.finish()?;
         }
         for mut rule in keys.sections("late_in")? {
             let flights = rule.texts("flights")?.unwrap_or_default();
@@ -271,8 +293,9 @@ impl Schema {
                     "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
                 return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
             };
+            let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
             rule.finish()?;
-            schema.repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s });
+            schema.repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, longer });
         }
         keys.finish()?;
         Ok(schema)
@@ -282,9 +305,9 @@ impl Schema {
     pub fn for_log(&self, own: &[&LateIn]) -> Self {
         let mut schema = self.clone();
         for (&column, late_s) in own.iter().flat_map(|rule| &rule.late) {
-            *schema.late.entry(column).or_insert(0.0) += late_s;
+            schema.late.entry(column).or_default().s += late_s;
         }
-        schema.late.retain(|_, late_s| *late_s != 0.0);
+        schema.late.retain(|_, late| *late != Late::default());
         schema
     }
 
@@ -337,8 +360,12 @@ fn stated(table: &Table) -> BTreeMap<String, String> {
     for (key, value) in table {
         match value {
             Value::Table(inside) => {
-                let texts = inside.iter().filter_map(|(name, value)| Some((format!("{key}.{name}"), value.as_str()?.to_owned())));
-                stated.extend(texts);
+                let text = |value: &Value| match value {
+                    Value::String(text) => Some(text.clone()),
+                    Value::Float(_) | Value::Integer(_) => Some(value.to_string()),
+                    _ => None,
+                };
+                stated.extend(inside.iter().filter_map(|(name, value)| Some((format!("{key}.{name}"), text(value)?))));
             }
             Value::String(text) => {
                 stated.insert(key.clone(), text.clone());
@@ -517,6 +544,8 @@ mod tests {
             ("resample_hz = 1e9", "`resample_hz` is 1000000000, expected a rate from 2 to 100000 Hz"),
             ("quaternion = \"xyzx\"", "`quaternion` is `xyzx`, expected one of xyzw, wxyz"),
             ("[[repair]]\ncolumns = [\"m1\"]", "an incomplete rule"),
+            ("[[repair]]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nlonger = \"split\"", "expected one of error, cut"),
+            ("[drift]\ncontrols = 0.2", "`drift.controls` is 0.2, expected a drift from -0.1 to 0.1 s for each second"),
             ("[[late_in]]\ncontrols = 0.01", "`late_in` is an incomplete rule"),
             ("[[late_in]]\nflights = \"a\"\ncontrol = 0.01", "did you mean `controls`?"),
             ("[[late_in]]\nflights = \"a\"\ncontrols = 2", "`late_in.controls` is 2, expected a time from -1 to 1 s"),

@@ -18,7 +18,7 @@ pub struct Source {
     pub axes: Axes,
     /// Order in which quaternions were read, if every log's attitude is one.
     pub quaternion: Option<QuaternionOrder>,
-    /// What the description states: `axes`, `velocity`, `units.vx`, `columns.roll`, … with the text given. A group of units stands under
+    /// What the description states: `axes`, `velocity`, `units.vx`, `columns.roll`, `drift.controls`, … with the text or number given. A group of units stands under
     /// each of its columns, too.
     pub stated: BTreeMap<String, String>,
     /// The text of the description in force.

@@ -6,8 +6,11 @@ use super::timing::Timing;
 
 /// A delay that grows by so much along a flight changes verdicts, s.
 const GROWS_S: f64 = 0.03;
+/// The same where it is stated that the stream has a clock of its own: what is left of it is no chance.
+const STILL_GROWS_S: f64 = 0.005;
 
-const CONTROLS: &str = "controls";
+/// The sticks, as a stream.
+pub(super) const CONTROLS: &str = "controls";
 /// How the findings begin.
 pub(super) const CLOCK: &str = "clock_";
 
@@ -40,8 +43,8 @@ impl Halves {
         self.flights += other.flights;
     }
 
-    /// By how much the delay of each stream grows.
-    pub fn findings(&self) -> Vec<Finding> {
+    /// By how much the delay of each stream grows; of which ones a drift is stated.
+    pub fn findings(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<Finding> {
         let late = |timing: &Timing| {
             let mut late = timing.offsets(0.0);
             late.push(timing.control_delay(None).0);
@@ -51,7 +54,12 @@ impl Halves {
         // From the middle of one half to that of the other.
         let apart_s = 0.5 * self.duration_s / self.flights.max(1) as f64;
         let same = |one: &Finding| second.iter().find(|other| other.name == one.name).cloned();
-        first.iter().filter_map(|one| grown(one, &same(one)?, apart_s)).collect()
+        let mut grown: Vec<Finding> = first.iter().filter_map(|one| grown(one, &same(one)?, apart_s, is_stated)).collect();
+        // Of two streams that both drift against a third, or against each other, nothing tells which is to be moved.
+        if grown.iter().filter(|finding| finding.set.is_some()).count() > 1 {
+            grown.iter_mut().for_each(|finding| finding.set = None);
+        }
+        grown
     }
 }
 
@@ -66,23 +74,29 @@ fn stream(of: &str) -> &'static str {
     }
 }
 
-fn grown(first: &Finding, second: &Finding, apart_s: f64) -> Option<Finding> {
+fn grown(first: &Finding, second: &Finding, apart_s: f64, is_stated: &dyn Fn(&str) -> bool) -> Option<Finding> {
     let half = |finding: &Finding| Some(0.5 * (finding.interval?[1] - finding.interval?[0]));
     let by = second.measured? - first.measured?;
     let half = half(first)?.hypot(half(second)?);
     let (low, high) = (by - half, by + half);
     let stream = stream(&first.name);
-    // Controls that are recorded early act late; of two streams in step the one that is recorded early is early.
-    let fast = by / apart_s * if stream == CONTROLS { 1.0 } else { -1.0 };
-    let is_grown = by.abs() > GROWS_S && (low > 0.0 || high < 0.0);
-    let message = if is_grown {
-        format!(
-            "from the first half of a flight to the second the delay of the {stream} grows by {:.0} ms: a clock of its own, {:+.2} % fast",
-            1e3 * by,
-            100.0 * fast
-        )
+    // Controls that are recorded early act late.
+    let drift = by / apart_s * if stream == CONTROLS { -1.0 } else { 1.0 };
+    let least_s = if is_stated(stream) { STILL_GROWS_S } else { GROWS_S };
+    let is_grown = by.abs() > least_s && (low > 0.0 || high < 0.0);
+    let message = format!(
+        "from the first half of a flight to the second the delay of the {} grows by {:.0} ms: a clock of its own, {:.2} % {}",
+        stream.replace('_', " "),
+        1e3 * by,
+        100.0 * drift.abs(),
+        // What comes ever later has stamps that run ahead.
+        if drift > 0.0 { "fast" } else { "slow" }
+    );
+    let set = format!("[drift] {stream} = {drift:.5}");
+    let found = if is_grown {
+        finding(&format!("{CLOCK}{stream}"), Severity::Fault, message, Some(&set))
     } else {
-        "one clock".into()
+        finding(&format!("{CLOCK}{stream}"), Severity::Ok, "one clock".into(), None)
     };
     Some(Finding {
         subject: Subject::Timing,
@@ -90,11 +104,6 @@ fn grown(first: &Finding, second: &Finding, apart_s: f64) -> Option<Finding> {
         interval: Some([low, high]),
         expected: Some(0.0),
         unit: "s".into(),
-        ..finding(
-            &format!("{CLOCK}{stream}"),
-            if is_grown { Severity::Fault } else { Severity::Ok },
-            message.replace('_', " "),
-            None,
-        )
+        ..found
     })
 }

@@ -70,7 +70,7 @@ fn told(flights: &[Flight], period: usize, indices: &[usize], columns: &[Column]
     );
     if indices.len() as f64 > MOST * flights.len() as f64 {
         let verdict = if matters { Severity::Fault } else { Severity::Warning };
-        return Some(finding(&name, verdict, message, Some(&format!("resample_hz = {rate_hz:.3}"))));
+        return Some(finding(&name, verdict, message, super::streams::resampled(flights, columns, rate_hz).as_deref()));
     }
     matters.then(|| in_flights(&name, indices, &message, flights))
 }

@@ -31,6 +31,7 @@ mod increments;
 mod jointly;
 mod limits;
 mod lines;
+#[cfg(feature = "files")]
 mod mending;
 mod mixes;
 mod mounts;
@@ -61,6 +62,7 @@ mod vibration;
 
 pub use excitation::{Collinearity, Excitation};
 pub use finding::{Finding, Severity, Subject};
+#[cfg(feature = "files")]
 pub use mending::{Mending, mend};
 pub use report::CheckReport;
 #[cfg(feature = "files")]
@@ -276,7 +278,7 @@ impl Gathered {
         if self.columns.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
             findings.extend(self.together.timing.offsets(0.0));
         } else {
-            findings.extend(self.together.halves.findings());
+            findings.extend(self.together.halves.findings(&|stream| data.source.stated.contains_key(&format!("drift.{stream}"))));
             findings.extend(odd::late_streams(&self.together.timing));
             findings.extend(odd::late_controls(&self.together.timing));
         }

@@ -2,7 +2,7 @@
 //! by itself; what most of them keep and some break is a fault of those, and they are left out of what all together are judged by.
 
 use super::causes::{self, Cause};
-use super::clocks::CLOCK;
+use super::clocks::{self, CLOCK};
 use super::evidence::Evidence;
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
@@ -57,7 +57,7 @@ impl Own {
         findings.extend(short.timing.offsets(CONVINCING_FALL));
         findings.push(short.timing.control_delay(None).0);
         findings.extend(short.timing.sticks());
-        findings.extend(short.halves.findings());
+        findings.extend(short.halves.findings(&|_| false));
         findings.extend(short.forces.lateral());
         findings.extend(lengths(&short.forces.coefficients()));
         let mut evidence = Evidence::new(quaternion, step_s);
@@ -178,6 +178,7 @@ impl Odd {
         let usual = mounts::usual(each.iter().map(|own| &own.turns));
         let is_turned = |own: &&&Own| mounts::is_beyond(&own.turns, &usual);
         let turned: BTreeSet<usize> = each.iter().filter(is_turned).map(|own| own.flight).collect();
+        let mut drifts = false;
         for (name, mut of_flights) in by_name {
             // A mount that all share is no fault of one.
             of_flights
@@ -190,9 +191,16 @@ impl Odd {
                 name if name.starts_with(CLOCK) => {
                     let mut such = broken(&of_flights);
                     such.retain(|(indices, _)| are_some(indices.len()));
+                    such.iter_mut().for_each(|(indices, _)| {
+                        indices.extend(alike(indices, &of_flights));
+                        indices.sort_unstable();
+                    });
+                    drifts |= name.ends_with(clocks::CONTROLS) && !such.is_empty();
                     odd.extend(name, such, flights);
                     continue;
                 }
+                // Beside controls that come ever later, or earlier, those of all other flights look late.
+                name if drifts && (name == CONTROLS || name.starts_with(STICK)) => continue,
                 CONTROLS => shifted(&of_flights, "the controls"),
                 // One stick alone may well be slower than the rest in a flight; it cannot act before it is given.
                 name if name.starts_with(STICK) => {
@@ -266,6 +274,14 @@ fn broken(of_flights: &[(usize, &Finding)]) -> Vec<(Vec<usize>, String)> {
     }
     let told = |alike: Vec<(usize, &Finding)>| (alike.iter().map(|entry| entry.0).collect(), alike[0].1.message.clone());
     kinds.into_values().map(told).collect()
+}
+
+/// Flights that are less sure of the same: what was measured there is nearer to what it is in these than to nothing.
+fn alike(of: &[usize], of_flights: &[(usize, &Finding)]) -> Vec<usize> {
+    let known: Vec<(usize, f64)> = of_flights.iter().filter_map(|(flight, finding)| Some((*flight, finding.measured?))).collect();
+    let usual = median(known.iter().filter(|(flight, _)| of.contains(flight)).map(|entry| entry.1).collect());
+    let is_nearer = |value: f64| usual.is_some_and(|usual| value / usual > 0.5);
+    known.into_iter().filter(|(flight, value)| !of.contains(flight) && is_nearer(*value)).map(|entry| entry.0).collect()
 }
 
 /// Flights in which the gains of a relation's axes are others than in the most, though near 1, and alike: a wrong scale is one of all three axes, where a

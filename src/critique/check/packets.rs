@@ -12,7 +12,7 @@ const LONGEST_S: f64 = 2.0;
 const FEWEST: usize = 3;
 /// A stream of which more rows repeat the row before is slow, not lost now and then.
 const SLOW: f64 = 0.4;
-/// What lasted longer, s, cannot be bridged by a straight line.
+/// Where one lasted longer, s, no straight line bridges it, and flights are cut at those that last half as long.
 const BRIDGED_S: f64 = 1.0;
 
 const POSE: [Column; 6] = [Column::X, Column::Y, Column::Z, Column::Roll, Column::Pitch, Column::Yaw];
@@ -92,11 +92,15 @@ fn of_packet(flights: &[Flight], name: &str, columns: &[Column], filled: Filled)
         list.join(", "),
         100.0 * of_them
     );
-    let rule = format!("[[repair]] columns = {list:?}, {key} = true, max_gap_s = {:.3}, with the file's names", 1.5 * longest_s);
+    let bridged = if longest_s <= BRIDGED_S {
+        format!("max_gap_s = {:.3}", 1.5 * longest_s)
+    } else {
+        format!("max_gap_s = {:.3}, longer = \"cut\"", 0.5 * BRIDGED_S)
+    };
+    let rule = format!("[[repair]] columns = {list:?}, {key} = true, {bridged}, with the file's names");
     let verdict = if of_them > MUCH { Severity::Fault } else { Severity::Warning };
-    let set = (longest_s <= BRIDGED_S).then_some(rule.as_str());
     let first = columns.first().map_or("", |column| column.name());
-    Some((finding(&format!("{stem}_{first}"), verdict, message, set), lost.iter().map(|(index, ..)| *index).collect()))
+    Some((finding(&format!("{stem}_{first}"), verdict, message, Some(&rule)), lost.iter().map(|(index, ..)| *index).collect()))
 }
 
 /// What is measured besides.

@@ -184,7 +184,23 @@ impl Trial<'_> {
             };
             (left, Kind::Filtered(time_s))
         };
-        FILTERS_S.map(of).into_iter().min_by(|one, other| one.0.total_cmp(&other.0)).unwrap_or((f64::INFINITY, Kind::Leaps))
+        let nearest = FILTERS_S.map(of).into_iter().min_by(|one, other| one.0.total_cmp(&other.0));
+        let Some((left, Kind::Filtered(time_s))) = nearest else { return (f64::INFINITY, Kind::Leaps) };
+        (left, Kind::Filtered(self.time_constant_s(time_s)))
+    }
+
+    /// The time constant of the filter, s, which is near this one. A state s behind it: s + T s′ = s₀, so e = −T Δs′. A derivative f: f + T f′ = f₀, so
+    /// e = T Δf.
+    fn time_constant_s(&self, near_s: f64) -> f64 {
+        let channel = self.broken.channel;
+        let found_s = if self.is_state {
+            let rate = lagged(&channel.rate, near_s, channel.step_s);
+            -self.on(|piece| difference(&rate, piece)).1
+        } else {
+            self.on(|piece| difference(&channel.rate, piece)).1
+        };
+        // The next ones of those that are tried are not farther.
+        if (0.5..2.0).contains(&(found_s / near_s)) { found_s } else { near_s }
     }
 
     fn averaged(&self) -> (f64, Kind) {

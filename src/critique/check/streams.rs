@@ -34,6 +34,10 @@ const LEAST_NOISE: f64 = 0.03;
 
 /// How findings of held streams begin.
 pub(super) const HELD: &str = "held_";
+/// How findings of accelerations that are mostly noise begin.
+pub(super) const SWAMPED_BY_NOISE: &str = "swamped_";
+const LINEAR: [Column; 3] = [Column::VxDot, Column::VyDot, Column::VzDot];
+const ANGULAR: [Column; 3] = [Column::WxDot, Column::WyDot, Column::WzDot];
 
 /// Position matters for the height above ground alone.
 pub(super) const POSITION: [Column; 3] = [Column::X, Column::Y, Column::Z];
@@ -98,6 +102,9 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         noisy.chain(CONTROLS.into_iter().filter(is_smooth).filter_map(|column| rough(flights, column))).collect();
     findings.extend(rounded.into_iter().map(|(_, finding)| finding));
     findings.extend(noisy);
+    if recorded {
+        findings.extend([LINEAR, ANGULAR].into_iter().filter_map(|targets| swamped(flights, targets)));
+    }
     findings
 }
 
@@ -222,10 +229,27 @@ fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Findin
     match hold.flights.as_slice() {
         [] => {
             let verdict = if matters { Severity::Fault } else { Severity::Warning };
-            Some(finding(&name, verdict, message, Some(&format!("resample_hz = {rate_hz:.3}"))))
+            let set = resampled(flights, columns, rate_hz);
+            Some(finding(&name, verdict, message, set.as_deref()))
         }
         some => matters.then(|| in_flights(&name, some, &message, flights)),
     }
+}
+
+/// The line that brings a log to the rate of its slow streams; `None` where another stream that drives the physics is faster, which would be lost with that: in all
+/// flights some such column changes in most rows.
+pub(super) fn resampled(flights: &[Flight], slow: &[Column], rate_hz: f64) -> Option<String> {
+    let is_faster = |column: Column| {
+        let moves = |flight: &Flight| {
+            let values = flight.column(column);
+            let is_so = 2 * values.windows(2).filter(|pair| pair[0] != pair[1]).count() > values.len();
+            flight.rest();
+            is_so
+        };
+        flights.iter().all(moves)
+    };
+    let is_lost = driving().filter(|column| !slow.contains(column)).any(is_faster);
+    (!is_lost).then(|| format!("resample_hz = {rate_hz:.3}"))
 }
 
 /// The step to which a column is rounded, in each flight where it is, and the flights that tell.
@@ -329,6 +353,27 @@ fn rough(flights: &[Flight], column: Column) -> Option<Finding> {
     );
     let verdict = if size > SWAMPED * deviation { Severity::Fault } else { Severity::Warning };
     (size > ROUGH * deviation).then(|| finding(&format!("noise_{name}"), verdict, message, None))
+}
+
+/// Accelerations that are mostly noise, as differences of a noisy velocity are: better derived anew, with what is faster than the aircraft left out.
+fn swamped(flights: &[Flight], targets: [Column; 3]) -> Option<Finding> {
+    let each = targets.map(|column| {
+        Some((median(flights.iter().map(|flight| noise_of(flight, column)).collect())?, variance(flights, column).sqrt()))
+    });
+    let [x, y, z] = each;
+    let each = [x?, y?, z?];
+    let share = each.iter().map(|(size, deviation)| (size / deviation).powi(2)).fold(0.0, f64::max);
+    let names = targets.map(Column::name);
+    let message = format!(
+        "{} have noise of up to {:.2} {} (rms), up to {:.0} % of their variance, as differences of neighbouring samples have: what is small in them is not \
+         seen; derived anew, with a low-pass, they have less",
+        names.join(", "),
+        each.iter().map(|(size, _)| *size).fold(0.0, f64::max),
+        targets[0].unit(),
+        100.0 * share
+    );
+    let set = format!("ignore = {names:?}, missing = {names:?}");
+    (share > SWAMPED.powi(2)).then(|| finding(&format!("{SWAMPED_BY_NOISE}{}", names[0]), Severity::Warning, message, Some(&set)))
 }
 
 /// Third differences; of white noise their squares are 20 times its own: coefficients 1, 3, 3, 1.

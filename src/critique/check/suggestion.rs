@@ -49,7 +49,8 @@ impl CheckReport {
     /// What mends the faults that were found in flights of this source. `None` where nothing is at fault, or where the source has a description that is
     /// none.
     pub fn suggestion(&self, source: &Source) -> Option<Suggestion> {
-        let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || finding.name == super::stamps::NAME;
+        let is_worth_it = |name: &str| name == super::stamps::NAME || name.starts_with(super::streams::SWAMPED_BY_NOISE);
+        let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || is_worth_it(&finding.name);
         let mut faults = self.findings.iter().filter(is_mended).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
@@ -166,7 +167,8 @@ impl<'a> Draft<'a> {
                     entries.push(("", key, value));
                 }
                 "units" => entries.extend(self.unit(&key, value)?),
-                "late" => entries.extend(self.later(&key, &value)?),
+                "late" => entries.extend(self.later("late", &key, &value)?),
+                "drift" => entries.extend(self.later("drift", &key, &value)?),
                 "columns" => entries.push(("columns", key.clone(), self.column(&key, &value)?)),
                 other => return Err(format!("`{other}` is no section of dataset.toml")),
             }
@@ -233,24 +235,41 @@ impl<'a> Draft<'a> {
         Ok([word].into_iter().chain(others).map(|key| ("units", key.to_owned(), unit.clone())).collect())
     }
 
-    /// What a stream still comes late by is on top of what it has been moved.
-    fn later(&self, word: &str, by_s: &Value) -> Result<Vec<Entry>, String> {
-        let by_s = by_s.as_float().ok_or_else(|| format!("`late.{word}` is {by_s}"))?;
-        let stated_s =
-            |key: &str| self.stated.get("late", key).and_then(|old| old.as_float().or(old.as_integer().map(|s| s as f64)));
-        // To a microsecond, so that sums are as a person writes them.
-        let entry = |key: &str, from_s: f64| ("late", key.to_owned(), Value::Float(((from_s + by_s) * 1e6).round() / 1e6));
+    /// What a stream still comes late by, or drifts by, is on top of what it has been moved.
+    fn later(&self, section: &'static str, word: &str, by: &Value) -> Result<Vec<Entry>, String> {
+        let by = by.as_float().ok_or_else(|| format!("`{section}.{word}` is {by}"))?;
         let columns = columns_of(word);
-        if let [single] = columns {
-            let so_far = Column::from_name(single).and_then(|column| self.schema.late.get(&column).copied());
-            return Ok(vec![entry(word, so_far.unwrap_or(0.0))]);
+        if section == "late"
+            && let Some(column) = columns.iter().find(|column| self.is_made_in_time(column))
+        {
+            return Err(format!("another finding says why `{column}` comes late; `check` says whether it still does with that"));
         }
-        let is_moved = |column: &&&str| self.set.contains_key(&("late", (**column).to_owned()));
+        let stated =
+            |key: &str| self.stated.get(section, key).and_then(|old| old.as_float().or(old.as_integer().map(|old| old as f64)));
+        // To a microsecond, so that sums are as a person writes them.
+        let entry = |key: &str, from: f64| (section, key.to_owned(), Value::Float(((from + by) * 1e6).round() / 1e6));
+        if let [single] = columns {
+            let late = Column::from_name(single).and_then(|column| self.schema.late.get(&column).copied()).unwrap_or_default();
+            return Ok(vec![entry(word, if section == "late" { late.s } else { late.drift })]);
+        }
+        let is_moved = |column: &&&str| self.set.contains_key(&(section, (**column).to_owned()));
         if let Some(column) = columns.iter().find(is_moved) {
             return Err(format!("another finding moves `{column}` already"));
         }
-        let single = columns.iter().filter_map(|column| Some(entry(column, stated_s(column)?)));
-        Ok([entry(word, stated_s(word).unwrap_or(0.0))].into_iter().chain(single).collect())
+        let single = columns.iter().filter_map(|column| Some(entry(column, stated(column)?)));
+        Ok([entry(word, stated(word).unwrap_or(0.0))].into_iter().chain(single).collect())
+    }
+
+    /// Whether a line that was added undoes a filter, or a clock, behind which this column is late.
+    fn is_made_in_time(&self, column: &str) -> bool {
+        self.set.iter().any(|((section, key), value)| match *section {
+            "drift" => columns_of(key).contains(&column),
+            "columns" => {
+                key == column
+                    && value.as_str().and_then(|text| Formula::parse(text).ok()).is_some_and(|formula| formula.remembers())
+            }
+            _ => false,
+        })
     }
 
     /// A formula of columns as the program has them in terms of the file's.

@@ -223,6 +223,14 @@ pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
                 lines(&|name| format!("{name} = \"{name} {sign} {:.4}\"", by.abs()))
             ))
         }
+        // An angle leaps where it goes round, and so would its rate.
+        Kind::Filtered(_) if columns.iter().all(|column| ["rates", "velocity"].contains(&stream_of(*column))) => {
+            let time_s = usual(all, |kind| if let Kind::Filtered(time_s) = kind { *time_s } else { 0.0 });
+            Some(format!(
+                "[columns] {}, with the file's names",
+                lines(&|name| format!("{name} = \"{name} + {time_s:.4} * rate({name})\""))
+            ))
+        }
         Kind::Holds(part, _) => {
             let [x, y, z] = measured_at(all, columns, part)?;
             Some(format!(
