@@ -281,22 +281,7 @@ impl Schema {
             }
             schema.late_in.push(LateIn { flights, late });
         }
-        for mut rule in keys.sections("repair")? {
-            let columns = rule.texts("columns")?.unwrap_or_default();
-            let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
-            let held = rule.flag("held")?.unwrap_or(false);
-            let zero = rule.flag("zero")?.unwrap_or(false);
-            let spike = rule.number("spike", f64::MIN_POSITIVE)?;
-            let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
-            let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
-                let expected =
-                    "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
-                return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
-            };
-            let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
-            rule.finish()?;
-            schema.repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, longer });
-        }
+        schema.repairs = repairs(&mut keys, place)?;
         keys.finish()?;
         Ok(schema)
     }
@@ -410,6 +395,28 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
+}
+
+/// `[[repair]]`, each rule.
+fn repairs(keys: &mut Keys, place: &str) -> Result<Vec<Repair>> {
+    let mut repairs = Vec::new();
+    for mut rule in keys.sections("repair")? {
+        let columns = rule.texts("columns")?.unwrap_or_default();
+        let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
+        let held = rule.flag("held")?.unwrap_or(false);
+        let zero = rule.flag("zero")?.unwrap_or(false);
+        let spike = rule.number("spike", f64::MIN_POSITIVE)?;
+        let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
+        let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
+            let expected =
+                "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
+            return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
+        };
+        let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
+        rule.finish()?;
+        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, longer });
+    }
+    Ok(repairs)
 }
 
 /// `missing`, of the columns that may be.
