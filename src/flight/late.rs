@@ -1,5 +1,5 @@
-//! Streams that come late: each is moved back in time, by whole samples where all of a log comes as late. By how much is stated in `[late]` and `[drift]` of the description; finding it
-//! out is not this file's business.
+//! Streams that come late: each is moved back in time, by whole samples, or, where it drifts, to between samples. By how much is stated in `[late]` and
+//! `[drift]` of the description; finding it out is not this file's business.
 
 use super::Column;
 use super::convert::Columns;
@@ -55,8 +55,9 @@ fn between(values: &[f64], row: f64) -> f64 {
 
 /// Moves columns that come late by so much (early, if negative) to where they belong, to the nearest sample, and with them the further columns
 /// that nothing else is made of. A stream that drifts would be off by up to half a sample, now here and now there, which is a lag to whoever looks for one:
-/// but for angles, which go round, such a canonical column is taken from between its samples. Returns the rows that then have a value of every stream (what stands in the others is the nearest there is), and
-/// the names of the further columns.
+/// but for angles, which go round, such a canonical column is taken from between its samples.
+///
+/// Returns the rows that then have a value of every stream (what stands in the others is the nearest there is), and the names of the further columns.
 pub(super) fn in_step(
     columns: &mut Columns,
     late: &BTreeMap<Column, Late>,

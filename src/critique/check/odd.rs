@@ -178,6 +178,7 @@ impl Odd {
         let usual = mounts::usual(each.iter().map(|own| &own.turns));
         let is_turned = |own: &&&Own| mounts::is_beyond(&own.turns, &usual);
         let turned: BTreeSet<usize> = each.iter().filter(is_turned).map(|own| own.flight).collect();
+        // By name, so that clocks come before delays of the controls and of single sticks.
         let mut drifts = false;
         for (name, mut of_flights) in by_name {
             // A mount that all share is no fault of one.
