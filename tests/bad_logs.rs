@@ -534,48 +534,6 @@ fn controls_that_were_joined_a_sample_late_in_some_logs_are_moved_back_there() -
     Ok(())
 }
 
-/// A text that mends these flights, by as many rounds as that takes.
-fn mended(flights: &[Flight]) -> Result<String, Box<dyn std::error::Error>> {
-    let folder = tempfile::tempdir()?;
-    data_set_csv(folder.path(), flights)?;
-    let set = data_set(folder.path(), &ReadOptions::default())?;
-    let read = |text: &str| data_set(folder.path(), &ReadOptions { described: Some(text.into()), ..ReadOptions::default() });
-    let made = mend(&set, &check(&set, None), None, read).ok_or("nothing mends it")?;
-    assert!(made.is_free(), "{}\n{:?}", made.suggestion.text, made.report.map(|report| report.to_string()));
-    Ok(made.suggestion.text)
-}
-
-#[test]
-fn controls_with_a_clock_of_their_own_are_moved_back_by_a_drift() -> Outcome {
-    let slow = flights(|columns| {
-        for control in [Column::U1, Column::U2, Column::U3, Column::U4] {
-            let values = columns[control as usize].clone();
-            let ahead = |row: usize| values[(row + row / 150).min(values.len() - 1)];
-            columns[control as usize] = (0..values.len()).map(ahead).collect();
-        }
-    })?;
-    let text = mended(&slow)?;
-    let drift = text.lines().find_map(|line| line.strip_prefix("controls = ")).ok_or_else(|| text.clone())?;
-    assert!((drift.parse::<f64>()? + 1.0 / 150.0).abs() < 4e-4, "{text}");
-    Ok(())
-}
-
-#[test]
-fn rates_behind_a_filter_are_led_by_their_own_change() -> Outcome {
-    let filtered = flights(|columns| {
-        for rate in [Column::Wx, Column::Wy, Column::Wz] {
-            let mut state = columns[rate as usize][0];
-            for value in &mut columns[rate as usize] {
-                state += (*value - state) * 0.1;
-                *value = state;
-            }
-        }
-    })?;
-    let text = mended(&filtered)?;
-    assert!(text.contains("wx = \"wx + 0.0"), "{text}");
-    Ok(())
-}
-
 #[test]
 fn a_pose_that_was_frozen_for_long_is_cut_out() -> Outcome {
     let frozen = flights(|columns| {

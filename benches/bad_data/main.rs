@@ -15,6 +15,7 @@
 mod cases;
 mod change;
 mod corruptions;
+mod eighth;
 mod fifth;
 mod fourth;
 mod further;

@@ -282,6 +282,9 @@ impl Schema {
             schema.late_in.push(LateIn { flights, late });
         }
         schema.repairs = repairs(&mut keys, place)?;
+        for column in schema.repairs.iter().filter(|rule| rule.held).flat_map(|rule| &rule.columns) {
+            schema.stated.insert(format!("held.{column}"), "interpolated".into());
+        }
         keys.finish()?;
         Ok(schema)
     }

@@ -19,7 +19,7 @@ pub struct Source {
     /// Order in which quaternions were read, if every log's attitude is one.
     pub quaternion: Option<QuaternionOrder>,
     /// What the description states: `axes`, `velocity`, `units.vx`, `columns.roll`, `drift.controls`, … with the text or number given. A group of units stands under
-    /// each of its columns, too.
+    /// each of its columns, too, and `held.roll` under each column of the file whose held rows a `[[repair]]` bridges.
     pub stated: BTreeMap<String, String>,
     /// The text of the description in force.
     pub description: Option<String>,

@@ -5,6 +5,8 @@ use super::causes::{Cause, Kind};
 use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, in_flights};
 use super::gains::OFFSETS;
+use super::increments::Vector;
+use super::robust::median;
 use super::told::{mend, stream_of, told, usual};
 use crate::flight::{Column, Flight};
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +24,10 @@ const SLOW_S: f64 = 0.04;
 
 /// A cause of the set is one of so many of its flights.
 const HALF: f64 = 0.5;
+/// A lever arm is one of the set where so many of the flights show the same, and nearly all of them something of its stream …
+const FEW_OF_ALL: f64 = 0.25;
+/// … within this share of it.
+const SAME_ARM: f64 = 0.2;
 
 /// The name of a kind, and the stream that it is wrong with.
 type Named = (&'static str, Option<&'static str>);
@@ -45,10 +51,10 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
             alike.entry((cause.kind.name(), stream)).or_default().push((*flight, cause));
         }
     }
-    let mut order: Vec<Vec<OfFlight<'_>>> = alike.into_values().collect();
-    order.sort_by_key(|alike| std::cmp::Reverse(alike.len()));
+    let mut order: Vec<(Named, Vec<OfFlight<'_>>)> = alike.into_iter().collect();
+    order.sort_by_key(|(_, alike)| std::cmp::Reverse(alike.len()));
     let mut blamed = Blamed { findings: Vec::new(), flights: BTreeSet::new() };
-    for alike in order {
+    for ((_, stream), alike) in order {
         let columns = common(&alike);
         let of_all: Vec<&Cause> = alike.iter().map(|entry| entry.1).collect();
         let first = columns.first().map_or("", |column| column.name());
@@ -57,7 +63,10 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
         let indices: BTreeSet<usize> = alike.iter().map(|entry| entry.0).collect();
         let indices: Vec<usize> = indices.into_iter().collect();
         let of_those = indices.len() as f64;
-        let is_set = of_those > MOST * (sound as f64 + of_those) && of_those > HALF * causes.len() as f64;
+        let shared = |by: f64| by > MOST * (sound as f64 + by) && by > HALF * causes.len() as f64;
+        // Quiet flights say less of a lever arm, and show something else that stands in for it.
+        let by_stream = || causes.iter().filter(|entry| is_of_stream(entry.1, stream)).count() as f64;
+        let is_set = shared(of_those) || (one_arm(&of_all) && of_those > FEW_OF_ALL * causes.len() as f64 && shared(by_stream()));
         let found = if is_set {
             finding(&name, Severity::Fault, message, mend(&of_all, &columns).as_deref())
         } else {
@@ -73,6 +82,24 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
         }
     }
     blamed
+}
+
+/// Whether something is wrong with this stream.
+fn is_of_stream(causes: Option<&[Cause]>, stream: Option<&str>) -> bool {
+    let of = |cause: &Cause| cause.columns.first().map(|column| stream_of(*column));
+    causes.into_iter().flatten().any(|cause| of(cause) == stream)
+}
+
+/// Whether all are the same lever arm.
+fn one_arm(all: &[&Cause]) -> bool {
+    let arms: Option<Vec<Vector>> =
+        all.iter().map(|cause| if let Kind::OffCentre(arm) = cause.kind { Some(arm) } else { None }).collect();
+    arms.is_some_and(|arms| {
+        let usual: Vector = std::array::from_fn(|axis| median(arms.iter().map(|arm| arm[axis]).collect()).unwrap_or(0.0));
+        let size = |arm: Vector| arm[0].hypot(arm[1]).hypot(arm[2]);
+        let apart = |arm: &Vector| size(std::array::from_fn(|axis| arm[axis] - usual[axis]));
+        arms.iter().all(|arm| apart(arm) < SAME_ARM * size(usual))
+    })
 }
 
 /// The time constant of the filter of first order that takes as much off slow oscillations as a mean over this time does: τ² ω² / 2 = T² ω² / 24.

@@ -30,6 +30,9 @@ const FLAT: f64 = 0.3;
 
 /// How a message begins of a gain that no unit explains.
 pub(super) const FAR: &str = "the gain of this axis is far from 1";
+/// Gains of three axes that agree to this share are one scale.
+const ONE_SCALE: f64 = 0.03;
+
 /// How findings on offsets begin, and the name of that on the heading.
 pub(super) const OFFSET: &str = "offset_";
 pub(super) const HEADING: &str = "heading";
@@ -196,6 +199,10 @@ impl Gains {
         let mut findings: Vec<Finding> =
             gains.map(|((estimate, axis), column)| gain(relation, axis, column, units, estimate)).collect();
         alone(&mut findings, columns);
+        // Rates and what was made of them have one scale; what stands beside them has another unit.
+        if ["attitude_rate", "rate_targets"].contains(&relation) {
+            alike(&mut findings, columns);
+        }
         if relation == "attitude_rate" {
             without_gyros(&mut findings);
         }
@@ -245,6 +252,20 @@ fn alone(findings: &mut [Finding], columns: [&str; 3]) {
         if let Some((_, unit)) = unit {
             finding.set = Some(format!("[units] {column} = {unit}"));
         }
+    }
+}
+
+/// Three gains that are the same, and far from 1, are a scale: a range or a sensitivity that was taken for another. It is that of the columns, since angles
+/// that are scaled are none that turn.
+fn alike(findings: &mut [Finding], columns: [&str; 3]) {
+    let far = |finding: &Finding| finding.measured.filter(|_| finding.message.contains(FAR));
+    let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(|axis| findings.get(axis).and_then(far)) else { return };
+    let mean = (x + y + z) / 3.0;
+    if [x, y, z].iter().any(|value| (value / mean - 1.0).abs() > ONE_SCALE) {
+        return;
+    }
+    for (finding, column) in findings.iter_mut().zip(columns) {
+        finding.set = Some(format!("[columns] {column} = \"{mean:.4} * {column}\", with the file's name"));
     }
 }
 

@@ -20,6 +20,9 @@ const LOOKED_AT: usize = 3_000;
 /// From this period on, s, lines hide what an aircraft does.
 const LONG_S: f64 = 0.05;
 
+/// How findings of such streams begin.
+pub(super) const INTERPOLATED: &str = "interpolated_";
+
 /// Streams of less than the log's rate, a finding for each rate.
 pub(super) fn findings(flights: &[Flight], is_rounded: &dyn Fn(Column) -> bool) -> Vec<Finding> {
     let present = |column: &Column| flights.iter().all(|flight| !flight.absent.contains(column)) && !is_rounded(*column);
@@ -63,7 +66,7 @@ fn told(flights: &[Flight], period: usize, indices: &[usize], columns: &[Column]
     let names: Vec<&str> = columns.iter().map(|column| column.name()).collect();
     let seconds = period as f64 * flights[*indices.first()?].step_s;
     let matters = seconds > LONG_S && columns.iter().any(|column| !matches!(column, Column::X | Column::Y | Column::Z));
-    let (name, rate_hz) = (format!("interpolated_{}", names[0]), 1.0 / seconds);
+    let (name, rate_hz) = (format!("{INTERPOLATED}{}", names[0]), 1.0 / seconds);
     let message = format!(
         "{} come at {rate_hz:.3} Hz with straight lines in between (interpolated): what is faster is not in the log",
         names.join(", ")

@@ -70,7 +70,7 @@ pub use suggestion::{Open, Suggestion};
 pub use timing::DelayProfile;
 
 use crate::flight::attitude::QuaternionOrder;
-use crate::flight::{Column, DataSet, Flight, Targets};
+use crate::flight::{Column, DataSet, Flight, Source, Targets};
 use crate::physics::Model;
 use blame::Blamed;
 use evidence::Evidence;
@@ -167,6 +167,19 @@ impl Columns {
             both(of_streams, || both(|| dead_zone::findings(flights), moved));
         Self { poor: streams.into_iter().chain(cells).collect(), spoilt, dead_zones, excitation, collinearity }
     }
+
+    /// Straight lines that the description itself draws between rows that were held are as a person wants them.
+    fn with_stated(mut self, source: &Source) -> Self {
+        for finding in &mut self.poor {
+            let Some(column) = finding.name.strip_prefix(lines::INTERPOLATED) else { continue };
+            let own = source.stated.get(&format!("columns.{column}")).map_or(column, String::as_str);
+            if finding.verdict == Severity::Fault && source.stated.contains_key(&format!("held.{own}")) {
+                finding.verdict = Severity::Warning;
+                finding.message.push_str(", and the description draws these lines");
+            }
+        }
+        self
+    }
 }
 
 /// Two pieces of work, beside each other where there are threads.
@@ -206,7 +219,7 @@ impl Gathered {
         let quaternion = data.source.quaternion.map(other_order);
         let step_s = data.flights.first().map_or(1.0, |flight| flight.step_s);
         let (Read { each, sticks, piled, sides, followed }, columns) =
-            both(|| read(data, quaternion, step_s), || Columns::of(&data.flights));
+            both(|| read(data, quaternion, step_s), || Columns::of(&data.flights).with_stated(&data.source));
         let faults = columns.poor.iter().filter(|finding| finding.verdict == Severity::Fault);
         let names: BTreeSet<&String> = faults.flat_map(|finding| &finding.flights).collect();
         let unfit = |flight: &usize| names.contains(&data.flights[*flight].name);

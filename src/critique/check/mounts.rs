@@ -153,9 +153,10 @@ impl Mounts {
         }
         let turned = [(velocity, "velocity"), (rates, RATES)];
         let known = || turned.iter().filter_map(|(turn, stream)| Some((turn.as_ref()?, *stream)));
+        let of_rates = known().find(|(_, stream)| *stream == RATES).map(|(turn, _)| turn);
         let faults = known()
             .filter(|(turn, _)| turn.convinces)
-            .filter_map(|(turn, stream)| Some(against(turn, turn.axis()?, stream, with_targets)));
+            .filter_map(|(turn, stream)| Some(against(turn, turn.axis()?, stream, of_rates, with_targets)));
         let faults: Vec<Finding> = faults.collect();
         if !faults.is_empty() {
             return faults;
@@ -199,23 +200,46 @@ fn attitude(angle: Estimate, axis: usize) -> Finding {
         value.to_degrees(),
         AXES[axis]
     );
-    let sign = if value < 0.0 { '+' } else { '-' };
-    // Only the roll is turned last, about the body's own axis.
-    let set = (axis == 0).then(|| format!("[columns] roll = \"roll {sign} {:.4}\", with the file's name", value.abs()));
-    of_angle(angle, Severity::Fault, message, set)
+    // A heading that is off is another matter: which way the aircraft goes is known besides.
+    let by = std::array::from_fn(|of| if of == axis { value } else { 0.0 });
+    of_angle(angle, Severity::Fault, message, (axis < 2).then(|| levelled(by)))
 }
 
-fn against(turn: &Turn, axis: usize, stream: &str, with_targets: bool) -> Finding {
+/// The line that takes angles off roll and pitch.
+fn levelled(by: Vector) -> String {
+    let line = |(name, by): (&str, f64)| {
+        let sign = if by < 0.0 { '+' } else { '-' };
+        format!("{name} = \"{name} {sign} {:.4}\"", by.abs())
+    };
+    let angles = ["roll", "pitch"].into_iter().zip(by).filter(|(_, by)| *by != 0.0);
+    format!("[columns] {}, with the file's names", angles.map(line).collect::<Vec<_>>().join(", "))
+}
+
+/// The axes of a stream against the attitude. Where the rates show the turn of the velocity rather than none, it is the attitude that is not level.
+fn against(turn: &Turn, axis: usize, stream: &str, of_rates: Option<&Turn>, with_targets: bool) -> Finding {
     let angle = turn.angles[axis];
     let degrees = -angle.value.to_degrees();
     let message = format!("the axes of the {stream} are turned by {degrees:.1}° about {} against the attitude", AXES[axis]);
-    let set = (stream == RATES).then(|| turned_back(angle.value, axis, with_targets));
-    of_angle(angle, Severity::Fault, message, set)
+    if stream == RATES {
+        return of_angle(angle, Severity::Fault, message, Some(turned_back(angle.value, axis, with_targets)));
+    }
+    // About one axis is enough: an offset of the pitch angle is no turn that goes along with the roll, and rates show a part of it.
+    let agrees = |rates: &Turn| {
+        let is_alike = |of: usize| (rates.angles[of].value / turn.angles[of].value - 1.0).abs() < ALIKE;
+        (0..2).any(|of| turn.size(of) > TURNED && is_alike(of))
+    };
+    let set = (axis < 2 && of_rates.is_some_and(agrees)).then(|| {
+        let by = |of: usize| Some(turn.angles[of].value).filter(|value| of < 2 && value.abs() > 0.5 * TURNED).unwrap_or(0.0);
+        levelled(std::array::from_fn(by))
+    });
+    let why = if set.is_some() { ", and so are those of the rates: roll and pitch are not level" } else { "" };
+    of_angle(angle, Severity::Fault, format!("{message}{why}"), set)
 }
 
 /// The line that turns rates back, and what was made of them.
 fn turned_back(angle: f64, axis: usize, with_targets: bool) -> String {
-    let (sin, cos) = angle.sin_cos();
+    // What a large turn has in common with a small one is its sine.
+    let (sin, cos) = angle.clamp(-1.0, 1.0).asin().sin_cos();
     let [next, last] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| AXES[axis]);
     let of = |end: &str| {
         let (one, other) = (format!("w{next}{end}"), format!("w{last}{end}"));

@@ -7,6 +7,7 @@ use super::lines;
 use super::on_change;
 use super::robust::{NORMAL, lower_quartile, median};
 use super::slew;
+use super::told::derived_anew;
 use crate::flight::{Column, Flight, Targets};
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -229,7 +230,7 @@ fn of_hold(flights: &[Flight], hold: &Hold, columns: &[Column]) -> Option<Findin
     match hold.flights.as_slice() {
         [] => {
             let verdict = if matters { Severity::Fault } else { Severity::Warning };
-            let set = resampled(flights, columns, rate_hz);
+            let set = resampled(flights, columns, rate_hz).or_else(|| bridged(columns, hold.seconds));
             Some(finding(&name, verdict, message, set.as_deref()))
         }
         some => matters.then(|| in_flights(&name, some, &message, flights)),
@@ -250,6 +251,14 @@ pub(super) fn resampled(flights: &[Flight], slow: &[Column], rate_hz: f64) -> Op
     };
     let is_lost = driving().filter(|column| !slow.contains(column)).any(is_faster);
     (!is_lost).then(|| format!("resample_hz = {rate_hz:.3}"))
+}
+
+/// The line that joins samples of a slower stream by straight lines, beside faster ones. A stick may well have rested.
+fn bridged(slow: &[Column], held_s: f64) -> Option<String> {
+    let names: Vec<&str> = slow.iter().map(|column| column.name()).collect();
+    let is_stick = slow.iter().any(|column| CONTROLS.contains(column));
+    let longest_s = 1.5 * held_s;
+    (!is_stick).then(|| format!("[[repair]] columns = {names:?}, held = true, max_gap_s = {longest_s:.3}, with the file's names"))
 }
 
 /// The step to which a column is rounded, in each flight where it is, and the flights that tell.
@@ -372,7 +381,7 @@ fn swamped(flights: &[Flight], targets: [Column; 3]) -> Option<Finding> {
         targets[0].unit(),
         100.0 * share
     );
-    let set = format!("ignore = {names:?}, missing = {names:?}");
+    let set = derived_anew(&names);
     (share > SWAMPED.powi(2)).then(|| finding(&format!("{SWAMPED_BY_NOISE}{}", names[0]), Severity::Warning, message, Some(&set)))
 }
 

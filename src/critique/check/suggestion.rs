@@ -94,12 +94,17 @@ impl Tier {
     }
 }
 
+/// Of the flights that are read, at most this part is left out at once: what more of them have is not theirs.
+const LEFT_OUT: f64 = 2.0 / 3.0;
+
 /// A key that is to have a value, in a section ("" before all sections).
 type Entry = (&'static str, String, Value);
 
 /// The description while findings are added to it.
 struct Draft<'a> {
     source: &'a Source,
+    /// How many flights were read.
+    flights: usize,
     /// The accelerations stand in no file.
     derived: bool,
     /// As the flights were read.
@@ -116,7 +121,16 @@ impl<'a> Draft<'a> {
         let schema = Schema::parse(stated.unwrap_or_default().as_bytes(), "dataset.toml").ok()?;
         let derived = report.targets == Targets::Derived && schema.target_origin == Targets::Recorded;
         let made = Description::parse(stated.unwrap_or(TITLE))?;
-        Some(Self { source, derived, stated: Description::parse(stated.unwrap_or_default())?, schema, made, set: BTreeMap::new() })
+        let flights = report.flights;
+        Some(Self {
+            source,
+            flights,
+            derived,
+            stated: Description::parse(stated.unwrap_or_default())?,
+            schema,
+            made,
+            set: BTreeMap::new(),
+        })
     }
 
     /// Adds what a finding prints, all of it or nothing.
@@ -196,6 +210,11 @@ impl<'a> Draft<'a> {
                 all.push(item);
             }
         }
+        let stated = self.stated.get("", key).and_then(Value::as_array).map_or(0, Vec::len);
+        let more = all.len() - stated.min(all.len());
+        if key == "leave_out" && more as f64 > LEFT_OUT * self.flights as f64 {
+            return Err(format!("with it {more} of {} flights would be left out: what so many have may be right", self.flights));
+        }
         Ok(Value::Array(all))
     }
 
@@ -260,9 +279,10 @@ impl<'a> Draft<'a> {
         Ok([entry(word, stated(word).unwrap_or(0.0))].into_iter().chain(single).collect())
     }
 
-    /// Whether a line that was added undoes a filter, or a clock, behind which this column is late.
+    /// Whether a line that was added undoes a filter, or a clock, behind which this column is late, or has it made anew.
     fn is_made_in_time(&self, column: &str) -> bool {
         self.set.iter().any(|((section, key), value)| match *section {
+            "" => key == "missing" && value.as_array().is_some_and(|all| all.iter().any(|one| one.as_str() == Some(column))),
             "drift" => columns_of(key).contains(&column),
             "columns" => {
                 key == column
@@ -467,7 +487,7 @@ mod tests {
         CheckReport {
             fault: !lines.is_empty(),
             summary: String::new(),
-            flights: 1,
+            flights: 40,
             duration_s: 1.0,
             targets: Targets::Recorded,
             findings: lines.iter().enumerate().map(finding).collect(),
@@ -539,6 +559,13 @@ mod tests {
         is_left(Some("axes = \"ENU/FLU\""), "[columns] yaw = \"-yaw\"", "computed from other columns");
         let both = suggested(None, &[("[late] rates = 0.05", &[]), ("[late] rates = 0.02", &[])]);
         assert!(both.is_some_and(|(text, open)| text.ends_with("rates = 0.05") && open[0].contains("another finding sets")));
+        let names: Vec<String> = (0..40).map(|flight| format!("f{flight}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let line = "leave_out = [...]";
+        let halves = suggested(None, &[(line, &names[..20]), (line, &names[20..])]);
+        assert!(
+            halves.is_some_and(|(text, open)| text.contains("\"f19\"") && !text.contains("f20") && open[0].contains("40 of 40"))
+        );
     }
 
     #[test]

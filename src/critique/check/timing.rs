@@ -5,13 +5,14 @@
 //! (jackknife). A flight whose step differs from the first's is left out.
 
 use super::finding::{Finding, Severity, Subject};
-use super::increments::Motion;
+use super::increments::{Instant, Motion, Vector};
 use super::regression::BlockRegression;
 use super::sticks::{EXPLAINED, STICKS};
 use crate::blocks::FEW_BLOCKS;
-use crate::flight::attitude::{cross, rotate};
+use crate::flight::attitude::{Matrix3, cross, rotate};
 use crate::student_t::quantile_975;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 
 /// Streams are compared up to this shift to either side, s.
 const LARGEST_SHIFT_S: f64 = 0.1;
@@ -104,16 +105,24 @@ struct Pair {
     /// The second stream, as `[late]` of the description calls it.
     second: &'static str,
     applies: fn(&Motion) -> bool,
-    /// Change of the state less its predicted change, given the piece and the shift of the other stream.
-    error: fn(&Motion, &std::ops::Range<usize>, isize) -> f64,
+    relation: Relation,
+}
+
+/// What the state of one stream changes by, given a shift of the other.
+#[derive(Clone, Copy)]
+enum Relation {
+    /// State and rate, each of one stream alone.
+    Apart(fn(&Instant) -> Vector, fn(&Instant) -> Vector),
+    /// An attitude is turned by rates in axes that turn with it.
+    Turned,
 }
 
 fn shifted(sample: usize, by: isize) -> usize {
     sample.saturating_add_signed(by)
 }
 
-fn squared(change: impl Fn(usize) -> f64, predicted: [f64; 3]) -> f64 {
-    (0..3).map(|axis| (change(axis) - predicted[axis]).powi(2)).sum()
+fn squared(change: Vector, predicted: Vector) -> f64 {
+    (0..3).map(|axis| (change[axis] - predicted[axis]).powi(2)).sum()
 }
 
 const PAIRS: [Pair; 4] = [
@@ -123,11 +132,7 @@ const PAIRS: [Pair; 4] = [
         early: "velocity and attitude come earlier than position",
         second: "velocity",
         applies: |motion| motion.position && motion.heading,
-        error: |motion, piece, shift| {
-            let at = |k: usize| &motion.instants[k];
-            let travel = motion.integral(piece, |k| rotate(&at(shifted(k, shift)).rotation, at(shifted(k, shift)).velocity));
-            squared(|axis| at(piece.end).position[axis] - at(piece.start).position[axis], travel)
-        },
+        relation: Relation::Apart(|at| at.position, |at| rotate(&at.rotation, at.velocity)),
     },
     Pair {
         name: "rates_offset",
@@ -135,15 +140,7 @@ const PAIRS: [Pair; 4] = [
         early: "the rates come earlier than the attitude",
         second: "rates",
         applies: |_| true,
-        error: |motion, piece, shift| {
-            let at = |k: usize| &motion.instants[k];
-            let rows = if motion.heading { 0..3 } else { 2..3 };
-            rows.map(|row| {
-                let turned = motion.integral(piece, |k| cross(at(k).rotation[row], at(shifted(k, shift)).rates));
-                squared(|axis| at(piece.end).rotation[row][axis] - at(piece.start).rotation[row][axis], turned)
-            })
-            .sum()
-        },
+        relation: Relation::Turned,
     },
     Pair {
         name: "targets_offset",
@@ -151,11 +148,7 @@ const PAIRS: [Pair; 4] = [
         early: "the linear accelerations come earlier than the velocity",
         second: "acceleration",
         applies: |motion| motion.recorded,
-        error: |motion, piece, shift| {
-            let at = |k: usize| &motion.instants[k];
-            let gained = motion.integral(piece, |k| at(shifted(k, shift)).linear_target);
-            squared(|axis| at(piece.end).velocity[axis] - at(piece.start).velocity[axis], gained)
-        },
+        relation: Relation::Apart(|at| at.velocity, |at| at.linear_target),
     },
     Pair {
         name: "angular_targets_offset",
@@ -163,13 +156,47 @@ const PAIRS: [Pair; 4] = [
         early: "the angular targets come earlier than the rates",
         second: "angular_acceleration",
         applies: |motion| motion.recorded,
-        error: |motion, piece, shift| {
-            let at = |k: usize| &motion.instants[k];
-            let gained = motion.integral(piece, |k| at(shifted(k, shift)).angular_target);
-            squared(|axis| at(piece.end).rates[axis] - at(piece.start).rates[axis], gained)
-        },
+        relation: Relation::Apart(|at| at.rates, |at| at.angular_target),
     },
 ];
+
+impl Relation {
+    /// Squared error of the change over each piece, by shift: `[shift][piece]`.
+    fn errors(self, motion: &Motion, pieces: &[Range<usize>], shifts: &[isize]) -> Vec<Vec<f64>> {
+        match self {
+            Self::Apart(state, rate) => {
+                // Side by side, since each is read once for each shift.
+                let rates: Vec<Vector> = motion.instants.iter().map(rate).collect();
+                let state = |k: usize| state(&motion.instants[k]);
+                by_shift(pieces, shifts, |piece, shift| {
+                    let gained = motion.integral(piece, |k| rates[shifted(k, shift)]);
+                    squared(difference(state(piece.end), state(piece.start)), gained)
+                })
+            }
+            Self::Turned => {
+                let attitudes: Vec<Matrix3> = motion.instants.iter().map(|at| at.rotation).collect();
+                let rates: Vec<Vector> = motion.instants.iter().map(|at| at.rates).collect();
+                by_shift(pieces, shifts, |piece, shift| {
+                    // Without a heading, how the vertical turns.
+                    let rows = if motion.heading { 0..3 } else { 2..3 };
+                    let of_row = |row: usize| {
+                        let turned = motion.integral(piece, |k| cross(attitudes[k][row], rates[shifted(k, shift)]));
+                        squared(difference(attitudes[piece.end][row], attitudes[piece.start][row]), turned)
+                    };
+                    rows.map(of_row).sum()
+                })
+            }
+        }
+    }
+}
+
+fn by_shift(pieces: &[Range<usize>], shifts: &[isize], error: impl Fn(&Range<usize>, isize) -> f64) -> Vec<Vec<f64>> {
+    shifts.iter().map(|&shift| pieces.iter().map(|piece| error(piece, shift)).collect()).collect()
+}
+
+fn difference(end: Vector, start: Vector) -> Vector {
+    std::array::from_fn(|axis| end[axis] - start[axis])
+}
 
 /// Accumulates all profiles over flights.
 pub(super) struct Timing {
@@ -221,11 +248,11 @@ impl Timing {
         }
         let margin = self.pairs.first().map_or(0, |(_, profile)| profile.shifts.len() / 2 * self.grid);
         for (pair, profile) in self.pairs.iter_mut().filter(|(pair, _)| (pair.applies)(motion)) {
-            for (index, shift) in profile.shifts.iter().enumerate() {
+            let (pieces, of_blocks): (Vec<Range<usize>>, Vec<usize>) = motion.pieces(margin).unzip();
+            let errors = pair.relation.errors(motion, &pieces, &profile.shifts);
+            for (blocks, errors) in profile.errors[0].iter_mut().zip(errors) {
                 let mut open = None;
-                for (piece, block) in motion.pieces(margin) {
-                    let error = (pair.error)(motion, &piece, *shift);
-                    let blocks = &mut profile.errors[0][index];
+                for (error, &block) in errors.into_iter().zip(&of_blocks) {
                     if open != Some(block) {
                         open = Some(block);
                         blocks.push(0.0);
@@ -258,7 +285,7 @@ impl Timing {
     }
 
     /// Of these blocks only.
-    pub fn part(&self, range: std::ops::Range<usize>) -> Self {
+    pub fn part(&self, range: Range<usize>) -> Self {
         let mut part = Self::new(self.step_s);
         for ((_, profile), (_, own)) in part.pairs.iter_mut().zip(&self.pairs) {
             let shifts = profile.errors.iter_mut().flatten().zip(own.errors.iter().flatten());

@@ -200,6 +200,31 @@ pub(super) fn told(all: &[&Cause], columns: &[Column]) -> String {
     }
 }
 
+/// The line that leaves accelerations of the file out, so that they are made of velocity and rates.
+pub(super) fn derived_anew(names: &[&str]) -> String {
+    format!("ignore = {names:?}, missing = {names:?}")
+}
+
+/// A linear acceleration without what the arm r of its sensor gives it, v̇ − (ω̇ × r + ω × (ω × r)), as a line of `[columns]`.
+fn centred(arm: Vector, axis: usize) -> String {
+    let [i, j, k] = [0, 1, 2].map(|step| ["x", "y", "z"][(axis + step) % 3]);
+    let [r, s, t] = [0, 1, 2].map(|step| arm[(axis + step) % 3]);
+    let terms = [
+        (-t, format!("w{j}_dot")),
+        (s, format!("w{k}_dot")),
+        (-s, format!("w{i} * w{j}")),
+        (r, format!("w{j} * w{j}")),
+        (r, format!("w{k} * w{k}")),
+        (-t, format!("w{i} * w{k}")),
+    ];
+    // To a millimetre.
+    let of_arm = terms.iter().filter(|(by, _)| by.abs() >= 5e-4).map(|(by, rates)| {
+        let sign = if *by < 0.0 { '-' } else { '+' };
+        format!(" {sign} {:.3} * {rates}", by.abs())
+    });
+    format!("v{i}_dot = \"v{i}_dot{}\"", of_arm.collect::<String>())
+}
+
 /// The line of `dataset.toml` that mends all flights, where one can.
 pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
     if all.iter().any(|cause| cause.or.is_some() || cause.from_s.is_some()) {
@@ -231,6 +256,17 @@ pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
                 lines(&|name| format!("{name} = \"{name} + {time_s:.4} * rate({name})\""))
             ))
         }
+        // What a filter took is noise by now; what the derivative is of has it still.
+        Kind::Filtered(_) | Kind::Averaged(_) => {
+            let stream = columns.first().map(|column| stream_of(*column))?;
+            let names: Vec<&str> =
+                Column::TARGETS.iter().filter(|column| stream_of(**column) == stream).map(|column| column.name()).collect();
+            (!names.is_empty()).then(|| derived_anew(&names))
+        }
+        Kind::OffCentre(_) => {
+            let arm = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
+            Some(format!("[columns] {}, with the file's names", [0, 1, 2].map(|axis| centred(arm, axis)).join(", ")))
+        }
         Kind::Holds(part, _) => {
             let [x, y, z] = measured_at(all, columns, part)?;
             Some(format!(
@@ -239,5 +275,35 @@ pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
             ))
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::flight::attitude::cross;
+    use crate::formula::{Formula, Value};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn an_arm_is_taken_off_as_mechanics_has_it(
+            arm in prop::array::uniform3(-1.0..1.0_f64),
+            rates in prop::array::uniform3(-5.0..5.0_f64),
+            angular in prop::array::uniform3(-20.0..20.0_f64),
+        ) {
+            let arm = arm.map(|part| (1e3 * part).round() / 1e3);
+            let (along, inwards) = (cross(angular, arm), cross(rates, cross(rates, arm)));
+            let names = ["vx_dot", "vy_dot", "vz_dot", "wx", "wy", "wz", "wx_dot", "wy_dot", "wz_dot"];
+            for axis in 0..3 {
+                let line = centred(arm, axis);
+                let text = line.split('"').nth(1).expect("a formula in quotes");
+                let measured: Vector = std::array::from_fn(|of| along[of] + inwards[of]);
+                let values: Vec<f64> = measured.into_iter().chain(rates).chain(angular).collect();
+                let of = |name: &str| names.iter().position(|known| *known == name).map(|at| Value::from(&values[at..=at]));
+                let left = Formula::parse(text)?.evaluate(1, 0.01, &of)?;
+                prop_assert!(left[0].abs() < 1e-9, "{text}: {}", left[0]);
+            }
+        }
     }
 }

@@ -1,0 +1,136 @@
+//! Flights of the simulator with one thing wrong in all of them, and lines of `dataset.toml` that undo it, so that nothing has to be left out: `mend`, as far
+//! as it takes. What is named, and what else is suggested, is tested in `bad_logs`, `bad_columns`, `bad_streams` and `bad_vectors`.
+#![cfg(all(feature = "files", feature = "sim"))]
+
+mod corrupted;
+
+use corrupted::{Columns, Outcome, flights as some};
+use phyture::Error;
+use phyture::critique::check::{check, mend};
+use phyture::flight::read::{ReadOptions, data_set};
+use phyture::flight::write::data_set_csv;
+use phyture::flight::{Column, Flight};
+
+/// All flights changed.
+fn flights(change: impl Fn(&mut Columns)) -> Result<Vec<Flight>, Error> {
+    some(|_| true, change)
+}
+
+/// A text that mends these flights, by as many rounds as that takes.
+fn mended(flights: &[Flight]) -> Result<String, Box<dyn std::error::Error>> {
+    let folder = tempfile::tempdir()?;
+    data_set_csv(folder.path(), flights)?;
+    let set = data_set(folder.path(), &ReadOptions::default())?;
+    let read = |text: &str| data_set(folder.path(), &ReadOptions { described: Some(text.into()), ..ReadOptions::default() });
+    let made = mend(&set, &check(&set, None), None, read).ok_or("nothing mends it")?;
+    assert!(made.is_free(), "{}\n{:?}", made.suggestion.text, made.report.map(|report| report.to_string()));
+    Ok(made.suggestion.text)
+}
+
+#[test]
+fn controls_with_a_clock_of_their_own_are_moved_back_by_a_drift() -> Outcome {
+    let slow = flights(|columns| {
+        for control in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = columns[control as usize].clone();
+            let ahead = |row: usize| values[(row + row / 150).min(values.len() - 1)];
+            columns[control as usize] = (0..values.len()).map(ahead).collect();
+        }
+    })?;
+    let text = mended(&slow)?;
+    let drift = text.lines().find_map(|line| line.strip_prefix("controls = ")).ok_or_else(|| text.clone())?;
+    assert!((drift.parse::<f64>()? + 1.0 / 150.0).abs() < 4e-4, "{text}");
+    Ok(())
+}
+
+#[test]
+fn rates_behind_a_filter_are_led_by_their_own_change() -> Outcome {
+    let filtered = flights(|columns| {
+        for rate in [Column::Wx, Column::Wy, Column::Wz] {
+            let mut state = columns[rate as usize][0];
+            for value in &mut columns[rate as usize] {
+                state += (*value - state) * 0.1;
+                *value = state;
+            }
+        }
+    })?;
+    let text = mended(&filtered)?;
+    assert!(text.contains("wx = \"wx + 0.0"), "{text}");
+    Ok(())
+}
+
+const ATTITUDE: [Column; 3] = [Column::Roll, Column::Pitch, Column::Yaw];
+const RATES: [Column; 3] = [Column::Wx, Column::Wy, Column::Wz];
+const ANGULAR: [Column; 3] = [Column::WxDot, Column::WyDot, Column::WzDot];
+
+/// Each of these lines is in the text that mends the flights, and none is left out.
+fn assert_undone(flights: &[Flight], lines: &[&str]) -> Outcome {
+    let text = mended(flights)?;
+    for line in lines {
+        assert!(text.lines().any(|own| own.starts_with(line)), "{line} is not in\n{text}");
+    }
+    assert!(!text.contains("leave_out"), "{text}");
+    Ok(())
+}
+
+#[test]
+fn an_attitude_that_is_held_beside_faster_streams_is_joined_by_lines() -> Outcome {
+    let held = flights(|columns| {
+        for angle in ATTITUDE {
+            for chunk in columns[angle as usize].chunks_mut(10) {
+                let first = chunk[0];
+                chunk.fill(first);
+            }
+        }
+    })?;
+    assert_undone(&held, &["columns = [\"roll\", \"pitch\", \"yaw\"]", "held = true"])
+}
+
+#[test]
+fn accelerations_behind_a_filter_are_derived_anew() -> Outcome {
+    let smoothed = flights(|columns| {
+        for target in ANGULAR {
+            let mut state = columns[target as usize][0];
+            for value in &mut columns[target as usize] {
+                state += (*value - state) * 0.12;
+                *value = state;
+            }
+        }
+    })?;
+    assert_undone(&smoothed, &["missing = [\"wx_dot\", \"wy_dot\", \"wz_dot\"]"])
+}
+
+#[test]
+fn rates_of_another_range_are_scaled_with_what_was_made_of_them() -> Outcome {
+    let halved = flights(|columns| {
+        for column in RATES.into_iter().chain(ANGULAR) {
+            columns[column as usize].iter_mut().for_each(|value| *value *= 0.5);
+        }
+    })?;
+    assert_undone(&halved, &["wx = \"2", "wy = \"2", "wz = \"2", "wx_dot = \"", "wy_dot = \"", "wz_dot = \""])
+}
+
+#[test]
+fn an_accelerometer_off_the_centre_is_moved_there() -> Outcome {
+    let off = flights(|columns| {
+        let arm = [-0.7, 0.0, -0.1];
+        for row in 0..columns[0].len() {
+            let [rates, angular] = [RATES, ANGULAR].map(|three| three.map(|column| columns[column as usize][row]));
+            let cross = phyture::flight::attitude::cross;
+            let (along, inwards) = (cross(angular, arm), cross(rates, cross(rates, arm)));
+            for (axis, target) in [Column::VxDot, Column::VyDot, Column::VzDot].into_iter().enumerate() {
+                columns[target as usize][row] += along[axis] + inwards[axis];
+            }
+        }
+    })?;
+    assert_undone(&off, &["vx_dot = \"vx_dot + 0.1", "vy_dot = \"vy_dot + 0.7", "vz_dot = \"vz_dot - 0.7"])
+}
+
+#[test]
+fn an_attitude_that_is_not_level_is_levelled() -> Outcome {
+    let tilted = flights(|columns| {
+        // A pitch ends at the vertical.
+        columns[Column::Pitch as usize].iter_mut().for_each(|value| *value = (*value + 0.09).min(1.57));
+        columns[Column::Roll as usize].iter_mut().for_each(|value| *value -= 0.07);
+    })?;
+    assert_undone(&tilted, &["pitch = \"pitch - 0.0", "roll = \"roll + 0.0"])
+}
