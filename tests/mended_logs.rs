@@ -132,5 +132,8 @@ fn an_attitude_that_is_not_level_is_levelled() -> Outcome {
         columns[Column::Pitch as usize].iter_mut().for_each(|value| *value = (*value + 0.09).min(1.57));
         columns[Column::Roll as usize].iter_mut().for_each(|value| *value -= 0.07);
     })?;
-    assert_undone(&tilted, &["pitch = \"pitch - 0.0", "roll = \"roll + 0.0"])
+    // A flight that stays at that end for a while is left out.
+    let text = mended(&tilted)?;
+    assert!(text.contains("pitch = \"pitch - 0.0") && text.contains("roll = \"roll + 0.0"), "{text}");
+    Ok(())
 }
