@@ -6,8 +6,7 @@ use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, in_flights};
 use super::gains::OFFSETS;
 use super::increments::Vector;
-use super::robust::median;
-use super::told::{mend, stream_of, told, usual};
+use super::told::{mend, stream_of, told, usual, usual_arm};
 use crate::flight::{Column, Flight};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -92,14 +91,13 @@ fn is_of_stream(causes: Option<&[Cause]>, stream: Option<&str>) -> bool {
 
 /// Whether all are the same lever arm.
 fn one_arm(all: &[&Cause]) -> bool {
-    let arms: Option<Vec<Vector>> =
-        all.iter().map(|cause| if let Kind::OffCentre(arm) = cause.kind { Some(arm) } else { None }).collect();
-    arms.is_some_and(|arms| {
-        let usual: Vector = std::array::from_fn(|axis| median(arms.iter().map(|arm| arm[axis]).collect()).unwrap_or(0.0));
-        let size = |arm: Vector| arm[0].hypot(arm[1]).hypot(arm[2]);
-        let apart = |arm: &Vector| size(std::array::from_fn(|axis| arm[axis] - usual[axis]));
-        arms.iter().all(|arm| apart(arm) < SAME_ARM * size(usual))
-    })
+    let usual = usual_arm(all);
+    let size = |arm: Vector| arm[0].hypot(arm[1]).hypot(arm[2]);
+    let is_usual = |cause: &&Cause| match cause.kind {
+        Kind::OffCentre(arm) => size(std::array::from_fn(|axis| arm[axis] - usual[axis])) < SAME_ARM * size(usual),
+        _ => false,
+    };
+    all.iter().all(is_usual)
 }
 
 /// The time constant of the filter of first order that takes as much off slow oscillations as a mean over this time does: τ² ω² / 2 = T² ω² / 24.

@@ -78,8 +78,13 @@ fn holds(all: &[&Cause], columns: &[Column], part: Part) -> String {
     format!("{why}{stream} {have} too much that goes with another stream; {}", told.join(", "))
 }
 
+/// Where accelerations are measured, m from the centre of gravity, as usual among the flights.
+pub(super) fn usual_arm(all: &[&Cause]) -> Vector {
+    std::array::from_fn(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }))
+}
+
 fn off_centre(all: &[&Cause]) -> String {
-    let [x, y, z] = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
+    let [x, y, z] = usual_arm(all);
     format!(
         "the linear accelerations are those of a sensor that is mounted off the centre of gravity by ({x:.2}, {y:.2}, {z:.2}) m, a lever arm: forward, \
          to the right, down"
@@ -264,7 +269,7 @@ pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
             (!names.is_empty()).then(|| derived_anew(&names))
         }
         Kind::OffCentre(_) => {
-            let arm = [0, 1, 2].map(|axis| usual(all, |kind| if let Kind::OffCentre(arm) = kind { arm[axis] } else { 0.0 }));
+            let arm = usual_arm(all);
             Some(format!("[columns] {}, with the file's names", [0, 1, 2].map(|axis| centred(arm, axis)).join(", ")))
         }
         Kind::Holds(part, _) => {
