@@ -27,6 +27,7 @@ mod sixth;
 mod sound;
 mod tables;
 mod third;
+mod words;
 
 use run::Plan;
 use std::ops::Range;
