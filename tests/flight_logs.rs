@@ -491,6 +491,28 @@ fn a_stream_that_comes_late_is_moved_back() -> Outcome {
 }
 
 #[test]
+fn a_log_is_cut_where_rows_are_said_to_be_lost() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let root = folder.path();
+    put(root, "a.csv", &Sheet::canonical(60).csv())?;
+    put(root, "b.csv", &Sheet::canonical(61).csv())?;
+    let plain = data_set(root, &ReadOptions::default())?;
+    let at = |sample: usize| plain.flights[1].time_s(sample);
+    let rule = |at_s: f64| format!("[[cut]]\nflights = \"b\"\nat = [{at_s}, {}]\n", at(40));
+    put(root, "dataset.toml", &rule(at(20)))?;
+    let cut = data_set(root, &ReadOptions::default())?;
+    let pieces: Vec<(&str, usize)> = cut.flights.iter().map(|flight| (flight.name.as_str(), flight.len())).collect();
+    assert_eq!(pieces, [("a", 60), ("b[1]", 20), ("b[2]", 20), ("b[3]", 21)]);
+    assert_eq!(cut.flights[2].column(Column::Wx)[..], plain.flights[1].column(Column::Wx)[20..40]);
+    assert_says(&cut.notes.join("\n"), &["`b`: cut before t = ", "as dataset.toml says"]);
+    put(root, "dataset.toml", &rule(1e3))?;
+    assert_says(&refusal(data_set(root, &ReadOptions::default())), &["b.csv", "a cut at t = 1000 s", "a time after"]);
+    put(root, "dataset.toml", &rule(at(20)).replace("\"b\"", "\"c\""))?;
+    assert_says(&refusal(data_set(root, &ReadOptions::default())), &["`cut.flights` is `c`, which is no log of this data set"]);
+    Ok(())
+}
+
+#[test]
 fn a_stream_that_comes_late_in_one_log_is_moved_there_alone() -> Outcome {
     let folder = tempfile::tempdir()?;
     let root = folder.path();

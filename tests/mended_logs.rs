@@ -109,6 +109,56 @@ fn rates_of_another_range_are_scaled_with_what_was_made_of_them() -> Outcome {
     assert_undone(&halved, &["wx = \"2", "wy = \"2", "wz = \"2", "wx_dot = \"", "wy_dot = \"", "wz_dot = \""])
 }
 
+/// Three columns at once become three others.
+fn three(columns: &mut Columns, of: [Column; 3], change: impl Fn([f64; 3]) -> [f64; 3]) {
+    for row in 0..columns[0].len() {
+        let changed = change(of.map(|column| columns[column as usize][row]));
+        of.into_iter().zip(changed).for_each(|(column, value)| columns[column as usize][row] = value);
+    }
+}
+
+#[test]
+fn servos_of_a_swash_plate_are_the_sticks_again() -> Outcome {
+    let servos = flights(|columns| {
+        three(columns, [Column::U1, Column::U2, Column::U4], |[lateral, longitudinal, collective]| {
+            let ahead = collective + 0.5 * longitudinal;
+            [ahead + 0.866 * lateral, ahead - 0.866 * lateral, collective - longitudinal]
+        });
+    })?;
+    let lines = ["u1 = \"u1 - 1.0000 * u2\"", "u2 = \"u2 + 1.0000 * u1 - 2.0000 * u4\"", "u4 = \"u4 + 1.0000 * u1 + 1.0000 * u2\""];
+    assert_undone(&servos, &lines)
+}
+
+#[test]
+fn flights_are_cut_where_rows_are_lost() -> Outcome {
+    let lost = flights(|columns| {
+        let is_lost = |row: usize| [700, 1500].iter().any(|first| (*first..first + 45).contains(&row));
+        for values in columns.iter_mut() {
+            *values = values.iter().enumerate().filter(|entry| !is_lost(entry.0)).map(|entry| *entry.1).collect();
+        }
+    })?;
+    assert_undone(&lost, &["[[cut]]", "at = [7.0, 14.55]"])
+}
+
+#[test]
+fn a_rotor_that_shakes_all_sensors_is_filtered() -> Outcome {
+    let shaken = flights(|columns| {
+        let linear = [Column::VxDot, Column::VyDot, Column::VzDot];
+        for (three, size) in [(RATES, 0.4), (linear, 4.0), (ANGULAR, 10.0)] {
+            for (axis, column) in three.into_iter().enumerate() {
+                let turn = |row: usize| 23.0 * 0.01 * row as f64 + 0.3 * axis as f64;
+                let wave = |row: usize| size * (std::f64::consts::TAU * turn(row)).sin();
+                columns[column as usize].iter_mut().enumerate().for_each(|(row, value)| *value += wave(row));
+            }
+        }
+    })?;
+    let text = mended(&shaken)?;
+    for line in ["wx = \"0.5 * wx + 0.5 * delay(wx, 0.02", "missing = [", "wx = 0.01"] {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    Ok(())
+}
+
 #[test]
 fn an_accelerometer_off_the_centre_is_moved_there() -> Outcome {
     let off = flights(|columns| {
@@ -134,6 +184,6 @@ fn an_attitude_that_is_not_level_is_levelled() -> Outcome {
     })?;
     // A flight that stays at that end for a while is left out.
     let text = mended(&tilted)?;
-    assert!(text.contains("pitch = \"pitch - 0.0") && text.contains("roll = \"roll + 0.0"), "{text}");
+    assert!(text.contains("pitch = \"clamp(pitch - 0.0") && text.contains("roll = \"roll + 0.0"), "{text}");
     Ok(())
 }

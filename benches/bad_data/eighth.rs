@@ -3,7 +3,7 @@
 //! had seen neither the checks nor the other lists, so that some repeat what those have. Reported once, on seeds
 //! 85014 and 85015, and looked at since: they are for development now.
 
-use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Chance, Change, Corruption, Kind, LINEAR, Log, POSITION, Part, RATES, VELOCITY};
+use crate::change::{ANGULAR, ATTITUDE, CONTROLS, Change, Corruption, Kind, LINEAR, POSITION, Part, RATES, VELOCITY};
 use crate::words::*;
 use phyture::flight::attitude::{cross, rotate, rotate_back, rotation_body_to_inertial};
 use phyture::flight::{Column, GRAVITY_M_S2};

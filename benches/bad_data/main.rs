@@ -20,6 +20,7 @@ mod fifth;
 mod fourth;
 mod further;
 mod mend;
+mod ninth;
 mod run;
 mod second;
 mod seventh;

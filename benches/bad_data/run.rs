@@ -8,6 +8,7 @@ use crate::fifth::FIFTH;
 use crate::fourth::FOURTH;
 use crate::further::FURTHER;
 use crate::mend::through_files;
+use crate::ninth::NINTH;
 use crate::second::SECOND;
 use crate::seventh::SEVENTH;
 use crate::sixth::SIXTH;
@@ -61,7 +62,7 @@ const LATE_ATTITUDE: &str = "sync";
 const SHARE: f64 = 0.5;
 
 /// All corruptions, by the round in which they were written.
-pub const HALVES: [(&str, &[Corruption]); 9] = [
+pub const HALVES: [(&str, &[Corruption]); 10] = [
     ("development", corruptions::DEVELOPMENT),
     ("further", FURTHER),
     ("second", SECOND),
@@ -71,6 +72,7 @@ pub const HALVES: [(&str, &[Corruption]); 9] = [
     ("sixth", SIXTH),
     ("seventh", SEVENTH),
     ("eighth", EIGHTH),
+    ("ninth", NINTH),
 ];
 
 /// What `diagnose` says where `check` found a fault.
@@ -113,7 +115,7 @@ pub struct Mended {
 /// One case.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Line {
-    /// `development`, `further`, `second`, `third`, `fourth`, `fifth`, `sixth`, `seventh`, `eighth`, `uncorrupted` or `clean`.
+    /// `development`, `further`, `second`, `third`, `fourth`, `fifth`, `sixth`, `seventh`, `eighth`, `ninth`, `uncorrupted` or `clean`.
     pub half: String,
     /// Identifier; of a clean set what flies in it.
     pub corruption: String,

@@ -49,7 +49,15 @@ impl Judged<'_> {
 
     /// Effects that are neither hidden nor named without the corruption.
     fn is_false(&self) -> bool {
-        self.line.accepted.iter().any(|name| *name != self.line.hidden && !self.clean.accepted.contains(name))
+        self.has_false(&self.line.accepted)
+    }
+
+    fn is_false_once_mended(&self) -> bool {
+        self.line.mended.as_ref().is_some_and(|mended| self.has_false(&mended.accepted))
+    }
+
+    fn has_false(&self, accepted: &[String]) -> bool {
+        accepted.iter().any(|name| *name != self.line.hidden && !self.clean.accepted.contains(name))
     }
 
     fn hides(&self) -> bool {
@@ -147,6 +155,7 @@ fn totals<'a>(cases: &[Judged<'a>]) {
         count(&can_be, &|case| case.line.mended.as_ref().is_some_and(|mended| mended.is_free)),
     );
     row("of these as without the corruption", "-", count(&can_be, &Judged::is_mended));
+    row("of these no false effect then", "-", count(&can_be, &|case| !case.is_false_once_mended()));
     row("of these the hidden effect found", "-", count(&|case| can_be(case) && case.hides(), &Judged::finds));
 }
 

@@ -12,9 +12,9 @@ use super::schema::Schema;
 use super::source::Read;
 use super::table::RawTable;
 use super::taint::tainted;
-use super::timing::{Clock, Part, parts};
+use super::timing::{Clock, Part, cut, parts};
 use super::{Column, Flight, Targets, attitude};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::formula::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -54,14 +54,17 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     };
     let unit = schema.stated.get("units.t").map(String::as_str);
     let clock = Clock { unit, resampled: schema.resample_hz.is_some(), split: cuts.split_at_gaps };
-    let parts = parts(&table, &time_name, &time_s, clock)?;
+    let parts = cut(parts(&table, &time_name, &time_s, clock)?, &time_s, &schema.cut_at_s)
+        .map_err(|at_s| no_place(&table, at_s, &time_s))?;
     let log_start_s = time_s.first().copied().unwrap_or_default();
     let mut done = Assembled { files: table.read.iter().cloned().collect(), ..Assembled::default() };
     if let [whole] = parts.as_slice() {
         of_part(table, &time_s, whole, Identity { name, manoeuvre, alone: true, log_start_s }, schema, cuts, &mut done)?;
     } else {
         for part in &parts {
-            if part.gap_before_s > 0.0 {
+            if schema.cut_at_s.iter().any(|at_s| within_half_a_step(*at_s, part)) {
+                done.own_notes.push(format!("`{name}`: cut before t = {:.3} s, as dataset.toml says", part.start_s));
+            } else if part.gap_before_s > 0.0 {
                 let gap = format!("`{name}`: cut at a jump of {:.3} s before t = {:.3} s", part.gap_before_s, part.start_s);
                 done.own_notes.push(gap);
             }
@@ -79,6 +82,16 @@ pub(super) fn assemble(table: RawTable, name: &str, manoeuvre: &str, schema: &Sc
     }
     done.flights.iter_mut().for_each(|flight| flight.tainted.clone_from(&tainted));
     Ok(done)
+}
+
+/// Where a cut lies outside the log.
+fn no_place(table: &RawTable, at_s: f64, time_s: &[f64]) -> Error {
+    let [first, last] = [time_s.first(), time_s.last()].map(|time| time.copied().unwrap_or_default());
+    table.fault(format!("a cut at t = {at_s} s, as dataset.toml says"), format!("a time after {first} s, up to {last} s"))
+}
+
+fn within_half_a_step(at_s: f64, part: &Part) -> bool {
+    (at_s - part.start_s).abs() <= 0.5 * part.step_s
 }
 
 /// What a part's flights are called, and whether the part is the whole log.

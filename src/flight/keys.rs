@@ -77,6 +77,21 @@ impl Keys {
         Err(self.fault(key, number.to_string(), expected))
     }
 
+    /// A list of numbers, or one.
+    pub fn numbers(&mut self, key: &'static str) -> Result<Option<Vec<f64>>> {
+        let value = self.take(key);
+        let one = |value| match value {
+            Value::Float(number) if number.is_finite() => Ok(number),
+            Value::Integer(number) => Ok(number as f64),
+            other => Err(self.fault(key, other.to_string(), "a number, or a list of such".into())),
+        };
+        match value {
+            None => Ok(None),
+            Some(Value::Array(values)) => values.into_iter().map(one).collect::<Result<_>>().map(Some),
+            Some(value) => Ok(Some(vec![one(value)?])),
+        }
+    }
+
     /// Times by stream, s.
     pub fn times(&mut self) -> Result<BTreeMap<Column, f64>> {
         self.by_stream(LATEST_S, "a time", " s")
@@ -125,6 +140,7 @@ impl Keys {
             "late" => "late.",
             "drift" => "drift.",
             "late_in" => "late_in.",
+            "cut" => "cut.",
             _ => "repair.",
         };
         match self.take(key) {

@@ -8,7 +8,7 @@ use super::assemble::{Assembled, Cuts, gather};
 use super::format::Log;
 use super::formats;
 use super::listing::{DESCRIPTION, Listing, check_unique, given, list};
-use super::schema::{LateIn, Schema};
+use super::schema::{OfLog, Schema};
 use super::source::Read;
 use super::table::fault;
 use super::{DataSet, Flight, Given, Source, names};
@@ -98,7 +98,7 @@ fn of_logs(
         schema = Schema::parse(whole.as_bytes(), "dataset.toml")?;
         text = Some(whole);
     }
-    let own = late_in(&schema, &logs, is_of_these, &mut notes).map_err(in_description)?;
+    let own = of_single_logs(&schema, &logs, is_of_these, &mut notes).map_err(in_description)?;
     let held = AtomicUsize::new(0);
     let results = read_each(&logs, &schema, &own, cuts, &held);
     let mut data = DataSet { notes, ..DataSet::default() };
@@ -183,7 +183,7 @@ fn in_force(folder: Option<&Path>, options: &ReadOptions, notes: &mut Vec<String
 fn read_each(
     logs: &[Log],
     schema: &Schema,
-    own: &BTreeMap<&str, Vec<&LateIn>>,
+    own: &BTreeMap<&str, OfLog<'_>>,
     cuts: Cuts,
     held: &AtomicUsize,
 ) -> Vec<Result<(Assembled, Vec<u64>)>> {
@@ -218,25 +218,34 @@ fn leave_out(data: &mut DataSet, schema: &Schema, logs: &[Log], unread: &[&str],
 
 /// What the description says of single logs, by their names. One that is not among the logs may be that of another part of a larger set, or of another
 /// set, unless the description is of these.
-fn late_in<'s, 'l>(
+fn of_single_logs<'s, 'l>(
     schema: &'s Schema,
     logs: &'l [Log],
     is_of_these: bool,
     notes: &mut Vec<String>,
-) -> Result<BTreeMap<&'l str, Vec<&'s LateIn>>> {
-    let mut own: BTreeMap<&str, Vec<&LateIn>> = BTreeMap::new();
+) -> Result<BTreeMap<&'l str, OfLog<'s>>> {
+    let mut own: BTreeMap<&str, OfLog<'_>> = BTreeMap::new();
+    let mut note = |what: &str, elsewhere: &[&str]| {
+        if !elsewhere.is_empty() {
+            notes.push(format!("to be {what}, as dataset.toml says, but not among these flights: {}", elsewhere.join(", ")));
+        }
+    };
     let mut elsewhere = Vec::new();
-    for rule in &schema.late_in {
-        for name in &rule.flights {
-            match the_log(name, logs, "late_in.flights", is_of_these)? {
-                Some(log) => own.entry(&logs[log].name).or_default().push(rule),
-                None => elsewhere.push(name.as_str()),
-            }
+    for (rule, name) in schema.late_in.iter().flat_map(|rule| rule.flights.iter().map(move |name| (rule, name))) {
+        match the_log(name, logs, "late_in.flights", is_of_these)? {
+            Some(log) => own.entry(&logs[log].name).or_default().late.push(rule),
+            None => elsewhere.push(name.as_str()),
         }
     }
-    if !elsewhere.is_empty() {
-        notes.push(format!("to be moved in time, as dataset.toml says, but not among these flights: {}", elsewhere.join(", ")));
+    note("moved in time", &elsewhere);
+    elsewhere.clear();
+    for (rule, name) in schema.cuts.iter().flat_map(|rule| rule.flights.iter().map(move |name| (rule, name))) {
+        match the_log(name, logs, "cut.flights", is_of_these)? {
+            Some(log) => own.entry(&logs[log].name).or_default().cut_at_s.extend(&rule.at_s),
+            None => elsewhere.push(name.as_str()),
+        }
     }
+    note("cut", &elsewhere);
     Ok(own)
 }
 

@@ -14,6 +14,7 @@
 //! | `[late]` | seconds by which a group of `[units]`, or a column, comes later than the rest (negative: earlier): `angles = 0.04` |
 //! | `[drift]` | how that grows along a log, s for each second since its first row: a stream with a clock of its own: `controls = -0.005` |
 //! | `[[late_in]]` | `flights` and the same for those alone, on top of `[late]`: logs of one set that were joined differently |
+//! | `[[cut]]` | `flights` and `at`, times in s: where rows are lost that no gap in time shows, or parts were joined; what lies before and behind becomes a flight each |
 //! | `missing` | columns the logs lack: position, `yaw`, accelerations |
 //! | `use` | rows to use: a formula with a comparison, or a list that must all hold, in canonical and further columns and `height airspeed alpha beta g_x g_y g_z` |
 //! | `minimum_length_s` | pieces that `use` or gaps leave shorter than this are left out, with a note |
@@ -118,6 +119,23 @@ pub(crate) struct LateIn {
     pub late: BTreeMap<Column, f64>,
 }
 
+/// Where some flights are cut.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Cut {
+    /// Names of flights, as a person writes them.
+    pub flights: Vec<String>,
+    /// A piece begins with the row at this time of the log or the next one, s.
+    pub at_s: Vec<f64>,
+}
+
+/// What is said of a log alone.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OfLog<'a> {
+    pub late: Vec<&'a LateIn>,
+    /// Where it is cut, s.
+    pub cut_at_s: Vec<f64>,
+}
+
 /// A parsed `dataset.toml`; the default is the canonical form.
 #[derive(Clone, Debug)]
 pub(crate) struct Schema {
@@ -136,6 +154,9 @@ pub(crate) struct Schema {
     pub late: BTreeMap<Column, Late>,
     /// What comes on top of that in some flights.
     pub late_in: Vec<LateIn>,
+    pub cuts: Vec<Cut>,
+    /// Where the log at hand is cut, s.
+    pub cut_at_s: Vec<f64>,
     pub missing: Vec<Column>,
     pub rows: Vec<Formula>,
     pub minimum_length_s: f64,
@@ -172,6 +193,8 @@ impl Default for Schema {
             factors: BTreeMap::new(),
             late: BTreeMap::new(),
             late_in: Vec::new(),
+            cuts: Vec::new(),
+            cut_at_s: Vec::new(),
             missing: Vec::new(),
             rows: Vec::new(),
             minimum_length_s: 0.0,
@@ -206,8 +229,45 @@ const TARGETS: [(&str, TargetKind); 4] = [
 const MAY_LACK: [Column; 4] = [Column::X, Column::Y, Column::Z, Column::Yaw];
 
 /// Keys that hold for columns that are canonical already, or for whole logs.
-const OF_CANONICAL_COLUMNS: [&str; 11] =
-    ["use", "minimum_length_s", "resample_hz", "late", "drift", "late_in", "manoeuvre", "classes", "exclude", "leave_out", "notes"];
+const OF_CANONICAL_COLUMNS: [&str; 12] = [
+    "use",
+    "minimum_length_s",
+    "resample_hz",
+    "late",
+    "drift",
+    "late_in",
+    "cut",
+    "manoeuvre",
+    "classes",
+    "exclude",
+    "leave_out",
+    "notes",
+];
+
+/// The rules of single logs.
+fn of_single_logs(keys: &mut Keys) -> Result<(Vec<LateIn>, Vec<Cut>)> {
+    let (mut all_late, mut cuts) = (Vec::new(), Vec::new());
+    for mut rule in keys.sections("late_in")? {
+        let flights = rule.texts("flights")?.unwrap_or_default();
+        let late = rule.times()?;
+        rule.finish()?;
+        if flights.is_empty() || late.is_empty() {
+            let expected = "`flights` and at least one stream, as `controls = 0.01`";
+            return Err(keys.fault("late_in", "an incomplete rule".into(), expected.into()));
+        }
+        all_late.push(LateIn { flights, late });
+    }
+    for mut rule in keys.sections("cut")? {
+        let flights = rule.texts("flights")?.unwrap_or_default();
+        let at_s = rule.numbers("at")?.unwrap_or_default();
+        rule.finish()?;
+        if flights.is_empty() || at_s.is_empty() {
+            return Err(keys.fault("cut", "an incomplete rule".into(), "`flights` and `at`, as `at = [12.5]`".into()));
+        }
+        cuts.push(Cut { flights, at_s });
+    }
+    Ok((all_late, cuts))
+}
 
 impl Schema {
     /// Understands a `dataset.toml`; `place` is named in errors.
@@ -271,16 +331,7 @@ impl Schema {
             drift.drifts()?.into_iter().for_each(|(column, drift)| schema.late.entry(column).or_default().drift = drift);
             drift.finish()?;
         }
-        for mut rule in keys.sections("late_in")? {
-            let flights = rule.texts("flights")?.unwrap_or_default();
-            let late = rule.times()?;
-            rule.finish()?;
-            if flights.is_empty() || late.is_empty() {
-                let expected = "`flights` and at least one stream, as `controls = 0.01`";
-                return Err(keys.fault("late_in", "an incomplete rule".into(), expected.into()));
-            }
-            schema.late_in.push(LateIn { flights, late });
-        }
+        (schema.late_in, schema.cuts) = of_single_logs(&mut keys)?;
         schema.repairs = repairs(&mut keys, place)?;
         for column in schema.repairs.iter().filter(|rule| rule.held).flat_map(|rule| &rule.columns) {
             schema.stated.insert(format!("held.{column}"), "interpolated".into());
@@ -289,10 +340,10 @@ impl Schema {
         Ok(schema)
     }
 
-    /// The same for one log, of which it is known what comes late in it alone.
-    pub fn for_log(&self, own: &[&LateIn]) -> Self {
-        let mut schema = self.clone();
-        for (&column, late_s) in own.iter().flat_map(|rule| &rule.late) {
+    /// The same for one log, of which it is known what is said of it alone.
+    pub fn for_log(&self, own: &OfLog<'_>) -> Self {
+        let mut schema = Self { cut_at_s: own.cut_at_s.clone(), ..self.clone() };
+        for (&column, late_s) in own.late.iter().flat_map(|rule| &rule.late) {
             schema.late.entry(column).or_default().s += late_s;
         }
         schema.late.retain(|_, late| *late != Late::default());
@@ -301,8 +352,8 @@ impl Schema {
 
     /// The same for a layout that makes canonical columns by itself: what these are made of is not for the description to say.
     pub fn of_canonical_columns(&self) -> Self {
-        let Self { rows, minimum_length_s, resample_hz, late, .. } = self.clone();
-        Self { rows, minimum_length_s, resample_hz, late, ..Self::default() }
+        let Self { rows, minimum_length_s, resample_hz, late, cut_at_s, .. } = self.clone();
+        Self { rows, minimum_length_s, resample_hz, late, cut_at_s, ..Self::default() }
     }
 
     /// The keys that are stated and do not hold for such a layout.
@@ -557,6 +608,8 @@ mod tests {
             ("[[repair]]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nlonger = \"split\"", "expected one of error, cut"),
             ("[drift]\ncontrols = 0.2", "`drift.controls` is 0.2, expected a drift from -0.1 to 0.1 s for each second"),
             ("[[late_in]]\ncontrols = 0.01", "`late_in` is an incomplete rule"),
+            ("[[cut]]\nflights = \"a\"", "`cut` is an incomplete rule"),
+            ("[[cut]]\nflights = \"a\"\nat = [\"b\"]", "`cut.at` is \"b\", expected a number"),
             ("[[late_in]]\nflights = \"a\"\ncontrol = 0.01", "did you mean `controls`?"),
             ("[[late_in]]\nflights = \"a\"\ncontrols = 2", "`late_in.controls` is 2, expected a time from -1 to 1 s"),
             ("[repair]\ncolumns = [\"m1\"]\nmax_gap_s = 1\nvalid = \"m1 > 0\"", "unknown name `m1`"),

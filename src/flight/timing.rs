@@ -87,6 +87,28 @@ pub(super) fn parts(table: &RawTable, column: &str, time_s: &[f64], clock: Clock
     Ok(parts)
 }
 
+/// Cuts parts further, before the rows at these times (to half a step); where it is cut already, nothing is done.
+///
+/// # Errors
+/// A time before which there is no row, or none behind.
+pub(super) fn cut(parts: Vec<Part>, time_s: &[f64], at_s: &[f64]) -> std::result::Result<Vec<Part>, f64> {
+    let mut pieces = parts;
+    for &at_s in at_s {
+        let row_of = |part: &Part| time_s.partition_point(|&time| time < at_s - 0.5 * part.step_s);
+        let place = pieces.iter().position(|piece| piece.rows.contains(&row_of(piece))).ok_or(at_s)?;
+        let row = row_of(&pieces[place]);
+        if row == 0 {
+            return Err(at_s);
+        }
+        let Part { rows, step_s, gap_before_s, .. } = pieces[place].clone();
+        if row > rows.start {
+            pieces[place] = part(time_s, rows.start..row, step_s, gap_before_s);
+            pieces.insert(place + 1, part(time_s, row..rows.end, step_s, 0.0));
+        }
+    }
+    Ok(pieces)
+}
+
 /// Refuses a step that no log of an aircraft has; mostly its time is in another unit.
 fn check_rate(table: &RawTable, column: &str, step_s: f64, unit: Option<&str>) -> Result<()> {
     if RATES_HZ.contains(&step_s.recip()) {
@@ -225,6 +247,18 @@ mod tests {
         let split = Clock { split: true, ..Clock::default() };
         let text = parts(&table(200), "t", &jitter, split).map_or_else(|error| error.to_string(), |_| "accepted".into());
         assert!(text.contains("steps are uneven") && text.contains("`resample_hz = 100`"), "{text}");
+    }
+
+    #[test]
+    fn a_part_is_cut_where_it_is_said() -> Result<()> {
+        let times: Vec<f64> = (0..10).map(|k| 5.0 + 0.01 * f64::from(k)).collect();
+        let whole = parts(&table(10), "t", &times, Clock::default())?;
+        let rows = |at_s: &[f64]| cut(whole.clone(), &times, at_s).map(|parts| parts.into_iter().map(|part| part.rows).collect());
+        assert_eq!(rows(&[5.07, 5.034, 5.07]), Ok(vec![0..3, 3..7, 7..10]));
+        for outside in [4.0, 5.0, 5.2] {
+            assert_eq!(rows(&[outside]), Err(outside));
+        }
+        Ok(())
     }
 
     #[test]

@@ -8,6 +8,7 @@ use super::channels::{Channel, Stream, difference};
 use super::contents::{self, Part};
 use super::increments::{Motion, Vector};
 use super::jointly;
+use super::lost;
 use super::repairs::Trial;
 use super::robust::median;
 use super::stray;
@@ -136,7 +137,7 @@ impl Kind {
             Self::Noise(_) => "noisy",
             Self::Rounded(_) => "rounded",
             Self::OffCentre(_) => "off_centre",
-            Self::Rows => "rows",
+            Self::Rows => lost::ROWS,
             Self::Pace(_) => "uneven_time",
             Self::Factors(_) => "uneven_factors",
         }

@@ -1,8 +1,8 @@
 //! Sticks with a dead zone: one value stands for all near it, and its neighbours do not occur. Where only the record has it, small deflections are lost;
-//! where the servo has it too, the aircraft is as the log says, so this is a warning.
+//! where the servo has it too, the aircraft is as the log says, so in all flights this is a warning. In some of them alone it is a fault of the record.
 
 use super::finding::{Finding, Severity, finding};
-use super::flights::{CONTROLS, MOST, named};
+use super::flights::{CONTROLS, MOST, in_flights};
 use super::robust::median;
 use crate::flight::Flight;
 
@@ -13,6 +13,8 @@ const WIDE: f64 = 0.02;
 const ALIKE: f64 = 1.5;
 /// … while as far again on either side so many samples stand.
 const BESIDE: f64 = 0.005;
+/// So many flights have it, or it may be chance.
+const FEWEST_FLIGHTS: usize = 3;
 /// Values at least, of a stick that is not rounded.
 const FEWEST: usize = 100;
 
@@ -26,16 +28,17 @@ pub(super) fn findings(flights: &[Flight]) -> Vec<Finding> {
         });
         let such: Vec<(usize, f64)> = each.collect();
         let half = 0.5 * median(such.iter().map(|entry| entry.1).collect())?;
-        let names: Vec<&str> = such.iter().map(|entry| flights[entry.0].name.as_str()).collect();
-        let is_set = such.len() as f64 > MOST * flights.len() as f64;
-        let flights =
-            if is_set { String::new() } else { format!("in {} of {} flights ({}): ", such.len(), flights.len(), named(&names)) };
-        let name = control.name();
-        let message = format!(
-            "{flights}{name} has a dead zone: within {half:.3} of one value it is held at that. Unless the servo has it, too, small deflections are missing, and can \
-             look like a curve of the stick (`ctrl_nonlin`)"
-        );
-        Some(finding(&format!("dead_zone_{name}"), Severity::Warning, message, None))
+        let name = format!("dead_zone_{}", control.name());
+        let message = format!("{} has a dead zone: within {half:.3} of one value it is held at that", control.name());
+        if such.len() as f64 > MOST * flights.len() as f64 {
+            let message = format!(
+                "{message}. Unless the servo has it, too, small deflections are missing, and can look like a curve of the stick (`ctrl_nonlin`)"
+            );
+            return Some(finding(&name, Severity::Warning, message, None));
+        }
+        let indices: Vec<usize> = such.iter().map(|entry| entry.0).collect();
+        let found = in_flights(&name, &indices, &format!("{message}, as it is not in the other flights"), flights);
+        Some(if such.len() < FEWEST_FLIGHTS { Finding { verdict: Severity::Warning, ..found } } else { found })
     };
     CONTROLS.into_iter().filter_map(of).collect()
 }

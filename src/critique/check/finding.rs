@@ -74,6 +74,8 @@ impl Severity {
 
 /// Columns of a finding's verdict and name.
 const PLACE: usize = 35;
+/// Of a finding with many lines so many are shown.
+const SHOWN: usize = 3;
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -88,7 +90,14 @@ impl fmt::Display for Finding {
         } else {
             write!(f, "{}\n{}", figures.trim_end(), wrapped(&" ".repeat(8), &self.message))?;
         }
-        self.set.iter().try_for_each(|set| write!(f, "\n{:>8}set: {}", "", set.replace('\n', "; ")))
+        let Some(set) = &self.set else { return Ok(()) };
+        let lines: Vec<&str> = set.lines().collect();
+        let shown = lines[..lines.len().min(SHOWN)].join("; ");
+        write!(f, "\n{:>8}set: {shown}", "")?;
+        match lines.len().checked_sub(SHOWN) {
+            None | Some(0) => Ok(()),
+            Some(more) => write!(f, "; and {more} more lines, all of which `check --suggest FILE` writes"),
+        }
     }
 }
 

@@ -7,6 +7,7 @@ use super::flights::{FEWEST, in_flights};
 use super::groups::{Of, apart};
 use super::robust::median;
 use super::sticks::{AXES, EXPLAINED, FIRST, Regressions, STICKS, Sticks};
+use super::told::short;
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
@@ -14,6 +15,9 @@ use std::collections::BTreeSet;
 const LEAST: f64 = 0.15;
 /// No aircraft is so cross-coupled in all flights that another stick does this part of what the own one does, on two axes or more.
 const AS_MUCH: f64 = 0.4;
+
+/// As near to a half or to a whole number a ratio is that.
+const SIMPLE: f64 = 0.05;
 
 /// An axis, and another stick than its own.
 type Pair = [usize; 2];
@@ -40,16 +44,35 @@ pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<us
     let common = |pair: Pair| {
         let such = ratios(pair);
         let value = median(such.iter().map(|one| one.value).collect())?;
-        (2 * such.len() > judged.len() && value.abs() > AS_MUCH).then_some((pair, value))
+        (2 * such.len() > judged.len() && value.abs() > LEAST).then_some((pair, value))
     };
-    let in_all: Ratios = OF_SWASH_PLATE.into_iter().filter_map(common).collect();
+    let of_all: Ratios = OF_SWASH_PLATE.into_iter().filter_map(common).collect();
+    let in_all: Ratios = of_all.iter().filter(|(_, value)| value.abs() > AS_MUCH).copied().collect();
     let axes: BTreeSet<usize> = in_all.iter().map(|entry| entry.0[0]).collect();
     let message = format!(
         "{} are mixed: {}; more than any rotor couples them, as where servos of the swash plate, or sticks behind a mixer, were recorded",
         names(in_all.iter().map(|entry| entry.0)),
         told(&in_all)
     );
-    (axes.len() > 1).then(|| finding("mixed_sticks", Severity::Fault, message, None)).into_iter().collect()
+    (axes.len() > 1).then(|| finding("mixed_sticks", Severity::Fault, message, Some(&unmixed(&of_all)))).into_iter().collect()
+}
+
+/// Sticks as they act: what moves an axis, in units of its own stick. Mixers have simple numbers, which a regression meets nearly.
+fn unmixed(ratios: &Ratios) -> String {
+    let simple = |ratio: f64| {
+        let near = (2.0 * ratio).round() / 2.0;
+        if (ratio - near).abs() < SIMPLE { near } else { ratio }
+    };
+    let term = |([_, stick], ratio): &(Pair, f64)| {
+        let sign = if *ratio < 0.0 { '-' } else { '+' };
+        format!(" {sign} {} * {}", short(simple(ratio.abs())), STICKS[*stick])
+    };
+    let line = |axis: usize| {
+        let terms: String = ratios.iter().filter(|(pair, _)| pair[0] == axis).map(term).collect();
+        (!terms.is_empty()).then(|| format!("{} = \"{}{terms}\"", STICKS[axis], STICKS[axis]))
+    };
+    let lines: Vec<String> = (0..STICKS.len()).filter_map(line).collect();
+    format!("[columns] {}, with the file's names", lines.join(", "))
 }
 
 /// Flights in which the ratio of a pair is another than in the rest; those of the same flights in one finding.

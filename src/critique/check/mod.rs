@@ -31,6 +31,7 @@ mod increments;
 mod jointly;
 mod limits;
 mod lines;
+mod lost;
 #[cfg(feature = "files")]
 mod mending;
 mod mixes;
@@ -318,7 +319,11 @@ fn blamed(judged: &[&Own], odd: &Odd, left: &[unexplained::OfFlight], data: &Dat
     };
     let unnamed = judged.iter().filter(|own| !is_named(own.flight));
     let causes: Vec<(usize, Option<&[causes::Cause]>)> = unnamed.map(|own| (own.flight, own.causes.as_deref())).collect();
-    blame::gathered(&causes, &unexplained::outstanding(left), &data.flights)
+    let mut blamed = blame::gathered(&causes, &unexplained::outstanding(left), &data.flights);
+    for finding in blamed.findings.iter_mut().filter(|finding| finding.name == lost::ROWS && finding.set.is_none()) {
+        finding.set = lost::mend(data);
+    }
+    blamed
 }
 
 /// Flights that are read side by side at most, and then leave the memory.

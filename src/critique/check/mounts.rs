@@ -209,7 +209,9 @@ fn attitude(angle: Estimate, axis: usize) -> Finding {
 fn levelled(by: Vector) -> String {
     let line = |(name, by): (&str, f64)| {
         let sign = if by < 0.0 { '+' } else { '-' };
-        format!("{name} = \"{name} {sign} {:.4}\"", by.abs())
+        let angle = format!("{name} {sign} {:.4}", by.abs());
+        // There is no pitch beyond the vertical.
+        if name == "pitch" { format!("{name} = \"clamp({angle}, -1.5707, 1.5707)\"") } else { format!("{name} = \"{angle}\"") }
     };
     let angles = ["roll", "pitch"].into_iter().zip(by).filter(|(_, by)| *by != 0.0);
     format!("[columns] {}, with the file's names", angles.map(line).collect::<Vec<_>>().join(", "))

@@ -106,7 +106,7 @@ fn agreed(lies: &[Lies]) -> Option<i64> {
 }
 
 /// The log that a flight is a piece of: `a/b[2]` is one of `a/b`.
-fn log_of(flight: &str) -> &str {
+pub(super) fn log_of(flight: &str) -> &str {
     match flight.strip_suffix(']').and_then(|rest| rest.rsplit_once('[')) {
         Some((log, piece)) if !piece.is_empty() && piece.bytes().all(|byte| byte.is_ascii_digit()) => log,
         _ => flight,

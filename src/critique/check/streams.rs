@@ -37,8 +37,8 @@ const LEAST_NOISE: f64 = 0.03;
 pub(super) const HELD: &str = "held_";
 /// How findings of accelerations that are mostly noise begin.
 pub(super) const SWAMPED_BY_NOISE: &str = "swamped_";
-const LINEAR: [Column; 3] = [Column::VxDot, Column::VyDot, Column::VzDot];
-const ANGULAR: [Column; 3] = [Column::WxDot, Column::WyDot, Column::WzDot];
+pub(super) const LINEAR: [Column; 3] = [Column::VxDot, Column::VyDot, Column::VzDot];
+pub(super) const ANGULAR: [Column; 3] = [Column::WxDot, Column::WyDot, Column::WzDot];
 
 /// Position matters for the height above ground alone.
 pub(super) const POSITION: [Column; 3] = [Column::X, Column::Y, Column::Z];

@@ -9,7 +9,7 @@ use super::report::CheckReport;
 use crate::critique::wrap::wrapped;
 use crate::flight::{Axes, Column, Description, Frame, Schema, Source, TargetKind, Targets, column_names, columns_of};
 use crate::formula::{Formula, quoted};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
 /// A description that mends what is at fault, as far as a description can.
@@ -41,7 +41,7 @@ const TIME: &str = "t";
 /// Lists, to which findings add.
 const LISTS: [&str; 3] = ["leave_out", "missing", "ignore"];
 /// Sections that can stand several times.
-const RULES: [&str; 2] = ["repair", "late_in"];
+const RULES: [&str; 3] = ["repair", "late_in", "cut"];
 /// Of these lists the entries are columns as the file has them.
 const OF_COLUMNS: [&str; 2] = ["missing", "ignore"];
 
@@ -49,14 +49,18 @@ impl CheckReport {
     /// What mends the faults that were found in flights of this source. `None` where nothing is at fault, or where the source has a description that is
     /// none.
     pub fn suggestion(&self, source: &Source) -> Option<Suggestion> {
-        let is_worth_it = |name: &str| name == super::stamps::NAME || name.starts_with(super::streams::SWAMPED_BY_NOISE);
+        let is_worth_it = |name: &str| {
+            name == super::stamps::NAME
+                || [super::streams::SWAMPED_BY_NOISE, super::vibration::VIBRATES].iter().any(|begin| name.starts_with(begin))
+        };
         let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || is_worth_it(&finding.name);
         let mut faults = self.findings.iter().filter(is_mended).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
         let (mut mends, mut open) = (Vec::new(), Vec::new());
         let mut faults: Vec<&Finding> = faults.collect();
-        faults.sort_by_key(|finding| Tier::of(finding));
+        let all = faults.clone();
+        faults.sort_by_cached_key(|finding| (Tier::of(finding), std::cmp::Reverse(votes(finding, &all))));
         let mut reached = None;
         for finding in faults {
             let (name, tier) = (finding.name.clone(), Tier::of(finding));
@@ -87,13 +91,29 @@ enum Tier {
 impl Tier {
     fn of(finding: &Finding) -> Self {
         match finding.set.as_deref() {
-            Some(line) if line.starts_with("[[repair]]") => Self::Cells,
+            Some(line) if line.starts_with("[[repair]]") || line.starts_with("[[cut]]") => Self::Cells,
             Some(line) if line.starts_with("leave_out") => Self::Flights,
             _ => Self::Columns,
         }
     }
 }
 
+/// How many findings speak against the flights that this one leaves out, itself among them; 0 where it leaves out none. Where some flights are not as the
+/// others, either may be wrong: those are left out first of which more is said.
+fn votes(finding: &Finding, others: &[&Finding]) -> usize {
+    let of = |finding: &Finding| -> BTreeSet<String> {
+        if Tier::of(finding) == Tier::Flights { finding.flights.iter().cloned().collect() } else { BTreeSet::new() }
+    };
+    let own = of(finding);
+    let is_alike = |other: &&&Finding| {
+        let other = of(other);
+        own.intersection(&other).count() as f64 > ALIKE * own.union(&other).count() as f64
+    };
+    others.iter().filter(is_alike).count()
+}
+
+/// Two findings are of the same flights where they have more than this part in common of what either names.
+const ALIKE: f64 = 0.5;
 /// Of the flights that are read, at most this part is left out at once: what more of them have is not theirs.
 const LEFT_OUT: f64 = 2.0 / 3.0;
 
@@ -135,19 +155,31 @@ impl<'a> Draft<'a> {
 
     /// Adds what a finding prints, all of it or nothing.
     fn add(&mut self, finding: &Finding) -> Result<(), String> {
-        let line = finding.set.as_deref().ok_or("no line of a description mends it")?;
+        let lines = finding.set.as_deref().ok_or("no line of a description mends it")?;
+        let before = (self.made.clone(), self.set.clone());
+        // Of several lines the first carries the reason.
+        let mut reason = comment(&format!("{}: {}", finding.name, finding.message));
+        for line in lines.lines() {
+            if let Err(reason) = self.add_line(line, finding, &std::mem::take(&mut reason)) {
+                (self.made, self.set) = before;
+                return Err(reason);
+            }
+        }
+        Ok(())
+    }
+
+    fn add_line(&mut self, line: &str, finding: &Finding, comment: &str) -> Result<(), String> {
         let (section, items) = parsed(line, finding).ok_or_else(|| format!("it leaves a choice: {line}"))?;
-        let comment = comment(&format!("{}: {}", finding.name, finding.message));
         let (mut made, mut set) = (self.made.clone(), self.set.clone());
         let unusual = |key: &str| format!("dataset.toml has `{key}` in a form that is not changed here: {line}");
         let entries = match section {
             "repair" => {
-                made = made.with_rule("repair", &self.rule(items)?, &comment).ok_or_else(|| unusual("repair"))?;
+                made = made.with_rule("repair", &self.rule(items)?, comment).ok_or_else(|| unusual("repair"))?;
                 Vec::new()
             }
             // Rules for single flights add up.
-            "late_in" => {
-                made = made.with_rule("late_in", &items, &comment).ok_or_else(|| unusual("late_in"))?;
+            section @ ("late_in" | "cut") => {
+                made = made.with_rule(section, &items, comment).ok_or_else(|| unusual(section))?;
                 Vec::new()
             }
             section => self.entries(section, items)?,
@@ -158,8 +190,7 @@ impl<'a> Draft<'a> {
             if known.as_ref().is_some_and(|known| *known != value && !LISTS.contains(&key.as_str())) {
                 return Err(format!("another finding sets `{full}` otherwise: {line}"));
             }
-            // Of several lines the first carries the reason.
-            let mut above = if place == 0 { comment.clone() } else { String::new() };
+            let mut above = if place == 0 { comment.to_owned() } else { String::new() };
             if let Some(old) = self.stated.get(section, &key).filter(|old| known.is_none() && **old != value) {
                 above.push_str(&self::comment(&format!("was {key} = {old}")));
             }
@@ -566,6 +597,8 @@ mod tests {
         assert!(
             halves.is_some_and(|(text, open)| text.contains("\"f19\"") && !text.contains("f20") && open[0].contains("40 of 40"))
         );
+        let outvoted = suggested(None, &[(line, &names[..20]), (line, &names[21..]), (line, &names[20..])]);
+        assert!(outvoted.is_some_and(|(text, open)| text.contains("\"f39\"") && !text.contains("\"f19\"") && open.len() == 1));
     }
 
     #[test]

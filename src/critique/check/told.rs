@@ -100,7 +100,7 @@ fn uneven_time(all: &[&Cause]) -> String {
 }
 
 /// A ratio with the digits that count.
-fn short(ratio: f64) -> String {
+pub(super) fn short(ratio: f64) -> String {
     if ratio.abs() < 0.1 { format!("{ratio:.3e}") } else { format!("{ratio:.4}") }
 }
 

@@ -4,6 +4,8 @@
 use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, named};
 use super::robust::median;
+use super::streams::{ANGULAR, LINEAR};
+use super::told::derived_anew;
 use crate::flight::{Column, Flight, Targets};
 use std::f64::consts::{PI, TAU};
 
@@ -22,6 +24,12 @@ const SPREAD: usize = 2;
 const LEAST_SHARE: f64 = 0.1;
 /// Lines of two flights are the same within so many bins.
 const SAME: f64 = 2.0;
+
+/// Where so many of the flights vibrate, all are filtered: it takes little from those that do not.
+const MANY: f64 = 0.5;
+
+/// How findings begin.
+pub(super) const VIBRATES: &str = "vibration_";
 
 /// A line of a column in a flight.
 #[derive(Clone, Copy, Debug)]
@@ -52,12 +60,28 @@ fn of_column(column: Column, flights: &[Flight]) -> Option<Finding> {
     let amplitude = median(same.iter().map(|(_, line)| line.amplitude).collect())?;
     let (name, unit) = (column.name(), column.unit());
     let names: Vec<&str> = same.iter().map(|(index, _)| flights[*index].name.as_str()).collect();
-    let place = if names.len() as f64 > MOST * flights.len() as f64 { String::new() } else { format!("in {}: ", named(&names)) };
+    let share = names.len() as f64 / flights.len() as f64;
+    let is_set = share > MOST;
+    let place = if is_set { String::new() } else { format!("in {}: ", named(&names)) };
     let message = format!(
         "{place}{name} vibrates at {hz:.1} Hz, {amplitude:.2} {unit} up and down: a line in its spectrum, as of a rotor or a motor that shakes the sensor (faster \
          ones show at another frequency, by aliasing); no model removes it"
     );
-    Some(finding(&format!("vibration_{name}"), Severity::Warning, message, None))
+    let set = (share > MANY).then(|| mend(column, hz));
+    Some(finding(&format!("{VIBRATES}{name}"), Severity::Warning, message, set.as_deref()))
+}
+
+/// A rate as the mean of two samples half a period apart, which come a quarter of it late; accelerations derived anew, with a low-pass.
+fn mend(column: Column, hz: f64) -> String {
+    let name = column.name();
+    if let Some(stream) = [LINEAR, ANGULAR].iter().find(|stream| stream.contains(&column)) {
+        return derived_anew(&stream.map(Column::name));
+    }
+    let half_s = 0.5 / hz;
+    format!(
+        "[late] {name} = {:.4}\n[columns] {name} = \"0.5 * {name} + 0.5 * delay({name}, {half_s:.4})\", with the file's name",
+        0.5 * half_s
+    )
 }
 
 /// The strongest line of a column; `None` where there is none.
