@@ -468,14 +468,15 @@ fn leaps_of_the_attitude_are_placed() -> Outcome {
 }
 
 #[test]
-fn a_trim_of_a_stick_is_a_warning_with_its_size() -> Outcome {
-    let flights = some(|index| index % 2 == 1, |columns| columns[Column::U1 as usize].iter_mut().for_each(|u| *u -= 0.2))?;
-    let set = DataSet { flights, ..DataSet::default() };
-    let report = check(&set, None);
-    let finding = report.findings.iter().find(|finding| finding.name == "trim_u1").ok_or("no finding")?;
-    assert_eq!(finding.verdict, Severity::Warning);
-    assert!(finding.message.contains("u1 stands 0.2"), "{}", finding.message);
-    assert!(!report.fault, "{}", report.summary);
+fn a_trim_of_a_stick_is_told_with_its_size_and_is_a_fault_where_many_flights_share_it() -> Outcome {
+    for (every, verdict) in [(2, Severity::Fault), (12, Severity::Warning)] {
+        let flights = some(|index| index % every == 1, |columns| columns[Column::U1 as usize].iter_mut().for_each(|u| *u -= 0.2))?;
+        let report = check(&DataSet { flights, ..DataSet::default() }, None);
+        let finding = report.findings.iter().find(|finding| finding.name == "trim_u1").ok_or("no finding")?;
+        assert_eq!(finding.verdict, verdict, "{}", finding.message);
+        assert!(finding.message.contains("u1 stands 0.2"), "{}", finding.message);
+        assert_eq!(report.fault, verdict == Severity::Fault, "{}", report.summary);
+    }
     Ok(())
 }
 

@@ -153,7 +153,7 @@ fn a_rotor_that_shakes_all_sensors_is_filtered() -> Outcome {
         }
     })?;
     let text = mended(&shaken)?;
-    for line in ["wx = \"0.5 * wx + 0.5 * delay(wx, 0.02", "missing = [", "wx = 0.01"] {
+    for line in ["wx = \"(wx + 1.9", "* delay(wx, 0.02) + delay(wx, 0.04)) / 3.9", "missing = [", "\nwx = 0.02\n"] {
         assert!(text.contains(line), "{line}: {text}");
     }
     Ok(())

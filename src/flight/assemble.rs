@@ -152,7 +152,7 @@ fn of_part(
     };
     let recorded = columns.get(Column::Vx).map_or(0, <[f64]>::len);
     let late = schema.late.iter().map(|(column, late)| (*column, late.after(part.start_s - log_start_s))).collect();
-    let (whole, with_them) = in_step(&mut columns, &late, step_s, recorded);
+    let (whole, with_them) = in_step(&mut columns, &late, &schema.filtered(), step_s, recorded);
     if !schema.late.is_empty() {
         let moved: Vec<String> = schema.late.iter().map(|(column, late)| format!("{} {late}", column.name())).collect();
         let with_them = if with_them.is_empty() { String::new() } else { format!("; with them {}", with_them.join(", ")) };

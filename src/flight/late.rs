@@ -3,7 +3,7 @@
 
 use super::Column;
 use super::convert::Columns;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::ops::Range;
 
@@ -57,10 +57,13 @@ fn between(values: &[f64], row: f64) -> f64 {
 /// that nothing else is made of. A stream that drifts would be off by up to half a sample, now here and now there, which is a lag to whoever looks for one:
 /// but for angles, which go round, such a canonical column is taken from between its samples.
 ///
+/// A column in `filtered` is made by a formula that remembers: one of linear phase that is late by s remembers twice as long, and has no value before.
+///
 /// Returns the rows that then have a value of every stream (what stands in the others is the nearest there is), and the names of the further columns.
 pub(super) fn in_step(
     columns: &mut Columns,
     late: &BTreeMap<Column, Late>,
+    filtered: &BTreeSet<Column>,
     step_s: f64,
     rows: usize,
 ) -> (Range<usize>, Vec<String>) {
@@ -77,7 +80,8 @@ pub(super) fn in_step(
         } else {
             (0..rows).map(|row| between(values, row as f64 + late.rows(row, step_s))).collect()
         };
-        let is_there = |row: &usize| (0..rows as isize).contains(&late.nearest(*row, step_s));
+        let remembers = if filtered.contains(&column) { 2 * late.nearest(0, step_s).max(0) } else { 0 };
+        let is_there = |row: &usize| (remembers..rows as isize).contains(&late.nearest(*row, step_s));
         let first = (0..rows).find(is_there).unwrap_or(rows);
         let end = (first..rows).rev().find(is_there).map_or(first, |row| row + 1);
         whole = whole.start.max(first)..whole.end.min(end);
@@ -113,7 +117,7 @@ mod tests {
         columns.canonical[Column::U1 as usize] = ramp(-2.0);
         let constant = |s: f64| Late { s, drift: 0.0 };
         let late = BTreeMap::from([(Column::Wx, constant(0.3)), (Column::U1, constant(-0.2))]);
-        let (rows, with_them) = in_step(&mut columns, &late, 0.1, 10);
+        let (rows, with_them) = in_step(&mut columns, &late, &BTreeSet::new(), 0.1, 10);
         assert_eq!((rows.clone(), with_them), (2..7, vec!["rotor".to_owned()]));
         for row in rows {
             let at = |column: Column| columns.get(column).expect("set above")[row];
@@ -121,7 +125,18 @@ mod tests {
             // One of which something is made that is in time, and one of which nothing is, stay.
             assert_eq!([columns.extra["battery"][row], columns.extra["wind"][row]], [row as f64 + 2.0; 2]);
         }
-        assert_eq!(in_step(&mut columns, &BTreeMap::from([(Column::Vx, constant(1.0))]), 0.01, 10).0.len(), 0);
+        assert_eq!(in_step(&mut columns, &BTreeMap::from([(Column::Vx, constant(1.0))]), &BTreeSet::new(), 0.01, 10).0.len(), 0);
+    }
+
+    #[test]
+    fn rows_of_a_filter_that_has_no_past_yet_are_not_used() {
+        for (filtered, whole) in [(BTreeSet::new(), 0..17), (BTreeSet::from([Column::Wx]), 3..17)] {
+            let mut columns =
+                Columns { canonical: Default::default(), extra: BTreeMap::new(), made: BTreeMap::new(), quaternion: false };
+            columns.canonical[Column::Wx as usize] = Some(vec![1.0; 20]);
+            let late = BTreeMap::from([(Column::Wx, Late { s: 0.3, drift: 0.0 })]);
+            assert_eq!(in_step(&mut columns, &late, &filtered, 0.1, 20).0, whole);
+        }
     }
 
     #[test]
@@ -134,7 +149,7 @@ mod tests {
             let mut columns =
                 Columns { canonical: Default::default(), extra: BTreeMap::new(), made: BTreeMap::new(), quaternion: false };
             columns.canonical[Column::U3 as usize] = Some((0..rows).map(written).collect());
-            let (whole, _) = in_step(&mut columns, &BTreeMap::from([(Column::U3, late)]), step_s, rows);
+            let (whole, _) = in_step(&mut columns, &BTreeMap::from([(Column::U3, late)]), &BTreeSet::new(), step_s, rows);
             assert!(whole.len() as f64 > 0.97 * rows as f64, "{drift}: {whole:?}");
             let values = columns.get(Column::U3).expect("set above");
             let inner = whole.start + 1..whole.end - 1;

@@ -372,6 +372,13 @@ impl Schema {
         Some(std::f64::consts::TAU / self.factor(angle))
     }
 
+    /// Columns that come late and are made by formulas that remember.
+    pub fn filtered(&self) -> BTreeSet<Column> {
+        let remembers = |source: &String| Formula::parse(source).is_ok_and(|formula| formula.remembers());
+        let is_filtered = |column: &&Column| self.columns.get(column.name()).is_some_and(|sources| sources.iter().any(remembers));
+        self.late.keys().filter(is_filtered).copied().collect()
+    }
+
     /// Factor to SI of a canonical column.
     pub fn factor(&self, column: &str) -> f64 {
         self.factors.get(column).copied().unwrap_or(1.0)

@@ -28,6 +28,9 @@ const FEW_OF_ALL: f64 = 0.25;
 /// … within this share of it.
 const SAME_ARM: f64 = 0.2;
 
+/// Filters are the same where their time constants are, to this factor.
+const SAME_FILTER: f64 = 1.6;
+
 /// The name of a kind, and the stream that it is wrong with.
 type Named = (&'static str, Option<&'static str>);
 /// A flight by its place, and a cause in it.
@@ -52,7 +55,7 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
     }
     let mut order: Vec<(Named, Vec<OfFlight<'_>>)> = alike.into_iter().collect();
     order.sort_by_key(|(_, alike)| std::cmp::Reverse(alike.len()));
-    let mut blamed = Blamed { findings: Vec::new(), flights: BTreeSet::new() };
+    let (mut blamed, mut filtered) = (Blamed { findings: Vec::new(), flights: BTreeSet::new() }, Vec::new());
     for ((_, stream), alike) in order {
         let columns = common(&alike);
         let of_all: Vec<&Cause> = alike.iter().map(|entry| entry.1).collect();
@@ -63,9 +66,13 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
         let indices: Vec<usize> = indices.into_iter().collect();
         let of_those = indices.len() as f64;
         let shared = |by: f64| by > MOST * (sound as f64 + by) && by > HALF * causes.len() as f64;
-        // Quiet flights say less of a lever arm, and show something else that stands in for it.
+        // Quiet flights say less of a lever arm or of a filter, and show something else that stands in for it.
         let by_stream = || causes.iter().filter(|entry| is_of_stream(entry.1, stream)).count() as f64;
-        let is_set = shared(of_those) || (one_arm(&of_all) && of_those > FEW_OF_ALL * causes.len() as f64 && shared(by_stream()));
+        let is_set = shared(of_those)
+            || ((one_arm(&of_all) || one_filter(&of_all, &columns))
+                && of_those > FEW_OF_ALL * causes.len() as f64
+                && shared(by_stream()));
+        filtered.extend(is_set.then_some(stream).flatten().filter(|_| one_filter(&of_all, &columns)).and_then(state_of));
         let found = if is_set {
             finding(&name, Severity::Fault, message, mend(&of_all, &columns).as_deref())
         } else {
@@ -80,13 +87,37 @@ pub(super) fn gathered(causes: &[(usize, Option<&[Cause]>)], outstanding: &BTree
             blamed.flights.extend(indices);
         }
     }
+    // What changes as filtered accelerations say looks early, and is not.
+    let is_early = |finding: &Finding| {
+        let late = finding.name.strip_prefix("late_").and_then(Column::from_name);
+        late.is_some_and(|column| filtered.contains(&stream_of(column)))
+    };
+    blamed.findings.retain(|finding| !is_early(finding));
     blamed
 }
 
-/// Whether something is wrong with this stream.
-fn is_of_stream(causes: Option<&[Cause]>, stream: Option<&str>) -> bool {
+/// The state that changes as accelerations say.
+fn state_of(accelerations: &'static str) -> Option<&'static str> {
+    match accelerations {
+        "linear accelerations" => Some("velocity"),
+        "angular accelerations" => Some("rates"),
+        _ => None,
+    }
+}
+
+/// Whether something is wrong with this stream, or with the state that changes as it says.
+fn is_of_stream(causes: Option<&[Cause]>, stream: Option<&'static str>) -> bool {
     let of = |cause: &Cause| cause.columns.first().map(|column| stream_of(*column));
-    causes.into_iter().flatten().any(|cause| of(cause) == stream)
+    let is_one = |cause: &Cause| of(cause) == stream || stream.and_then(state_of).is_some_and(|state| of(cause) == Some(state));
+    causes.into_iter().flatten().any(is_one)
+}
+
+/// Whether all are accelerations behind the same filter.
+fn one_filter(all: &[&Cause], columns: &[Column]) -> bool {
+    let time_s = |kind: &Kind| if let Kind::Filtered(time_s) = *kind { time_s } else { f64::INFINITY };
+    let usual_s = usual(all, time_s);
+    let is_usual = |cause: &&Cause| (time_s(&cause.kind) / usual_s).ln().abs() < SAME_FILTER.ln();
+    columns.iter().all(|column| Column::TARGETS.contains(column)) && usual_s.is_finite() && all.iter().all(is_usual)
 }
 
 /// Whether all are the same lever arm.

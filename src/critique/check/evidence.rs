@@ -4,13 +4,14 @@
 use super::clocks::Halves;
 use super::finding::{Finding, RELATIONS, Severity, finding};
 use super::forces::Forces;
-use super::gains::Gains;
+use super::gains::{Gains, ONE_SCALE};
 use super::increments::Motion;
 use super::mounts::{Mounts, Turns};
 use super::relations::Relation;
 use super::robust::median;
 use super::timing::Timing;
 use super::unexplained::Left;
+use crate::flight::Column;
 use std::collections::BTreeSet;
 
 /// Of the relation between rates and angular targets.
@@ -33,6 +34,8 @@ pub(super) const TIME_REVERSED: &str = "time_reversed";
 
 /// Of the finding on gains that are all alike.
 pub(super) const TIME_STEP: &str = "time_step";
+/// What accelerations were made with.
+pub(super) const TARGETS_STEP: &str = "targets_step";
 
 /// The accumulators of all checks that need no physics of the aircraft, and of the places of gravity.
 pub(super) struct Evidence {
@@ -116,7 +119,7 @@ impl Evidence {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }
-        let mut findings = with_position(time_step(without_consequences(findings)));
+        let mut findings = with_position(targets_step(time_step(without_consequences(findings))));
         let is_sound = |relation: &str| {
             let is_faulty = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.starts_with(relation);
             !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Severity::Fault)
@@ -176,6 +179,28 @@ fn time_step(findings: Vec<Finding>) -> Vec<Finding> {
     let set = format!("[columns] t = \"t * {times:.3}\", with the file's name");
     let others = findings.into_iter().filter(|finding| !RELATIONS.iter().any(|relation| finding.name.starts_with(relation)));
     std::iter::once(step(Severity::Fault, times, message, Some(&set))).chain(others).collect()
+}
+
+/// Six accelerations that are all off by the same factor were made with another time step, and the rest was not.
+fn targets_step(findings: Vec<Finding>) -> Vec<Finding> {
+    let is_gain = |finding: &Finding| {
+        let axis = |relation: &str| finding.name.strip_prefix(relation).is_some_and(|axis| !axis.is_empty());
+        axis(VELOCITY_TARGETS) || axis(RATE_TARGETS)
+    };
+    let off = findings.iter().filter(|finding| is_gain(finding) && finding.verdict == Severity::Fault);
+    let gains: Vec<f64> = off.filter_map(|finding| finding.measured).collect();
+    let mean = gains.iter().sum::<f64>() / gains.len() as f64;
+    if gains.len() < Column::TARGETS.len() || gains.iter().any(|gain| (gain / mean - 1.0).abs() > ONE_SCALE) {
+        return findings;
+    }
+    let message = format!(
+        "what changes does so {mean:.2} times as fast as all six accelerations say: they were made with a time step {mean:.2} times as long as it is"
+    );
+    let lines = Column::TARGETS.map(|column| format!("{0} = \"{mean:.4} * {0}\"", column.name())).join(", ");
+    let set = format!("[columns] {lines}, with the file's names");
+    let others = findings.into_iter().filter(|finding| !is_gain(finding));
+    let found = Finding { name: TARGETS_STEP.into(), ..step(Severity::Fault, mean, message, Some(&set)) };
+    std::iter::once(found).chain(others).collect()
 }
 
 fn step(verdict: Severity, times: f64, message: String, set: Option<&str>) -> Finding {

@@ -6,6 +6,7 @@
 use super::finding::{Finding, Severity, finding, unjudged};
 use super::increments::{Motion, Vector, length_s};
 use super::regression::{BlockRegression, Estimate};
+use super::told::plus;
 use super::unexplained::{self, Fit, Left};
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::{cross, rotate};
@@ -31,7 +32,7 @@ const FLAT: f64 = 0.3;
 /// How a message begins of a gain that no unit explains.
 pub(super) const FAR: &str = "the gain of this axis is far from 1";
 /// Gains of three axes that agree to this share are one scale.
-const ONE_SCALE: f64 = 0.03;
+pub(super) const ONE_SCALE: f64 = 0.03;
 
 /// How findings on offsets begin, and the name of that on the heading.
 pub(super) const OFFSET: &str = "offset_";
@@ -231,8 +232,7 @@ impl Gains {
             angle.abs().to_degrees(),
             if angle < 0.0 { "right" } else { "left" }
         );
-        let set =
-            format!("[columns] yaw = \"yaw {} {:.4}\", with the file's name", if angle < 0.0 { '-' } else { '+' }, angle.abs());
+        let set = format!("[columns] yaw = \"yaw {}\", with the file's name", plus(angle, 4));
         ((size - 1.0).abs() < WARNING_MARGIN).then(|| constant(HEADING, estimate, TURNED, "rad", says, set))
     }
 }
@@ -289,8 +289,7 @@ fn offset(column: &str, estimate: Estimate, least: f64, unit: &str) -> Finding {
     // What is regressed lacks it: the column less its offset is the rate.
     let (value, [low, high]) = (-estimate.value, [-estimate.interval[1], -estimate.interval[0]]);
     let says = format!("{column} has an offset of {value:.2} {unit} against the change of its state");
-    let sign = if value < 0.0 { '+' } else { '-' };
-    let set = format!("[columns] {column} = \"{column} {sign} {:.4}\", with the file's name", value.abs());
+    let set = format!("[columns] {column} = \"{column} {}\", with the file's name", plus(-value, 4));
     constant(&format!("{OFFSET}{column}"), Estimate { value, interval: [low, high] }, least, unit, says, set)
 }
 

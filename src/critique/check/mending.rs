@@ -57,24 +57,25 @@ pub fn mend(
 ) -> Option<Mending> {
     let is_of_use = |suggestion: &Suggestion| !suggestion.mends.is_empty();
     let suggestion = report.suggestion(&set.source).filter(is_of_use)?;
-    let mut made = Mending { suggestion, rounds: 1, report: None, set: None };
-    let Ok(mut again) = read(&made.suggestion.text) else { return Some(made) };
-    loop {
+    let Ok(first) = read(&suggestion.text) else { return Some(Mending { suggestion, rounds: 1, report: None, set: None }) };
+    let report = check(&first, model);
+    let (mut made, mut set, mut report, mut rounds) = (suggestion, first, report, 1);
+    while rounds < ROUNDS {
+        let next = report.suggestion(&set.source).filter(is_of_use).filter(|next| next.text != made.text);
+        // What cannot be read is not suggested, …
+        let Some((mut next, again)) = next.and_then(|next| read(&next.text).ok().map(|again| (next, again))) else { break };
         let seen = check(&again, model);
-        let next = if seen.fault { seen.suggestion(&again.source).filter(is_of_use) } else { None };
-        let open = faults(&seen);
-        (made.report, made.set) = (Some(seen), Some(again));
-        let next = next.filter(|next| made.rounds < ROUNDS && next.text != made.suggestion.text);
-        // What cannot be read is not suggested.
-        let Some((mut next, read)) = next.and_then(|next| read(&next.text).ok().map(|set| (next, set))) else {
-            made.suggestion.open.retain(|known| open.contains(&known.name));
-            return Some(made);
-        };
-        next.mends.splice(0..0, made.suggestion.mends);
-        made.suggestion = next;
-        made.rounds += 1;
-        again = read;
+        // … nor what brings a fault back where none is left.
+        if seen.fault && !report.fault {
+            break;
+        }
+        next.mends.splice(0..0, made.mends);
+        (made, set, report) = (next, again, seen);
+        rounds += 1;
     }
+    let open = faults(&report);
+    made.open.retain(|known| open.contains(&known.name));
+    Some(Mending { suggestion: made, rounds, report: Some(report), set: Some(set) })
 }
 
 fn faults(report: &CheckReport) -> Vec<String> {

@@ -7,7 +7,7 @@ use super::flights::{FEWEST, in_flights};
 use super::groups::{Of, apart};
 use super::robust::median;
 use super::sticks::{AXES, EXPLAINED, FIRST, Regressions, STICKS, Sticks};
-use super::told::short;
+use super::told::plus;
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
@@ -63,10 +63,7 @@ fn unmixed(ratios: &Ratios) -> String {
         let near = (2.0 * ratio).round() / 2.0;
         if (ratio - near).abs() < SIMPLE { near } else { ratio }
     };
-    let term = |([_, stick], ratio): &(Pair, f64)| {
-        let sign = if *ratio < 0.0 { '-' } else { '+' };
-        format!(" {sign} {} * {}", short(simple(ratio.abs())), STICKS[*stick])
-    };
+    let term = |([_, stick], ratio): &(Pair, f64)| format!(" {} * {}", plus(simple(*ratio), 4), STICKS[*stick]);
     let line = |axis: usize| {
         let terms: String = ratios.iter().filter(|(pair, _)| pair[0] == axis).map(term).collect();
         (!terms.is_empty()).then(|| format!("{} = \"{}{terms}\"", STICKS[axis], STICKS[axis]))

@@ -72,7 +72,7 @@ pub use timing::DelayProfile;
 
 use crate::flight::attitude::QuaternionOrder;
 use crate::flight::{Column, DataSet, Flight, Source, Targets};
-use crate::physics::Model;
+use crate::physics::{Model, Vehicle};
 use blame::Blamed;
 use evidence::Evidence;
 use finding::{RELATIONS, finding};
@@ -88,7 +88,7 @@ const LARGEST_OFF: f64 = 2.5;
 /// Share of the samples that may exceed it: glitches and full deflections are no other scale.
 const RARE_SHARE: f64 = 0.01;
 
-/// Checks conventions, timing and excitation of a data set. Of `model`, if there is one, only the control delay is used.
+/// Checks conventions, timing and excitation of a data set. Of `model`, if there is one, only the control delay and the kind of vehicle are used.
 ///
 /// Conventions: ṗ = R v; Ṙᵀ = Rᵀ × ω; recorded targets against the derivatives of v and ω; the force along x and y, which a
 /// rotor keeps small; and free coefficients of gravity and −ω × v, expected to be 1 (paper eq. 14). Intervals are 95 %, from blocks of
@@ -118,6 +118,11 @@ pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let Columns { excitation, collinearity, .. } = gathered.columns;
     findings.extend(excitation::findings(&excitation, &collinearity));
     findings.iter_mut().for_each(|finding| advice::heed(finding, &data.source));
+    // A battery that is put in anew trims a multirotor, which its models can carry (`trim_shift`).
+    if model.is_some_and(|model| model.vehicle == Vehicle::Multirotor) {
+        let of_trim = findings.iter_mut().filter(|finding| finding.name.starts_with(trims::TRIMMED_STICK));
+        of_trim.for_each(|finding| finding.verdict = Severity::Warning);
+    }
 
     CheckReport {
         fault: findings.iter().any(|finding| finding.verdict == Severity::Fault),
@@ -403,6 +408,7 @@ fn symptom(finding: Finding) -> Finding {
         gains::OFFSET,
         gains::HEADING,
         evidence::TIME_STEP,
+        evidence::TARGETS_STEP,
         evidence::TIME_REVERSED,
         mounts::NAME,
         "frozen_",

@@ -9,6 +9,7 @@ use super::finding::{Finding, Severity, finding};
 use super::increments::{Motion, Vector};
 use super::regression::{BlockRegression, Estimate};
 use super::robust::median;
+use super::told::plus;
 use crate::blocks::FEW_BLOCKS;
 use crate::flight::attitude::cross;
 
@@ -208,8 +209,7 @@ fn attitude(angle: Estimate, axis: usize) -> Finding {
 /// The line that takes angles off roll and pitch.
 fn levelled(by: Vector) -> String {
     let line = |(name, by): (&str, f64)| {
-        let sign = if by < 0.0 { '+' } else { '-' };
-        let angle = format!("{name} {sign} {:.4}", by.abs());
+        let angle = format!("{name} {}", plus(-by, 4));
         // There is no pitch beyond the vertical.
         if name == "pitch" { format!("{name} = \"clamp({angle}, -1.5707, 1.5707)\"") } else { format!("{name} = \"{angle}\"") }
     };
@@ -245,13 +245,8 @@ fn turned_back(angle: f64, axis: usize, with_targets: bool) -> String {
     let [next, last] = [(axis + 1) % 3, (axis + 2) % 3].map(|axis| AXES[axis]);
     let of = |end: &str| {
         let (one, other) = (format!("w{next}{end}"), format!("w{last}{end}"));
-        let sign = |factor: f64| if factor < 0.0 { '-' } else { '+' };
-        let size = sin.abs();
-        format!(
-            "{one} = \"{cos:.4} * {one} {} {size:.4} * {other}\", {other} = \"{cos:.4} * {other} {} {size:.4} * {one}\"",
-            sign(sin),
-            sign(-sin)
-        )
+        let [with, against] = [sin, -sin].map(|by| plus(by, 4));
+        format!("{one} = \"{cos:.4} * {one} {with} * {other}\", {other} = \"{cos:.4} * {other} {against} * {one}\"")
     };
     let ends = if with_targets { vec!["", "_dot"] } else { vec![""] };
     let columns: Vec<String> = ends.into_iter().map(of).collect();

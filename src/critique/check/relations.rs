@@ -109,6 +109,11 @@ const UNLEVEL: &str = "[columns] vx, vy, vz in body axes: turn them by pitch, th
 const OF_ANGLES: &str = "the rates are those of the angles roll, pitch and yaw (Euler rates), not about the axes of the body";
 const TO_BODY: &str = "[columns] wx = \"wx - wz * sin(pitch)\", wy = \"wy * cos(roll) + wz * sin(roll) * cos(pitch)\", wz = \"wz * cos(roll) * cos(pitch) - wy * sin(roll)\", with the file's names";
 
+const ENDS_EXCHANGED: &str = "roll and yaw are exchanged: yaw, pitch, roll in the place of roll, pitch, yaw";
+const YAW_ROLL: &str = "[columns] roll = \"yaw\", yaw = \"roll\", with the file's names";
+const OF_QUATERNION: &str = "the angles are x, y and z of a quaternion";
+const TO_ANGLES: &str = "[columns] roll = \"atan2(2 * (sqrt(max(0, 1 - roll^2 - pitch^2 - yaw^2)) * roll + pitch * yaw), 1 - 2 * (roll^2 + pitch^2))\", pitch = \"atan2(2 * (sqrt(max(0, 1 - roll^2 - pitch^2 - yaw^2)) * pitch - yaw * roll), sqrt(max(0, 1 - (2 * (sqrt(max(0, 1 - roll^2 - pitch^2 - yaw^2)) * pitch - yaw * roll))^2)))\", yaw = \"atan2(2 * (sqrt(max(0, 1 - roll^2 - pitch^2 - yaw^2)) * yaw + roll * pitch), 1 - 2 * (pitch^2 + yaw^2))\", with the file's names";
+
 /// Two columns of a vector in each other's place.
 const fn first_two([x, y, z]: Vector) -> Vector {
     [y, x, z]
@@ -154,6 +159,16 @@ fn of_wxyz(instant: &Instant) -> Matrix3 {
 
 fn of_xyzw(instant: &Instant) -> Matrix3 {
     reread(instant.angles, QuaternionOrder::ScalarLast)
+}
+
+/// R_b^in of a quaternion with scalar w ≥ 0 of which these are x, y, z.
+fn of_vector_part([x, y, z]: Vector) -> Matrix3 {
+    let w = (1.0 - dot([x, y, z], [x, y, z])).max(0.0).sqrt();
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ]
 }
 
 fn length(vector: Vector) -> f64 {
@@ -227,6 +242,8 @@ impl Relation {
             read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
             read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
             read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(first_two(i.angles)), i.velocity))),
+            read(ENDS_EXCHANGED, YAW_ROLL, at, |i| stack(rotate(&turned(outer_two(i.angles)), i.velocity))),
+            read(OF_QUATERNION, TO_ANGLES, at, |i| stack(rotate(&of_vector_part(i.angles), i.velocity))),
             read(XYZ.says, XYZ.set, at, |i| stack(rotate(&XYZ.rotation(i.angles), i.velocity))),
             read(XZY.says, XZY.set, at, |i| stack(rotate(&XZY.rotation(i.angles), i.velocity))),
             read(YXZ.says, YXZ.set, at, |i| stack(rotate(&YXZ.rotation(i.angles), i.velocity))),
@@ -291,6 +308,8 @@ impl Relation {
             read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
             read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
             read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(first_two(i.angles))), |i| turning(&turned(first_two(i.angles)), i.rates)),
+            read(ENDS_EXCHANGED, YAW_ROLL, |i| axes(&turned(outer_two(i.angles))), |i| turning(&turned(outer_two(i.angles)), i.rates)),
+            read(OF_QUATERNION, TO_ANGLES, |i| axes(&of_vector_part(i.angles)), |i| turning(&of_vector_part(i.angles), i.rates)),
             read(XYZ.says, XYZ.set, |i| axes(&XYZ.rotation(i.angles)), |i| turning(&XYZ.rotation(i.angles), i.rates)),
             read(XZY.says, XZY.set, |i| axes(&XZY.rotation(i.angles)), |i| turning(&XZY.rotation(i.angles), i.rates)),
             read(YXZ.says, YXZ.set, |i| axes(&YXZ.rotation(i.angles)), |i| turning(&YXZ.rotation(i.angles), i.rates)),

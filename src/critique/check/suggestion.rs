@@ -53,7 +53,14 @@ impl CheckReport {
             name == super::stamps::NAME
                 || [super::streams::SWAMPED_BY_NOISE, super::vibration::VIBRATES].iter().any(|begin| name.starts_with(begin))
         };
-        let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || is_worth_it(&finding.name);
+        // Controls that came late by more than is tried, or on a clock that runs away, are still late once they are moved.
+        let is_moved = ["late.controls", "drift.controls"].iter().any(|key| source.stated.contains_key(*key));
+        let is_rest = |finding: &Finding| {
+            is_moved
+                && finding.verdict == Severity::Warning
+                && finding.set.as_deref().is_some_and(|set| set.starts_with("[late] u"))
+        };
+        let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || is_worth_it(&finding.name) || is_rest(finding);
         let mut faults = self.findings.iter().filter(is_mended).peekable();
         faults.peek()?;
         let mut draft = Draft::new(self, source)?;
@@ -267,7 +274,7 @@ impl<'a> Draft<'a> {
             _ => self.stated.get("", key).is_none(),
         };
         match self.stated.get("", key) {
-            Some(old) if !is_free => Err(format!("dataset.toml states {key} = {old}, which {value} contradicts")),
+            Some(old) if !is_free && old != value => Err(format!("dataset.toml states {key} = {old}, which {value} contradicts")),
             _ => Ok(()),
         }
     }

@@ -100,7 +100,7 @@ fn uneven_time(all: &[&Cause]) -> String {
 }
 
 /// A ratio with the digits that count.
-pub(super) fn short(ratio: f64) -> String {
+fn short(ratio: f64) -> String {
     if ratio.abs() < 0.1 { format!("{ratio:.3e}") } else { format!("{ratio:.4}") }
 }
 
@@ -205,9 +205,17 @@ pub(super) fn told(all: &[&Cause], columns: &[Column]) -> String {
     }
 }
 
-/// The line that leaves accelerations of the file out, so that they are made of velocity and rates.
+/// A number as it is added in a formula: `+ 0.50`, `- 0.50`.
+pub(super) fn plus(number: f64, digits: usize) -> String {
+    let sign = if number < 0.0 { '-' } else { '+' };
+    format!("{sign} {:.digits$}", number.abs())
+}
+
+/// The line that leaves accelerations of the file out, so that they are made of velocity and rates. Angular ones then lack what is quick, which the sticks have,
+/// and a rotor that does not follow them would seem to lag.
 pub(super) fn derived_anew(names: &[&str]) -> String {
-    format!("ignore = {names:?}, missing = {names:?}")
+    let smooth = if names.contains(&Column::WxDot.name()) { ", smooth_controls = true" } else { "" };
+    format!("ignore = {names:?}, missing = {names:?}{smooth}")
 }
 
 /// A linear acceleration without what the arm r of its sensor gives it, v̇ − (ω̇ × r + ω × (ω × r)), as a line of `[columns]`.
@@ -223,10 +231,7 @@ fn centred(arm: Vector, axis: usize) -> String {
         (-t, format!("w{i} * w{k}")),
     ];
     // To a millimetre.
-    let of_arm = terms.iter().filter(|(by, _)| by.abs() >= 5e-4).map(|(by, rates)| {
-        let sign = if *by < 0.0 { '-' } else { '+' };
-        format!(" {sign} {:.3} * {rates}", by.abs())
-    });
+    let of_arm = terms.iter().filter(|(by, _)| by.abs() >= 5e-4).map(|(by, rates)| format!(" {} * {rates}", plus(*by, 3)));
     format!("v{i}_dot = \"v{i}_dot{}\"", of_arm.collect::<String>())
 }
 
@@ -247,11 +252,7 @@ pub(super) fn mend(all: &[&Cause], columns: &[Column]) -> Option<String> {
         }
         Kind::Off(_) => {
             let by = usual(all, |kind| if let Kind::Off(by) = kind { *by } else { 0.0 });
-            let sign = if by < 0.0 { '+' } else { '-' };
-            Some(format!(
-                "[columns] {}, with the file's name",
-                lines(&|name| format!("{name} = \"{name} {sign} {:.4}\"", by.abs()))
-            ))
+            Some(format!("[columns] {}, with the file's name", lines(&|name| format!("{name} = \"{name} {}\"", plus(-by, 4)))))
         }
         // An angle leaps where it goes round, and so would its rate.
         Kind::Filtered(_) if columns.iter().all(|column| ["rates", "velocity"].contains(&stream_of(*column))) => {

@@ -25,6 +25,12 @@ const AT_REST_S: f64 = 0.3;
 /// A trim differs from that of the others from here on, in units of the stick's usual deviation.
 const TRIMMED: f64 = 0.5;
 
+/// How findings begin of a stick that stands elsewhere in whole flights.
+pub(super) const TRIMMED_STICK: &str = "trim_u";
+
+/// In so many flights the same other trim is a fault.
+const MANY: usize = 3;
+
 /// A trim was moved where the same answer needs the stick elsewhere from a time on by this many usual deviations of it …
 const MOVED: f64 = 0.3;
 /// … that is so many times its interval, and leaves this part of the squared errors at most, …
@@ -83,7 +89,8 @@ fn longest_at(values: &[f64], value: f64) -> usize {
     values.chunk_by(|one, next| one == next).filter(|run| run[0] == value).map(<[f64]>::len).max().unwrap_or(0)
 }
 
-/// Flights in which the same answer needs the stick elsewhere than in the others. A centre of mass that lies elsewhere does the same, so it is a warning.
+/// Flights in which the same answer needs the stick elsewhere than in the others. A centre of mass that lies elsewhere does the same, so in a flight or two it is a
+/// warning; where many differ by the same, whatever it is, one model does not hold for both.
 fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -> Option<Finding> {
     let of = |(flight, regressions): &&(usize, Regressions)| {
         let estimates = regressions[stick].estimates()?;
@@ -103,7 +110,8 @@ fn trimmed(stick: usize, judged: &[&(usize, Regressions)], flights: &[Flight]) -
         by.abs(),
         if by > 0.0 { "higher" } else { "lower" }
     );
-    Some(Finding { verdict: Severity::Warning, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
+    let verdict = if indices.len() < MANY { Severity::Warning } else { Severity::Fault };
+    Some(Finding { verdict, ..in_flights(&format!("trim_{name}"), &indices, &message, flights) })
 }
 
 /// Flights in which the same answer needs the stick elsewhere from a time on. What shifts a centre of mass in flight does the same, so it is a warning.

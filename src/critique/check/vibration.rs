@@ -5,7 +5,7 @@ use super::finding::{Finding, Severity, finding};
 use super::flights::{MOST, named};
 use super::robust::median;
 use super::streams::{ANGULAR, LINEAR};
-use super::told::derived_anew;
+use super::told::{derived_anew, plus};
 use crate::flight::{Column, Flight, Targets};
 use std::f64::consts::{PI, TAU};
 
@@ -67,20 +67,24 @@ fn of_column(column: Column, flights: &[Flight]) -> Option<Finding> {
         "{place}{name} vibrates at {hz:.1} Hz, {amplitude:.2} {unit} up and down: a line in its spectrum, as of a rotor or a motor that shakes the sensor (faster \
          ones show at another frequency, by aliasing); no model removes it"
     );
-    let set = (share > MANY).then(|| mend(column, hz));
+    let set = (share > MANY).then(|| mend(column, hz, flights[0].step_s));
     Some(finding(&format!("{VIBRATES}{name}"), Severity::Warning, message, set.as_deref()))
 }
 
-/// A rate as the mean of two samples half a period apart, which come a quarter of it late; accelerations derived anew, with a low-pass.
-fn mend(column: Column, hz: f64) -> String {
+/// A rate through a filter of three taps m samples apart that is 0 at the line, ω₀ = 2π f: y_k = (w_k − 2 cos(m ω₀ Δt) w_{k−m} + w_{k−2m}) / (2 − 2 cos(m ω₀ Δt)),
+/// with m nearest to half a period, and late by exactly m samples; accelerations derived anew, with a low-pass.
+fn mend(column: Column, hz: f64, step_s: f64) -> String {
     let name = column.name();
     if let Some(stream) = [LINEAR, ANGULAR].iter().find(|stream| stream.contains(&column)) {
         return derived_anew(&stream.map(Column::name));
     }
-    let half_s = 0.5 / hz;
+    let apart_s = (0.5 / (hz * step_s)).round().max(1.0) * step_s;
+    let middle = -2.0 * (TAU * hz * apart_s).cos();
     format!(
-        "[late] {name} = {:.4}\n[columns] {name} = \"0.5 * {name} + 0.5 * delay({name}, {half_s:.4})\", with the file's name",
-        0.5 * half_s
+        "[late] {name} = {apart_s:.4}\n[columns] {name} = \"({name} {} * delay({name}, {apart_s:.4}) + delay({name}, {:.4})) / {:.4}\", with the file's name",
+        plus(middle, 4),
+        2.0 * apart_s,
+        2.0 + middle
     )
 }
 
