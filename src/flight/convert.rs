@@ -235,8 +235,6 @@ fn check_present(table: &RawTable, schema: &Schema, columns: &Columns) -> Result
 
 /// Largest roll that is taken as rad: one whole turn, should it be counted from 0 to 2π. Pitch ends at a right angle.
 const ANGLE_LIMITS: [(Column, f64); 2] = [(Column::Pitch, FRAC_PI_2), (Column::Roll, TAU)];
-/// So many steps tell how much faster angles change than rates say.
-const FEWEST_STEPS: usize = 30;
 /// Allowance for rounded angles, rad.
 const ANGLE_ROUNDING_RAD: f64 = 0.01;
 
@@ -253,6 +251,10 @@ fn refuse_degrees(table: &RawTable, schema: &Schema, columns: &Columns, step_s: 
             return Err(table.cell(row, &file_name(column), found, EXPECTED));
         }
     }
+    // A piece of a log that was read whole before may be too short, or too steep, to tell.
+    if !schema.cut_at_s.is_empty() {
+        return Ok(());
+    }
     for (angle, rate) in [(Column::Roll, Column::Wx), (Column::Pitch, Column::Wy)] {
         let (Some(angles), Some(rates)) = (columns.get(angle), columns.get(rate)) else { continue };
         // Regression of the angle's increments on the rate's and their correlation, at small tilt, where both agree.
@@ -266,7 +268,7 @@ fn refuse_degrees(table: &RawTable, schema: &Schema, columns: &Columns, step_s: 
         let slope = xy.abs() / xx;
         let in_degrees = 180.0 / PI;
         // Half to twice the factor, with the two moving as one.
-        if angles.len() > FEWEST_STEPS && slope > 0.5 * in_degrees && slope < 2.0 * in_degrees && xy * xy > 0.8 * xx * yy {
+        if slope > 0.5 * in_degrees && slope < 2.0 * in_degrees && xy * xy > 0.8 * xx * yy {
             let largest = (0..angles.len()).max_by(|&a, &b| angles[a].abs().total_cmp(&angles[b].abs())).unwrap_or(0);
             let found = format!(
                 "{}, and changes {slope:.0} times as fast as {} says, so it looks like degrees",

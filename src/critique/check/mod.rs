@@ -297,9 +297,13 @@ impl Gathered {
         if self.columns.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
             findings.extend(self.together.timing.offsets(0.0));
         } else {
-            findings.extend(self.together.halves.findings(&|stream| data.source.stated.contains_key(&format!("drift.{stream}"))));
+            let clocks = self.together.halves.findings(&|stream| data.source.stated.contains_key(&format!("drift.{stream}")));
+            let is_of_controls = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.ends_with(clocks::CONTROLS);
+            let has_clock = clocks.iter().any(is_of_controls);
+            findings.extend(clocks);
             findings.extend(odd::late_streams(&self.together.timing));
-            findings.extend(odd::late_controls(&self.together.timing));
+            // Of a clock that runs away the delay is a mean.
+            findings.extend(odd::late_controls(&self.together.timing).into_iter().filter(|_| !has_clock));
         }
         if self.misread { findings.into_iter().map(symptom).collect() } else { findings }
     }
