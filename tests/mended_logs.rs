@@ -7,6 +7,7 @@ mod corrupted;
 use corrupted::{Columns, Outcome, flights as some};
 use phyture::Error;
 use phyture::critique::check::{check, mend};
+use phyture::flight::attitude::euler_to_quaternion;
 use phyture::flight::read::{ReadOptions, data_set};
 use phyture::flight::write::data_set_csv;
 use phyture::flight::{Column, Flight};
@@ -107,6 +108,45 @@ fn rates_of_another_range_are_scaled_with_what_was_made_of_them() -> Outcome {
         }
     })?;
     assert_undone(&halved, &["wx = \"2", "wy = \"2", "wz = \"2", "wx_dot = \"", "wy_dot = \"", "wz_dot = \""])
+}
+
+#[test]
+fn accelerations_made_with_another_time_step_are_scaled_all_six() -> Outcome {
+    let halved = flights(|columns| {
+        for column in Column::TARGETS {
+            columns[column as usize].iter_mut().for_each(|value| *value *= 0.5);
+        }
+    })?;
+    assert_undone(&halved, &["vx_dot = \"", "vy_dot = \"", "vz_dot = \"", "wx_dot = \"", "wy_dot = \"", "wz_dot = \""])
+}
+
+#[test]
+fn controls_that_are_later_than_is_tried_are_moved_once_more() -> Outcome {
+    let late = flights(|columns| {
+        for control in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = columns[control as usize].clone();
+            columns[control as usize] = (0..values.len()).map(|row| values[row.saturating_sub(15)]).collect();
+        }
+    })?;
+    let text = mended(&late)?;
+    let moved = text.lines().find_map(|line| line.strip_prefix("controls = ")).ok_or_else(|| text.clone())?;
+    assert!((moved.parse::<f64>()? - 0.15).abs() < 0.005, "{text}");
+    Ok(())
+}
+
+#[test]
+fn angles_in_another_order_and_parts_of_a_quaternion_are_read_as_an_attitude() -> Outcome {
+    let exchanged = flights(|columns| columns.swap(Column::Roll as usize, Column::Yaw as usize))?;
+    assert_undone(&exchanged, &["roll = \"yaw\"", "yaw = \"roll\""])?;
+    let parts = flights(|columns| {
+        three(columns, ATTITUDE, |[roll, pitch, yaw]| {
+            let [x, y, z, w] = euler_to_quaternion(roll, pitch, yaw);
+            [x, y, z].map(|part| part * w.signum())
+        });
+    })?;
+    let text = mended(&parts)?;
+    assert!(text.contains("\nroll = \"atan2(2 * (sqrt(max(0, 1 - roll^2"), "{text}");
+    Ok(())
 }
 
 /// Three columns at once become three others.

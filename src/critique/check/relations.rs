@@ -222,6 +222,8 @@ impl Relation {
             None => vec![
                 read(MADE_OF_WXYZ, FROM_QUATERNION, at, |i| stack(rotate(&of_wxyz(i), i.velocity))),
                 read(MADE_OF_XYZW, FROM_QUATERNION, at, |i| stack(rotate(&of_xyzw(i), i.velocity))),
+                read(ENDS_EXCHANGED, YAW_ROLL, at, |i| stack(rotate(&turned(outer_two(i.angles)), i.velocity))),
+                read(OF_QUATERNION, TO_ANGLES, at, |i| stack(rotate(&of_vector_part(i.angles), i.velocity))),
             ],
         };
         Self::new("position_rate", "p' = R v", |motion| motion.position && motion.heading, [vec![
@@ -242,8 +244,6 @@ impl Relation {
             read("vy and vz are exchanged", "[columns] vy = \"vz\", vz = \"vy\", with the file's names", at, |i| stack(rotate(&i.rotation, last_two(i.velocity)))),
             read("vx and vz are exchanged", "[columns] vx = \"vz\", vz = \"vx\", with the file's names", at, |i| stack(rotate(&i.rotation, outer_two(i.velocity)))),
             read(EXCHANGED, ROLL_PITCH, at, |i| stack(rotate(&turned(first_two(i.angles)), i.velocity))),
-            read(ENDS_EXCHANGED, YAW_ROLL, at, |i| stack(rotate(&turned(outer_two(i.angles)), i.velocity))),
-            read(OF_QUATERNION, TO_ANGLES, at, |i| stack(rotate(&of_vector_part(i.angles), i.velocity))),
             read(XYZ.says, XYZ.set, at, |i| stack(rotate(&XYZ.rotation(i.angles), i.velocity))),
             read(XZY.says, XZY.set, at, |i| stack(rotate(&XZY.rotation(i.angles), i.velocity))),
             read(YXZ.says, YXZ.set, at, |i| stack(rotate(&YXZ.rotation(i.angles), i.velocity))),
@@ -287,6 +287,8 @@ impl Relation {
             None => vec![
                 read(MADE_OF_WXYZ, FROM_QUATERNION, |i| axes(&of_wxyz(i)), |i| turning(&of_wxyz(i), i.rates)),
                 read(MADE_OF_XYZW, FROM_QUATERNION, |i| axes(&of_xyzw(i)), |i| turning(&of_xyzw(i), i.rates)),
+                read(ENDS_EXCHANGED, YAW_ROLL, |i| axes(&turned(outer_two(i.angles))), |i| turning(&turned(outer_two(i.angles)), i.rates)),
+                read(OF_QUATERNION, TO_ANGLES, |i| axes(&of_vector_part(i.angles)), |i| turning(&of_vector_part(i.angles), i.rates)),
             ],
         };
         Self::new("attitude_rate", "dR'/dt = R' x w", |motion| motion.heading, [vec![
@@ -308,8 +310,6 @@ impl Relation {
             read("wy and wz are exchanged", "[columns] wy = \"wz\", wz = \"wy\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, last_two(i.rates))),
             read("wx and wz are exchanged", "[columns] wx = \"wz\", wz = \"wx\", with the file's names", |i| axes(&i.rotation), |i| turning(&i.rotation, outer_two(i.rates))),
             read(EXCHANGED, ROLL_PITCH, |i| axes(&turned(first_two(i.angles))), |i| turning(&turned(first_two(i.angles)), i.rates)),
-            read(ENDS_EXCHANGED, YAW_ROLL, |i| axes(&turned(outer_two(i.angles))), |i| turning(&turned(outer_two(i.angles)), i.rates)),
-            read(OF_QUATERNION, TO_ANGLES, |i| axes(&of_vector_part(i.angles)), |i| turning(&of_vector_part(i.angles), i.rates)),
             read(XYZ.says, XYZ.set, |i| axes(&XYZ.rotation(i.angles)), |i| turning(&XYZ.rotation(i.angles), i.rates)),
             read(XZY.says, XZY.set, |i| axes(&XZY.rotation(i.angles)), |i| turning(&XZY.rotation(i.angles), i.rates)),
             read(YXZ.says, YXZ.set, |i| axes(&YXZ.rotation(i.angles)), |i| turning(&YXZ.rotation(i.angles), i.rates)),
@@ -575,5 +575,27 @@ impl Hypothesis {
             ((change - predicted).powi(2), change.powi(2))
         });
         sums.fold((0.0, 0.0), |sum, term| (sum.0 + term.0, sum.1 + term.1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formula::{Formula, Value};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn angles_made_of_the_parts_of_a_quaternion_mean_its_attitude(x in -0.57..0.57_f64, y in -0.57..0.57_f64, z in -0.57..0.57_f64) {
+            let value = |name: &str| match name { "roll" => x, "pitch" => y, _ => z };
+            let angles: Vec<f64> = TO_ANGLES.split('"').skip(1).step_by(2).map(|text| {
+                let formula = Formula::parse(text).expect("a formula");
+                formula.evaluate(1, 0.01, &|name: &str| Some(Value::from(value(name)))).expect("a value")[0]
+            }).collect();
+            let meant = turned([angles[0], angles[1], angles[2]]);
+            for (meant, is) in meant.as_flattened().iter().zip(of_vector_part([x, y, z]).as_flattened()) {
+                prop_assert!((meant - is).abs() < 1e-7, "{meant} {is}");
+            }
+        }
     }
 }
