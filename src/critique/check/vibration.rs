@@ -65,7 +65,7 @@ fn of_column(column: Column, flights: &[Flight]) -> Option<Finding> {
     let place = if is_set { String::new() } else { format!("in {}: ", named(&names)) };
     let message = format!(
         "{place}{name} vibrates at {hz:.1} Hz, {amplitude:.2} {unit} up and down: a line in its spectrum, as of a rotor or a motor that shakes the sensor (faster \
-         ones show at another frequency, by aliasing); no model removes it"
+         ones show at another frequency, by aliasing); no model removes it, a filter can"
     );
     let set = (share > MANY).then(|| mend(column, hz, flights[0].step_s));
     Some(finding(&format!("{VIBRATES}{name}"), Severity::Warning, message, set.as_deref()))
