@@ -16,6 +16,8 @@ const LEAST: f64 = 0.15;
 /// No aircraft is so cross-coupled in all flights that another stick does this part of what the own one does, on two axes or more.
 const AS_MUCH: f64 = 0.4;
 
+/// Groups are about as large where the smaller one is this part of the other.
+const AS_MANY: f64 = 0.7;
 /// As near to a half or to a whole number a ratio is that.
 const SIMPLE: f64 = 0.05;
 
@@ -34,7 +36,7 @@ pub(super) fn findings(sticks: &Sticks, flights: &[Flight], except: &BTreeSet<us
         |[axis, stick]: Pair| -> Vec<Of> { judged.iter().filter_map(|(flight, all)| cross(*flight, all, axis, stick)).collect() };
     let of_some: Vec<(Pair, Vec<usize>, f64)> = OF_SWASH_PLATE
         .into_iter()
-        .filter_map(|pair| apart(ratios(pair), LEAST).map(|(fewer, by)| (pair, fewer, by)))
+        .filter_map(|pair| odd(ratios(pair)).map(|(flights, by)| (pair, flights, by)))
         // One flight may be flown so.
         .filter(|entry| entry.1.len() >= FEWEST)
         .collect();
@@ -70,6 +72,22 @@ fn unmixed(ratios: &Ratios) -> String {
     };
     let lines: Vec<String> = (0..STICKS.len()).filter_map(line).collect();
     format!("[columns] {}, with the file's names", lines.join(", "))
+}
+
+/// The flights in which a ratio is another than in the rest, and by how much: the fewer, or of about as many those in which it is farther from 0, as no swash plate
+/// mixes by itself.
+fn odd(ratios: Vec<Of>) -> Option<(Vec<usize>, f64)> {
+    let all: Vec<(usize, f64)> = ratios.iter().map(|one| (one.flight, one.value)).collect();
+    let (fewer, by) = apart(ratios, LEAST)?;
+    let is_own = |one: &&(usize, f64)| fewer.contains(&one.0);
+    let own = median(all.iter().filter(is_own).map(|one| one.1).collect())?;
+    let mut others: Vec<usize> = all.iter().filter(|one| !is_own(one)).map(|one| one.0).collect();
+    // `by` is from the others to these.
+    if fewer.len() as f64 <= AS_MANY * others.len() as f64 || own.abs() >= (own - by).abs() {
+        return Some((fewer, by));
+    }
+    others.sort_unstable();
+    Some((others, -by))
 }
 
 /// Flights in which the ratio of a pair is another than in the rest; those of the same flights in one finding.
