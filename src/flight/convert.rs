@@ -251,7 +251,7 @@ fn refuse_degrees(table: &RawTable, schema: &Schema, columns: &Columns, step_s: 
             return Err(table.cell(row, &file_name(column), found, EXPECTED));
         }
     }
-    // A piece of a log that was read whole before may be too short, or too steep, to tell.
+    // A piece may be too short, or too steep, to tell how fast; where it is cut is known of a log that was read whole.
     if !schema.cut_at_s.is_empty() {
         return Ok(());
     }
