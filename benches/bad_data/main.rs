@@ -27,6 +27,7 @@ mod seventh;
 mod sixth;
 mod sound;
 mod tables;
+mod tenth;
 mod third;
 mod words;
 

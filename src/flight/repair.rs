@@ -1,6 +1,6 @@
 //! Known-bad cells of sensor columns, bridged by rules that the dataset description states, and counted. Nothing else is mended.
 
-use super::schema::{Longer, Repair, Schema};
+use super::schema::{Between, Longer, Repair, Schema};
 use super::table::RawTable;
 use crate::error::Result;
 use crate::formula::Value;
@@ -15,7 +15,7 @@ pub(super) struct Repaired {
     pub cut: Vec<bool>,
 }
 
-/// Applies the rules: runs of bad cells up to the rule's length are interpolated linearly between their good neighbours; bad
+/// Applies the rules: runs of bad cells up to the rule's length are interpolated between their good neighbours; bad
 /// cells that cannot be (longer runs, ends of the record) become NaN, to be refused if a row in use holds them.
 ///
 /// Returns what was found and done, in words, and the rows at which a rule cuts the flight.
@@ -23,7 +23,8 @@ pub(super) struct Repaired {
 /// # Errors
 /// [`Error::Cell`](crate::Error::Cell) if a rule's column is not in the file.
 pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Result<Repaired> {
-    let (mut found, mut bridged, mut left, mut longest) = (0, Vec::new(), Vec::new(), 0);
+    let (mut found, mut left, mut longest) = (0, Vec::new(), 0);
+    let mut bridged: [Vec<String>; 2] = Default::default();
     let mut cut = vec![false; table.columns.first().map_or(0, Vec::len)];
     for rule in &schema.repairs {
         let places: Vec<usize> = rule.columns.iter().map(|name| place(table, name)).collect::<Result<_>>()?;
@@ -40,11 +41,11 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
             if let Some(least) = rule.spike {
                 spikes(values, least).for_each(|row| bad[row] = true);
             }
-            let count = bridge(values, &bad, rule.max_gap_s / step_s, schema.turn_of(name));
+            let count = bridge(values, &bad, rule.max_gap_s / step_s, schema.turn_of(name), rule.between);
             found += count.found;
             longest = longest.max(count.longest_bridged);
             if count.bridged > 0 {
-                bridged.push(format!("{} of `{name}`", count.bridged));
+                bridged[rule.between as usize].push(format!("{} of `{name}`", count.bridged));
             }
             if rule.longer == Longer::Cut {
                 count.left.iter().for_each(|run| cut[run.clone()].fill(true));
@@ -58,9 +59,9 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
         return Ok(Repaired { note: None, cut });
     }
     let mut sentences = Vec::new();
-    if !bridged.is_empty() {
-        let longest_s = longest as f64 * step_s;
-        sentences.push(format!("bad cells interpolated linearly, longest run {longest_s:.3} s: {}", bridged.join(", ")));
+    let longest_s = longest as f64 * step_s;
+    for (bridged, how) in bridged.iter().zip(["linearly", "by a cubic"]).filter(|(bridged, _)| !bridged.is_empty()) {
+        sentences.push(format!("bad cells interpolated {how}, longest run {longest_s:.3} s: {}", bridged.join(", ")));
     }
     if !left.is_empty() {
         sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
@@ -104,39 +105,101 @@ struct Count {
 }
 
 /// Bridges runs of at most `longest` samples; in a column in which a `turn` is nothing, the short way round.
-fn bridge(values: &mut [f64], bad: &[bool], longest: f64, turn: Option<f64>) -> Count {
+fn bridge(values: &mut [f64], bad: &[bool], longest: f64, turn: Option<f64>, between: Between) -> Count {
     let mut count = Count::default();
+    // The good cell before the one at the start of a run.
+    let mut earlier: Option<(usize, f64)> = None;
     let mut start = 0;
     while let Some(offset) = bad[start..].iter().position(|&bad| bad) {
         let first = start + offset;
         let length = bad[first..].iter().position(|&bad| !bad).unwrap_or(bad.len() - first);
         let end = first + length;
         count.found += length;
+        earlier = if offset > 1 { Some((first - 2, values[first - 2])) } else { earlier };
         // A hundredth of a sample for the rounding of the quotient.
         if first > 0 && end < values.len() && length as f64 <= longest + 0.01 {
-            let (before, after) = (values[first - 1], values[end]);
-            let change = turn.map_or(after - before, |turn| after - before - turn * ((after - before) / turn).round());
-            for (step, value) in values[first..end].iter_mut().enumerate() {
-                *value = before + change * (step + 1) as f64 / (length + 1) as f64;
-            }
+            let before = values[first - 1];
+            let beyond = (end + 1..bad.len()).find(|&row| !bad[row]).map(|row| (row, values[row]));
+            let shape = match between {
+                Between::Line => Shape::line(first - 1, before, end, values[end], turn),
+                Between::Cubic => Shape::line(first - 1, before, end, values[end], turn).curved(earlier, beyond, turn),
+            };
+            (first..end).for_each(|row| values[row] = shape.at(row));
             count.bridged += length;
             count.longest_bridged = count.longest_bridged.max(length);
         } else {
             values[first..end].fill(f64::NAN);
             count.left.push(first..end);
         }
+        earlier = first.checked_sub(1).map(|row| (row, values[row]));
         start = end;
     }
     count
 }
 
+/// The short way from one value to another.
+fn change(from: f64, to: f64, turn: Option<f64>) -> f64 {
+    turn.map_or(to - from, |turn| to - from - turn * ((to - from) / turn).round())
+}
+
+/// What lies between two good cells: a cubic with a slope at each end (Hermite).
+#[derive(Clone, Copy, Debug)]
+struct Shape {
+    first: usize,
+    value: f64,
+    rows: f64,
+    change: f64,
+    /// A row.
+    slopes: [f64; 2],
+}
+
+impl Shape {
+    fn line(first: usize, value: f64, last: usize, end: f64, turn: Option<f64>) -> Self {
+        let (rows, change) = ((last - first) as f64, change(value, end, turn));
+        Self { first, value, rows, change, slopes: [change / rows; 2] }
+    }
+
+    /// With the slope at each end of the parabola through it, the other end and the good cell beyond; where there is none beyond, as it was.
+    fn curved(mut self, earlier: Option<(usize, f64)>, beyond: Option<(usize, f64)>, turn: Option<f64>) -> Self {
+        let own = self.change / self.rows;
+        let slope = |other: f64, rows: f64| (own * rows + other * self.rows) / (self.rows + rows);
+        if let Some((row, value)) = earlier {
+            let rows = (self.first - row) as f64;
+            self.slopes[0] = slope(change(value, self.value, turn) / rows, rows);
+        }
+        if let Some((row, value)) = beyond {
+            let rows = row as f64 - self.first as f64 - self.rows;
+            self.slopes[1] = slope(change(self.value + self.change, value, turn) / rows, rows);
+        }
+        self
+    }
+
+    fn at(&self, row: usize) -> f64 {
+        let t = (row - self.first) as f64 / self.rows;
+        let [from, to] = self.slopes.map(|slope| slope * self.rows - self.change);
+        // What the slopes add to the straight line.
+        let bend = t * (1.0 - t) * ((1.0 - t) * from - t * to);
+        self.value + self.change * t + bend
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn rule(columns: &[&str]) -> Repair {
         let columns = columns.iter().map(|&name| name.to_owned()).collect();
-        Repair { columns, valid: Vec::new(), held: false, zero: false, spike: None, max_gap_s: 0.02, longer: Longer::Error }
+        Repair {
+            columns,
+            valid: Vec::new(),
+            held: false,
+            zero: false,
+            spike: None,
+            max_gap_s: 0.02,
+            between: Between::Line,
+            longer: Longer::Error,
+        }
     }
 
     fn with(rule: Repair) -> Schema {
@@ -191,6 +254,37 @@ mod tests {
         assert!(near, "{:?}", table.columns[0]);
         assert_eq!(table.columns[1][1], 0.0, "yaw was there");
         Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn a_cubic_is_exact_for_parabolas_at_any_spacing_and_a_line_for_lines(
+            [bend, slope, start] in [-2.0..2.0_f64, -3.0..3.0, -1.0..1.0],
+            gaps in prop::collection::vec(1..6_usize, 4..12),
+        ) {
+            let good: Vec<usize> = gaps.iter().scan(0, |row, gap| { *row += gap; Some(*row) }).collect();
+            let rows = good[good.len() - 1] + 1;
+            let bad: Vec<bool> = (0..rows).map(|row| !good.contains(&row)).collect();
+            for (between, bend) in [(Between::Line, 0.0), (Between::Cubic, bend)] {
+                let truth = |row: usize| start + slope * row as f64 + bend * (row * row) as f64;
+                let mut values: Vec<f64> = (0..rows).map(|row| if bad[row] { 99.0 } else { truth(row) }).collect();
+                bridge(&mut values, &bad, 6.0, None, between);
+                // The first and the last gap have a slope from one side alone.
+                for row in good[1]..good[good.len() - 2] {
+                    prop_assert!((values[row] - truth(row)).abs() < 1e-9 * (1.0 + truth(row).abs()), "{between:?} {row}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_cubic_goes_the_short_way_round_the_turn() {
+        let turn = std::f64::consts::TAU;
+        let truth = |row: usize| (2.0 + 0.12 * row as f64) % turn;
+        let bad: Vec<bool> = (0..41).map(|row| row % 8 != 0).collect();
+        let mut values: Vec<f64> = (0..41).map(|row| if bad[row] { 0.0 } else { truth(row) }).collect();
+        bridge(&mut values, &bad, 8.0, Some(turn), Between::Cubic);
+        assert!((0..41).all(|row| change(values[row], truth(row), Some(turn)).abs() < 1e-9), "{values:?}");
     }
 
     #[test]

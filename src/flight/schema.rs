@@ -27,7 +27,7 @@
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
-//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly; `longer = "cut"`: where more of them follow each other the flight is cut |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly, or with `between = "cubic"`; `longer = "cut"`: where more of them follow each other the flight is cut |
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::{Axes, QuaternionOrder};
@@ -92,8 +92,24 @@ pub(crate) struct Repair {
     pub spike: Option<f64>,
     /// Longest run of bad cells that is bridged, s.
     pub max_gap_s: f64,
+    /// What a run is bridged by.
+    pub between: Between,
     /// What is done with a longer one.
     pub longer: Longer,
+}
+
+/// What bridges a run of bad cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Between {
+    /// A straight line between the good cells at its ends.
+    #[default]
+    Line,
+    /// A cubic through them, with the slopes that the next good cells beyond give: for streams that are slow beside what they tell of.
+    Cubic,
+}
+
+impl Between {
+    const NAMES: [(&'static str, Self); 2] = [("line", Self::Line), ("cubic", Self::Cubic)];
 }
 
 /// What is done with a run of bad cells that is too long to be bridged.
@@ -473,9 +489,10 @@ fn repairs(keys: &mut Keys, place: &str) -> Result<Vec<Repair>> {
                 "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
             return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
         };
+        let between = rule.choice("between", &Between::NAMES)?.unwrap_or_default();
         let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
         rule.finish()?;
-        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, longer });
+        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, between, longer });
     }
     Ok(repairs)
 }

@@ -27,6 +27,19 @@ pub struct Source {
     pub left_out: Vec<String>,
 }
 
+impl Source {
+    /// Whether the description moves all controls in time.
+    pub fn moves_controls(&self) -> bool {
+        ["late.controls", "drift.controls"].iter().any(|key| self.stated.contains_key(*key))
+    }
+
+    /// Whether the description makes roll or pitch by taking something off it, or adding something.
+    pub fn shifts_attitude(&self) -> bool {
+        let shifts = |text: &String| [" + ", " - "].iter().any(|sign| text.contains(sign));
+        ["columns.roll", "columns.pitch"].iter().any(|key| self.stated.get(*key).is_some_and(shifts))
+    }
+}
+
 #[cfg(feature = "files")]
 mod digest {
     use super::Source;

@@ -2,7 +2,7 @@
 //! is done in `critique::diagnose`.
 
 use crate::critique::check::{self, CheckReport};
-use crate::critique::diagnose::{self, Amended, Diagnosis, Options, Outcome, Verdict, searched};
+use crate::critique::diagnose::{self, Amended, Diagnosis, Mends, Options, Outcome, Verdict, searched};
 use crate::critique::floor_of_spans;
 use crate::error::Result;
 use crate::flight::split::Split;
@@ -39,7 +39,8 @@ impl SearchTask<'_> {
     /// As [`diagnose::diagnose`].
     pub fn diagnose(&self, model: &Model) -> Result<Outcome> {
         let (searched, locked) = (searched(self.split), &self.split.test);
-        let mut outcome = diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options)?;
+        let mut outcome =
+            diagnose::diagnose(&self.set.flights, model, &searched, locked, self.split.tested.name(), &self.options())?;
         self.label(&mut outcome.diagnosis)?;
         diagnose::weigh(&mut outcome.diagnosis, &self.set.flights, &outcome.model, self.split)?;
         Ok(outcome)
@@ -50,7 +51,7 @@ impl SearchTask<'_> {
     /// # Errors
     /// As [`diagnose::amend`]; those of `heard`.
     pub fn amend(&self, model: &Model, heard: &mut dyn FnMut(usize, &Diagnosis) -> Result<()>) -> Result<Amended> {
-        diagnose::amend(&self.set.flights, model, self.split, &self.options, &mut |round, diagnosis| {
+        diagnose::amend(&self.set.flights, model, self.split, &self.options(), &mut |round, diagnosis| {
             self.label(diagnosis)?;
             heard(round, diagnosis)
         })
@@ -65,6 +66,11 @@ impl SearchTask<'_> {
         let mut together = diagnose::together(&self.set.flights, before, amended, self.split)?;
         self.label(&mut together)?;
         Ok(together)
+    }
+
+    /// With what the description of these flights mends.
+    fn options(&self) -> Options {
+        Options { mends: Mends::of(&self.set.source), ..self.options.clone() }
     }
 
     /// Notes what the search does not know: the hash of the files and the floor.

@@ -9,6 +9,9 @@ const GROWS_S: f64 = 0.03;
 /// The same where it is stated that the stream has a clock of its own: what is left of it is no chance.
 const STILL_GROWS_S: f64 = 0.005;
 
+/// What the sticks act late by beside a stated clock is taken for where it began from so much on, s: they are moved to between samples then.
+const LEAST_START_S: f64 = 0.0005;
+
 /// The sticks, as a stream.
 pub(super) const CONTROLS: &str = "controls";
 /// How the findings begin.
@@ -74,6 +77,24 @@ fn stream(of: &str) -> &'static str {
     }
 }
 
+/// Where a clock of the sticks is stated, what they act late by on the whole is where it began.
+pub(super) fn began(delay: &mut Finding) {
+    let Some((measured, interval)) = delay.measured.zip(delay.interval) else { return };
+    let of_model_s = delay.expected.unwrap_or(0.0);
+    let [low, high] = interval.map(|end| end - of_model_s);
+    let late_s = measured - of_model_s;
+    if late_s.abs() < LEAST_START_S || low <= 0.0 && high >= 0.0 {
+        return;
+    }
+    let way = if late_s > 0.0 { "late" } else { "early" };
+    delay.verdict = Severity::Warning;
+    delay.message = format!(
+        "beside the clock that is stated the controls act {:.1} ms {way}: where that clock began, or a delay of the machine, which no flight tells apart",
+        1e3 * late_s.abs()
+    );
+    delay.set = Some(format!("[late] controls = {:.4}", -late_s));
+}
+
 fn grown(first: &Finding, second: &Finding, apart_s: f64, is_stated: &dyn Fn(&str) -> bool) -> Option<Finding> {
     let half = |finding: &Finding| Some(0.5 * (finding.interval?[1] - finding.interval?[0]));
     let by = second.measured? - first.measured?;
@@ -106,4 +127,36 @@ fn grown(first: &Finding, second: &Finding, apart_s: f64, is_stated: &dyn Fn(&st
         unit: "s".into(),
         ..found
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn delay(measured: f64, of_model_s: Option<f64>) -> Finding {
+        let finding = finding(
+            "control_delay",
+            Severity::Ok,
+            "controls act this late".into(),
+            Some("control_delay_s = 0.006 under [data] in the model file"),
+        );
+        Finding { measured: Some(measured), interval: Some([measured - 0.001, measured + 0.001]), expected: of_model_s, ..finding }
+    }
+
+    #[test]
+    fn what_the_sticks_act_late_by_beside_a_stated_clock_is_where_it_began() {
+        for (measured, of_model_s, set) in [
+            (0.006, None, Some("[late] controls = -0.0060")),
+            (-0.004, None, Some("[late] controls = 0.0040")),
+            (0.026, Some(0.02), Some("[late] controls = -0.0060")),
+            (0.02, Some(0.02), None),
+            (0.0008, None, None),
+        ] {
+            let mut finding = delay(measured, of_model_s);
+            began(&mut finding);
+            let moved = finding.set.as_deref().filter(|set| set.starts_with("[late]"));
+            assert_eq!(moved, set, "{measured}, {of_model_s:?}");
+            assert_eq!(finding.verdict == Severity::Warning, set.is_some());
+        }
+    }
 }

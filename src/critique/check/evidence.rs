@@ -41,7 +41,7 @@ pub(super) const TARGETS_STEP: &str = "targets_step";
 pub(super) struct Evidence {
     pub relations: [Relation; 5],
     gains: Gains,
-    mounts: Mounts,
+    pub mounts: Mounts,
     pub forces: Forces,
     pub timing: Timing,
     pub halves: Halves,

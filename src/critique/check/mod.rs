@@ -112,8 +112,11 @@ const RARE_SHARE: f64 = 0.01;
 /// ```
 pub fn check(data: &DataSet, model: Option<&Model>) -> CheckReport {
     let gathered = Gathered::new(data);
-    let (delay, control_delay) = gathered.together.timing.control_delay(model.map(|model| model.data.control_delay_s));
+    let (mut delay, control_delay) = gathered.together.timing.control_delay(model.map(|model| model.data.control_delay_s));
     let mut findings = gathered.findings(data);
+    if data.source.stated.contains_key("drift.controls") {
+        clocks::began(&mut delay);
+    }
     findings.push(delay);
     let Columns { excitation, collinearity, .. } = gathered.columns;
     findings.extend(excitation::findings(&excitation, &collinearity));
@@ -293,6 +296,9 @@ impl Gathered {
         findings.extend(places(self.together.forces.coefficients(), unsure));
         let rest = data.flights.iter().enumerate().filter(|(flight, _)| !self.except.contains(flight));
         findings.extend(plausibility(&rest.map(|entry| entry.1).collect::<Vec<_>>()));
+        if data.source.shifts_attitude() {
+            findings.extend(self.together.mounts.still_tilted());
+        }
         // A stream that is held is late by half of its rest: that is said already.
         if self.columns.poor.iter().any(|finding| finding.name.starts_with(streams::HELD)) {
             findings.extend(self.together.timing.offsets(0.0));
@@ -303,7 +309,8 @@ impl Gathered {
             findings.extend(clocks);
             findings.extend(odd::late_streams(&self.together.timing));
             // Of a clock that runs away the delay is a mean.
-            findings.extend(odd::late_controls(&self.together.timing).into_iter().filter(|_| !has_clock));
+            let is_moved = data.source.stated.contains_key("late.controls");
+            findings.extend(odd::late_controls(&self.together.timing, is_moved).into_iter().filter(|_| !has_clock));
         }
         if self.misread { findings.into_iter().map(symptom).collect() } else { findings }
     }

@@ -15,6 +15,8 @@ use crate::flight::attitude::cross;
 
 /// A sensor that sits turned by so much, rad, is not mounted as meant.
 const TURNED: f64 = 0.05;
+/// The same of an attitude that the description levels: what is left of that is no way of mounting.
+const STILL_TURNED: f64 = 0.002;
 /// Share of the error that is left at most where a turn is its cause.
 const CONVINCING_SHARE: f64 = 0.5;
 /// Two estimates of one angle differ at most by this share of it.
@@ -22,6 +24,8 @@ const ALIKE: f64 = 0.5;
 
 /// Of the finding.
 pub(super) const NAME: &str = "mounts";
+/// Of the one on what levelling left.
+pub(super) const STILL: &str = "still_tilted";
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const RATES: &str = "rates";
@@ -140,6 +144,24 @@ impl Mounts {
     /// The angles.
     pub fn turns(&self) -> Turns {
         [&self.velocity, &self.rates].map(turn)
+    }
+
+    /// What is left of an attitude that the description levels. An offset of an angle is no turn, but to first order: so the first estimate of a large one is off.
+    pub fn still_tilted(&self) -> Option<Finding> {
+        let turns: Vec<Turn> = self.turns().into_iter().flatten().collect();
+        let width = |angle: &Estimate| angle.interval[1] - angle.interval[0];
+        let angle = |axis: usize| {
+            let angles = turns.iter().map(|turn| turn.angles[axis]);
+            let best = angles.min_by(|one, other| width(one).total_cmp(&width(other)))?;
+            let [low, high] = best.interval;
+            (best.value.abs() > STILL_TURNED && (low > 0.0 || high < 0.0)).then_some(best)
+        };
+        let angles = [angle(0), angle(1)];
+        let largest = angles.iter().flatten().max_by(|one, other| one.value.abs().total_cmp(&other.value.abs()))?;
+        let by = std::array::from_fn(|axis| angles.get(axis).copied().flatten().map_or(0.0, |angle| angle.value));
+        let [roll, pitch, _] = by.map(f64::to_degrees);
+        let message = format!("levelled as dataset.toml says, roll is still off by {roll:.2}°, pitch by {pitch:.2}°");
+        Some(Finding { name: STILL.into(), ..of_angle(*largest, Severity::Warning, message, Some(levelled(by))) })
     }
 
     /// What is turned, or that nothing is; nothing is said of a stream in which a column is known to be read wrongly, as `sound` says of velocity and

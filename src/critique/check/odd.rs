@@ -127,17 +127,24 @@ pub(super) fn late_streams(timing: &Timing) -> Vec<Finding> {
 }
 
 /// Controls of all flights that are recorded after they act, where the axes are explained by them: a loop that is closed fast does not explain them.
-pub(super) fn late_controls(timing: &Timing) -> Vec<Finding> {
+/// `is_moved` says that the description moves them as one already: what two of them are still late by is late in all.
+pub(super) fn late_controls(timing: &Timing, is_moved: bool) -> Vec<Finding> {
     let sticks = timing.sticks();
     let late: Vec<&Finding> =
         sticks.iter().filter(|finding| finding.measured.is_some_and(|at_s| at_s < 0.0) && contradicts(finding)).collect();
-    if late.len() < 2 || late.len() < sticks.len() {
+    let by = late.iter().filter_map(|finding| finding.measured);
+    let [least, most] = [by.clone().fold(0.0, f64::min), by.fold(f64::NEG_INFINITY, f64::max)];
+    let is_rest = is_moved && most - least <= SAME_S;
+    if late.len() < 2 || late.len() < sticks.len() && !is_rest {
         return late.into_iter().map(late_alone).collect();
     }
     let mean_s = -late.iter().filter_map(|finding| finding.measured).sum::<f64>() / late.len() as f64;
     let message = format!("the controls come late: they are recorded {:.0} ms after they act", 1e3 * mean_s);
     vec![finding("controls_late", Severity::Fault, message, Some(&format!("[late] controls = {mean_s:.3}")))]
 }
+
+/// Delays of sticks that are one delay differ at most by this, s.
+const SAME_S: f64 = 0.01;
 
 /// A stick that is late where others are in step. Physics that the model lacks can lead it as well: an induced flow that overshoots gives its thrust
 /// before the stick has moved all the way, and a pilot's hand answers what nothing explains yet. So a short delay is a warning.

@@ -253,12 +253,16 @@ pub(super) fn resampled(flights: &[Flight], slow: &[Column], rate_hz: f64) -> Op
     (!is_lost).then(|| format!("resample_hz = {rate_hz:.3}"))
 }
 
-/// The line that joins samples of a slower stream by straight lines, beside faster ones. A stick may well have rested.
+/// The line that joins samples of a slower stream, beside faster ones. A stick may well have rested.
 fn bridged(slow: &[Column], held_s: f64) -> Option<String> {
     let names: Vec<&str> = slow.iter().map(|column| column.name()).collect();
     let is_stick = slow.iter().any(|column| CONTROLS.contains(column));
     let longest_s = 1.5 * held_s;
-    (!is_stick).then(|| format!("[[repair]] columns = {names:?}, held = true, max_gap_s = {longest_s:.3}, with the file's names"))
+    (!is_stick).then(|| {
+        format!(
+            "[[repair]] columns = {names:?}, held = true, max_gap_s = {longest_s:.3}, between = \"cubic\", with the file's names"
+        )
+    })
 }
 
 /// The step to which a column is rounded, in each flight where it is, and the flights that tell.

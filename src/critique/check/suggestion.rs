@@ -53,12 +53,12 @@ impl CheckReport {
             name == super::stamps::NAME
                 || [super::streams::SWAMPED_BY_NOISE, super::vibration::VIBRATES].iter().any(|begin| name.starts_with(begin))
         };
-        // Controls that came late by more than is tried, or on a clock that runs away, are still late once they are moved.
-        let is_moved = ["late.controls", "drift.controls"].iter().any(|key| source.stated.contains_key(*key));
+        // What a first estimate leaves: of controls that came late by more than is tried, of a clock that runs away, of a large tilt.
+        let is_moved = source.moves_controls();
+        let moves_sticks = |set: &str| ["[late] u", "[late] controls"].iter().any(|begin| set.starts_with(begin));
         let is_rest = |finding: &Finding| {
-            is_moved
-                && finding.verdict == Severity::Warning
-                && finding.set.as_deref().is_some_and(|set| set.starts_with("[late] u"))
+            let is_of_sticks = is_moved && finding.set.as_deref().is_some_and(moves_sticks);
+            finding.verdict == Severity::Warning && (is_of_sticks || finding.name == super::mounts::STILL)
         };
         let is_mended = |finding: &&Finding| finding.verdict == Severity::Fault || is_worth_it(&finding.name) || is_rest(finding);
         let mut faults = self.findings.iter().filter(is_mended).peekable();

@@ -29,6 +29,7 @@ mod joint;
 mod judged;
 mod known;
 mod ladder;
+mod mends;
 mod own;
 mod refine;
 mod report;
@@ -50,6 +51,7 @@ mod watch;
 
 pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
+pub use mends::Mends;
 pub use own::{Met, met};
 pub use report::{
     Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Influence, Kept, Locked, Method, Number,

@@ -1,6 +1,7 @@
 //! What every part of a search works with: the options, the flights in blocks, the sign flips. The two roads are in `forward` and `backward`.
 
 use super::engine::Engine;
+use super::mends::Mends;
 use super::significance::Flips;
 use super::watch::Watch;
 
@@ -16,13 +17,15 @@ pub struct Options {
     pub without: Vec<String>,
     /// Whether a loop, once nothing of the catalogue is left, also tries the formulas that the rest of the error suggests.
     pub formulas: bool,
+    /// What the description of the flights mends: what that leaves is not named.
+    pub mends: Mends,
     /// Follows the search, and may stop it.
     pub watch: Watch,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { max_effects: None, seed: 1, without: Vec::new(), formulas: false, watch: Watch::default() }
+        Self { max_effects: None, seed: 1, without: Vec::new(), formulas: false, mends: Mends::default(), watch: Watch::default() }
     }
 }
 

@@ -279,7 +279,8 @@ impl Search<'_> {
             });
             let effect = found.model.effect(&found.step.effect)?;
             let stands = !unknown.is_empty() && stands_in(effect, &found.channels, &shares, unknown);
-            stands.then_some(STANDS_IN).or_else(|| doubt(&effect.kind, &found.channels, &shares, &variance))
+            let of_mends = || self.options.mends.doubt(effect, ground.flights.first()?.step_s);
+            stands.then_some(STANDS_IN).or_else(of_mends).or_else(|| doubt(&effect.kind, &found.channels, &shares, &variance))
         };
         Ok(Unfounded(found.iter().filter_map(|found| Some((found.step.effect.clone(), why(found)?))).collect()))
     }
