@@ -1,7 +1,7 @@
 //! From lines of cases to the tables that are reported.
 
 use crate::change::{Corruption, Part};
-use crate::run::{CLEAN_HALF, CONVENTION_FAULT, HALVES, Line, NULL, UNCORRUPTED, read};
+use crate::run::{CLEAN_HALF, CONVENTION_FAULT, HALVES, Line, Mended, NULL, UNCORRUPTED, read};
 use phyture::Result;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -14,6 +14,8 @@ struct Judged<'a> {
     corruption: &'a Corruption,
     line: &'a Line,
     clean: &'a Line,
+    /// The same without the flights that are hit.
+    rest: Option<&'a Line>,
 }
 
 impl Judged<'_> {
@@ -23,22 +25,29 @@ impl Judged<'_> {
 
     /// Whether the corruption has an effect: a fault, other words, other effects, or another error.
     fn changes(&self) -> bool {
-        self.differs(&self.line.verdict, &self.line.accepted, &self.line.rmse)
+        Self::differs(self.clean, &self.line.verdict, &self.line.accepted, &self.line.rmse)
     }
 
-    fn differs(&self, verdict: &str, accepted: &[String], rmse: &[Option<f64>]) -> bool {
+    /// What the flights as they are once mended are to be held against: where some are left out, the others alone.
+    fn sound(&self, mended: &Mended) -> &'a Line {
+        self.rest.filter(|_| mended.description.contains("leave_out")).unwrap_or(self.clean)
+    }
+
+    fn differs(clean: &Line, verdict: &str, accepted: &[String], rmse: &[Option<f64>]) -> bool {
         let sorted = |names: &[String]| names.iter().cloned().collect::<BTreeSet<_>>();
-        let other_error = rmse.iter().zip(&self.clean.rmse).any(|pair| match pair {
+        let other_error = rmse.iter().zip(&clean.rmse).any(|pair| match pair {
             (Some(with), Some(without)) => (with / without).ln().abs() > OTHER_ERROR.ln(),
             _ => false,
         });
-        verdict != self.clean.verdict || sorted(accepted) != sorted(&self.clean.accepted) || other_error
+        verdict != clean.verdict || sorted(accepted) != sorted(&clean.accepted) || other_error
     }
 
     /// Whether all is as without the corruption once what is printed is set.
     fn is_mended(&self) -> bool {
         let mended = self.line.mended.as_ref();
-        mended.is_some_and(|mended| mended.is_free && !self.differs(&mended.verdict, &mended.accepted, &mended.rmse))
+        mended.is_some_and(|mended| {
+            mended.is_free && !Self::differs(self.sound(mended), &mended.verdict, &mended.accepted, &mended.rmse)
+        })
     }
 
     /// Whether the right cause stands first of all that is said.
@@ -49,15 +58,15 @@ impl Judged<'_> {
 
     /// Effects that are neither hidden nor named without the corruption.
     fn is_false(&self) -> bool {
-        self.has_false(&self.line.accepted)
+        self.has_false(self.clean, &self.line.accepted)
     }
 
     fn is_false_once_mended(&self) -> bool {
-        self.line.mended.as_ref().is_some_and(|mended| self.has_false(&mended.accepted))
+        self.line.mended.as_ref().is_some_and(|mended| self.has_false(self.sound(mended), &mended.accepted))
     }
 
-    fn has_false(&self, accepted: &[String]) -> bool {
-        accepted.iter().any(|name| *name != self.line.hidden && !self.clean.accepted.contains(name))
+    fn has_false(&self, clean: &Line, accepted: &[String]) -> bool {
+        accepted.iter().any(|name| *name != self.line.hidden && !clean.accepted.contains(name))
     }
 
     fn hides(&self) -> bool {
@@ -74,14 +83,15 @@ impl Judged<'_> {
 /// Prints the tables of a file of cases.
 pub fn print(path: &Path) -> Result<()> {
     let lines = read(path)?;
-    let clean: BTreeMap<(u64, &str), &Line> =
-        lines.iter().filter(|line| line.half == UNCORRUPTED).map(|line| ((line.seed, line.hidden.as_str()), line)).collect();
+    let sound = lines.iter().filter(|line| line.half == UNCORRUPTED);
+    let sound: BTreeMap<(u64, &str, &str), &Line> =
+        sound.map(|line| ((line.seed, line.hidden.as_str(), line.part.as_str()), line)).collect();
     for (half, corruptions) in HALVES {
         // In the order of the list.
         let own = |corruption: &'static Corruption| {
             lines.iter().filter(move |line| line.half == half && line.corruption == corruption.id).filter_map(|line| {
-                let clean = clean.get(&(line.seed, line.hidden.as_str())).copied()?;
-                Some(Judged { corruption, line, clean })
+                let of = |part: &str| sound.get(&(line.seed, line.hidden.as_str(), part)).copied();
+                Some(Judged { corruption, line, clean: of("")?, rest: of(&line.part) })
             })
         };
         let cases: Vec<Judged<'_>> = corruptions.iter().flat_map(own).collect();
@@ -184,10 +194,10 @@ fn uncorrupted(lines: &[Line]) {
     for (half, metric) in
         [(CLEAN_HALF, "no fault claimed, clean sets"), (UNCORRUPTED, "no fault claimed, flights before corruption")]
     {
-        let own = of(half);
+        let own: Vec<_> = of(half).into_iter().filter(|line| line.part.is_empty()).collect();
         row(metric, "≥ 98 %", (own.iter().filter(|line| line.faults.is_empty()).count(), own.len()));
     }
-    let before = of(UNCORRUPTED);
+    let before: Vec<_> = of(UNCORRUPTED).into_iter().filter(|line| line.part.is_empty()).collect();
     let hidden: Vec<_> = before.iter().filter(|line| line.hidden != NULL).collect();
     row(
         "hidden effect found before corruption",

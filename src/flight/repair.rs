@@ -270,8 +270,9 @@ mod tests {
                 let mut values: Vec<f64> = (0..rows).map(|row| if bad[row] { 99.0 } else { truth(row) }).collect();
                 bridge(&mut values, &bad, 6.0, None, between);
                 // The first and the last gap have a slope from one side alone.
-                for row in good[1]..good[good.len() - 2] {
-                    prop_assert!((values[row] - truth(row)).abs() < 1e-9 * (1.0 + truth(row).abs()), "{between:?} {row}");
+                let whole = good[1]..good[good.len() - 2];
+                for (row, value) in values.iter().enumerate().filter(|(row, _)| whole.contains(row)) {
+                    prop_assert!((value - truth(row)).abs() < 1e-9 * (1.0 + truth(row).abs()), "{between:?} {row}");
                 }
             }
         }
