@@ -44,6 +44,24 @@ fn controls_with_a_clock_of_their_own_are_moved_back_by_a_drift() -> Outcome {
 }
 
 #[test]
+fn where_a_clock_began_has_a_line_of_its_own() -> Outcome {
+    let slow = flights(|columns| {
+        for control in [Column::U1, Column::U2, Column::U3, Column::U4] {
+            let values = columns[control as usize].clone();
+            let ahead = |row: usize| values[(row + row / 150 + 2).min(values.len() - 1)];
+            columns[control as usize] = (0..values.len()).map(ahead).collect();
+        }
+    })?;
+    let text = mended(&slow)?;
+    let numbers: Vec<f64> = text.lines().filter_map(|line| line.strip_prefix("controls = ")?.parse().ok()).collect();
+    let [drift, late] = numbers[..] else { return Err(text.into()) };
+    // Two samples ahead, and half of one on the average of those that are joined by their nearest sample.
+    assert!(text.contains("[drift]") && text.contains("[late]"), "{text}");
+    assert!((drift + 1.0 / 150.0).abs() < 4e-4 && (late + 0.02).abs() < 0.01, "{text}");
+    Ok(())
+}
+
+#[test]
 fn rates_behind_a_filter_are_led_by_their_own_change() -> Outcome {
     let filtered = flights(|columns| {
         for rate in [Column::Wx, Column::Wy, Column::Wz] {
@@ -74,7 +92,7 @@ fn assert_undone(flights: &[Flight], lines: &[&str]) -> Outcome {
 }
 
 #[test]
-fn an_attitude_that_is_held_beside_faster_streams_is_joined_by_lines() -> Outcome {
+fn an_attitude_that_is_held_beside_faster_streams_is_joined_by_cubics() -> Outcome {
     let held = flights(|columns| {
         for angle in ATTITUDE {
             for chunk in columns[angle as usize].chunks_mut(10) {
@@ -83,7 +101,7 @@ fn an_attitude_that_is_held_beside_faster_streams_is_joined_by_lines() -> Outcom
             }
         }
     })?;
-    assert_undone(&held, &["columns = [\"roll\", \"pitch\", \"yaw\"]", "held = true"])
+    assert_undone(&held, &["columns = [\"roll\", \"pitch\", \"yaw\"]", "held = true", "between = \"cubic\""])
 }
 
 #[test]
@@ -218,12 +236,16 @@ fn an_accelerometer_off_the_centre_is_moved_there() -> Outcome {
 #[test]
 fn an_attitude_that_is_not_level_is_levelled() -> Outcome {
     let tilted = flights(|columns| {
-        // A pitch ends at the vertical.
-        columns[Column::Pitch as usize].iter_mut().for_each(|value| *value = (*value + 0.09).min(1.57));
+        // Some are beyond the vertical then.
+        columns[Column::Pitch as usize].iter_mut().for_each(|value| *value += 0.09);
         columns[Column::Roll as usize].iter_mut().for_each(|value| *value -= 0.07);
     })?;
-    // A flight that stays at that end for a while is left out.
     let text = mended(&tilted)?;
     assert!(text.contains("pitch = \"clamp(pitch - 0.0") && text.contains("roll = \"roll + 0.0"), "{text}");
+    // All that is taken off pitch, in one round or two.
+    let pitch = text.lines().find_map(|line| line.strip_prefix("pitch = ")).unwrap_or_default();
+    let angle = |part: &str| part.split([',', '"', ')']).next().unwrap_or_default().parse::<f64>();
+    let taken: f64 = pitch.split(" - ").skip(1).map(angle).sum::<Result<f64, _>>()?;
+    assert!((taken - 0.09).abs() < 0.004, "{text}");
     Ok(())
 }

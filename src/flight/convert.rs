@@ -233,8 +233,9 @@ fn check_present(table: &RawTable, schema: &Schema, columns: &Columns) -> Result
     Err(missing(table, first.name(), &expected))
 }
 
-/// Largest roll that is taken as rad: one whole turn, should it be counted from 0 to 2π. Pitch ends at a right angle.
-const ANGLE_LIMITS: [(Column, f64); 2] = [(Column::Pitch, FRAC_PI_2), (Column::Roll, TAU)];
+/// Largest angles that are taken as rad. Roll: one whole turn, should it be counted from 0 to 2π. Pitch: a right angle, and by how much a sensor may be off
+/// level, which `check` names.
+const ANGLE_LIMITS: [(Column, f64); 2] = [(Column::Pitch, FRAC_PI_2 + 0.3), (Column::Roll, TAU)];
 /// Allowance for rounded angles, rad.
 const ANGLE_ROUNDING_RAD: f64 = 0.01;
 
