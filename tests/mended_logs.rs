@@ -92,6 +92,16 @@ fn assert_undone(flights: &[Flight], lines: &[&str]) -> Outcome {
 }
 
 #[test]
+fn rates_of_another_sensitivity_are_scaled_alone() -> Outcome {
+    let scaled = flights(|columns| {
+        for column in RATES {
+            columns[column as usize].iter_mut().for_each(|value| *value *= 1.14);
+        }
+    })?;
+    assert_undone(&scaled, &["wx = \"0.877", "wy = \"0.877", "wz = \"0.877"])
+}
+
+#[test]
 fn an_attitude_that_is_held_beside_faster_streams_is_joined_by_cubics() -> Outcome {
     let held = flights(|columns| {
         for angle in ATTITUDE {

@@ -18,7 +18,7 @@ struct Judged<'a> {
     rest: Option<&'a Line>,
 }
 
-impl Judged<'_> {
+impl<'a> Judged<'a> {
     fn is_fault(&self) -> bool {
         self.line.verdict == CONVENTION_FAULT
     }

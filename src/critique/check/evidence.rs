@@ -4,7 +4,7 @@
 use super::clocks::Halves;
 use super::finding::{Finding, RELATIONS, Severity, finding};
 use super::forces::Forces;
-use super::gains::{Gains, ONE_SCALE};
+use super::gains::{AXES, FAR, Gains, ONE_SCALE};
 use super::increments::Motion;
 use super::mounts::{Mounts, Turns};
 use super::relations::Relation;
@@ -26,8 +26,9 @@ const OTHER_TIME: f64 = 0.2;
 /// … and this near to each other say that the time runs otherwise.
 const SAME: f64 = 0.1;
 
-/// Of the relation between position and velocity.
+/// Of the relation between position and velocity, and between attitude and rates.
 const POSITION_RATE: &str = "position_rate";
+const ATTITUDE_RATE: &str = "attitude_rate";
 
 /// Of the finding on a time that runs backward.
 pub(super) const TIME_REVERSED: &str = "time_reversed";
@@ -36,6 +37,16 @@ pub(super) const TIME_REVERSED: &str = "time_reversed";
 pub(super) const TIME_STEP: &str = "time_step";
 /// What accelerations were made with.
 pub(super) const TARGETS_STEP: &str = "targets_step";
+
+/// A vector that is scaled.
+pub(super) const SCALE: &str = "scale_";
+/// What both the state of a vector and its own change say it is scaled by is no error of either relation from so far on: ten times what a sensor is calibrated
+/// to.
+const SCALED: f64 = 0.05;
+type Between = (&'static str, &'static str, &'static str, [&'static str; 3]);
+/// Vectors between two relations: of its state, and of its change.
+const BETWEEN: [(&str, &str, &str, [&str; 3]); 2] =
+    [("velocity", POSITION_RATE, VELOCITY_TARGETS, ["vx", "vy", "vz"]), ("rates", ATTITUDE_RATE, RATE_TARGETS, ["wx", "wy", "wz"])];
 
 /// The accumulators of all checks that need no physics of the aircraft, and of the places of gravity.
 pub(super) struct Evidence {
@@ -119,7 +130,7 @@ impl Evidence {
                 findings.extend(self.gains.findings(relation.name, least_explained));
             }
         }
-        let mut findings = with_position(targets_step(time_step(without_consequences(findings))));
+        let mut findings = with_position(scaled(targets_step(time_step(without_consequences(findings)))));
         let is_sound = |relation: &str| {
             let is_faulty = |finding: &Finding| finding.verdict == Severity::Fault && finding.name.starts_with(relation);
             !findings.iter().any(|finding| is_faulty(finding) || finding.name == TIME_STEP && finding.verdict == Severity::Fault)
@@ -201,6 +212,47 @@ fn targets_step(findings: Vec<Finding>) -> Vec<Finding> {
     let others = findings.into_iter().filter(|finding| !is_gain(finding));
     let found = Finding { name: TARGETS_STEP.into(), ..step(Severity::Fault, mean, message, Some(&set)) };
     std::iter::once(found).chain(others).collect()
+}
+
+/// A vector whose three columns are all the same factor too large for what they are the change of, and for what is their change: a scale of its own, as that
+/// of counts that were read with the sensitivity of another sensor. Where a unit or another reading is named already, nothing is added.
+fn scaled(findings: Vec<Finding>) -> Vec<Finding> {
+    let of = |(vector, of_state, of_change, columns): Between| {
+        let gains = |relation: &str| AXES.map(|axis| findings.iter().find(|finding| finding.name == format!("{relation}_{axis}")));
+        let own = [gains(of_state), gains(of_change)];
+        let off: Vec<f64> = own.iter().flatten().filter_map(|finding| scale(finding.as_ref()?)).collect();
+        let factors: Vec<f64> = off.iter().enumerate().map(|(place, gain)| if place < 3 { *gain } else { 1.0 / gain }).collect();
+        let mean = factors.iter().sum::<f64>() / factors.len() as f64;
+        let is_one = factors.len() == 6 && factors.iter().all(|factor| (factor / mean - 1.0).abs() < ONE_SCALE);
+        is_one.then(|| {
+            let message = format!(
+                "{vector} ({}) are {:.3} times what both the change of their state and their own change say: a scale, as of a sensor of another sensitivity",
+                columns.join(", "),
+                1.0 / mean
+            );
+            let lines = columns.map(|column| format!("{column} = \"{mean:.4} * {column}\"")).join(", ");
+            let set = format!("[columns] {lines}, with the file's names");
+            Finding { name: format!("{SCALE}{vector}"), ..step(Severity::Fault, mean, message, Some(&set)) }
+        })
+    };
+    let found: Vec<Finding> = BETWEEN.into_iter().filter_map(of).collect();
+    found.into_iter().chain(findings.iter().cloned()).collect()
+}
+
+/// Gains that a scale explains say nothing more. Those of single flights stay: they are held against those of others.
+pub(super) fn without_scaled(findings: Vec<Finding>) -> Vec<Finding> {
+    let is_scaled = |vector: &str| findings.iter().any(|finding| finding.name == format!("{SCALE}{vector}"));
+    let relations: Vec<&str> =
+        BETWEEN.into_iter().filter(|between| is_scaled(between.0)).flat_map(|between| [between.1, between.2]).collect();
+    let is_gain = |name: &str| relations.iter().any(|relation| name.strip_prefix(relation).is_some_and(|axis| !axis.is_empty()));
+    findings.into_iter().filter(|finding| !is_gain(&finding.name)).collect()
+}
+
+/// A gain that is certainly off 1 by more than a sensor's, and of which no unit is named.
+fn scale(gain: &Finding) -> Option<f64> {
+    let (value, [low, high]) = gain.measured.zip(gain.interval)?;
+    let is_unit = gain.verdict == Severity::Fault && !gain.message.contains(FAR);
+    (!is_unit && value > 0.0 && (low > 1.0 + SCALED || high < 1.0 - SCALED)).then_some(value)
 }
 
 fn step(verdict: Severity, times: f64, message: String, set: Option<&str>) -> Finding {

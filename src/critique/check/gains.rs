@@ -38,7 +38,8 @@ pub(super) const ONE_SCALE: f64 = 0.03;
 pub(super) const OFFSET: &str = "offset_";
 pub(super) const HEADING: &str = "heading";
 
-const AXES: [&str; 3] = ["x", "y", "z"];
+/// As they end the names of gains.
+pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// Accumulates the gains over flights.
 pub(super) struct Gains {

@@ -265,7 +265,7 @@ impl Gathered {
     fn findings(&self, data: &DataSet) -> Vec<Finding> {
         let mut findings = vec![origin(&data.flights)];
         findings.extend(self.columns.poor.iter().chain(&self.odd).cloned());
-        findings.extend(self.together.kinematics(0.0));
+        findings.extend(evidence::without_scaled(self.together.kinematics(0.0)));
         // Of the attitude the relations know more than the force does.
         let is_read = |finding: &Finding| finding.verdict == Severity::Fault && RELATIONS[..2].contains(&finding.name.as_str());
         let known: Vec<Option<String>> =
@@ -420,6 +420,7 @@ fn symptom(finding: Finding) -> Finding {
         gains::HEADING,
         evidence::TIME_STEP,
         evidence::TARGETS_STEP,
+        evidence::SCALE,
         evidence::TIME_REVERSED,
         mounts::NAME,
         "frozen_",

@@ -3,7 +3,7 @@
 
 use super::causes::{self, Cause};
 use super::clocks::{self, CLOCK};
-use super::evidence::Evidence;
+use super::evidence::{Evidence, SCALE};
 use super::finding::{Finding, RELATIONS, Severity, Subject, finding};
 use super::flights::{FEWEST, MOST, WIDER, in_flights};
 use super::increments::{Motion, SHORT_BLOCK_S, TOGETHER};
@@ -187,7 +187,8 @@ impl Odd {
         let turned: BTreeSet<usize> = each.iter().filter(is_turned).map(|own| own.flight).collect();
         // By name, so that clocks come before delays of the controls and of single sticks.
         let mut drifts = false;
-        for (name, mut of_flights) in by_name {
+        // What a flight says by itself of a scale, it says of each axis.
+        for (name, mut of_flights) in by_name.into_iter().filter(|(name, _)| !name.starts_with(SCALE)) {
             // A mount that all share is no fault of one.
             of_flights
                 .retain(|(flight, finding)| name != mounts::NAME || finding.verdict != Severity::Fault || turned.contains(flight));
