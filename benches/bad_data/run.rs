@@ -37,9 +37,9 @@ pub struct Plan {
     pub every: usize,
 }
 
-/// What is reported. Seeds 80000 to 80002, 83000 to 83006, 85000 to 85018 and 85501 to 85515, with clean sets 81000 to 81399, 84000 to 84399, 86100 to 86499 and
-/// 86600 to 86999, were spent: looked at before the checks were as they are.
-pub const REPORTED: Plan = Plan { seeds: 85_516..85_526, clean: 400, every: 1 };
+/// What is reported. Seeds 80000 to 80002, 83000 to 83006, 85000 to 85018 and 85501 to 85515, with clean sets 81000 to 81399, 84000 to 84399, 86100 to 86499, 86600 to
+/// 86999 and 87100 to 87499, were spent: looked at before the checks were as they are.
+pub const REPORTED: Plan = Plan { seeds: 88_000..88_010, clean: 400, every: 1 };
 /// On which checks are tuned.
 pub const DEVELOPMENT: Plan = Plan { seeds: 500..502, clean: 400, every: 1 };
 /// Some minutes.
