@@ -12,6 +12,7 @@ use crate::words::{
     spans, with_each_sample,
 };
 use phyture::flight::Column;
+use phyture::flight::attitude::rotate;
 use std::f64::consts::{PI, TAU};
 
 // Lists of words are not one word a line.
@@ -651,7 +652,7 @@ pub const TENTH: &[Corruption] = &[
         parts: [All, Half],
         change: Columns(|log, _| {
             with_each_sample(log, |log, sample| {
-                let turned = times(&body_to_inertial(log, sample), log.vector(VELOCITY, sample));
+                let turned = rotate(&body_to_inertial(log, sample), log.vector(VELOCITY, sample));
                 log.set_vector(VELOCITY, sample, turned);
             });
         }),
@@ -843,9 +844,4 @@ fn turned(angle: f64) -> f64 {
 /// 1 or -1.
 const fn side(chance: &mut Chance) -> f64 {
     if chance.uniform() < 0.5 { -1.0 } else { 1.0 }
-}
-
-/// A matrix times a vector.
-fn times(matrix: &[[f64; 3]; 3], vector: [f64; 3]) -> [f64; 3] {
-    matrix.map(|row| row.iter().zip(vector).map(|(one, other)| one * other).sum())
 }
