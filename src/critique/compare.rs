@@ -69,10 +69,10 @@ pub struct Comparison {
     pub target: Targets,
     /// Where the windows come from.
     pub split: Part,
-    /// Whether some model has numbers of each flight: flights that no fit has seen are then judged on their second halves, those numbers being
-    /// found from the first; noted by whoever has the models.
+    /// Whether some model has numbers of each flight: each half of a flight that no fit has seen is then judged with numbers that are found from
+    /// its other half; noted by whoever has the models.
     #[serde(default)]
-    pub own_from_first_half: bool,
+    pub own_from_other_half: bool,
     /// Samples from one window to the next, the same for all models.
     #[serde(default = "one")]
     pub stride: usize,
@@ -173,7 +173,7 @@ pub fn compare(flights: &[Flight], windows: &[Window], rows: &[Row], split: Part
         models,
         target: if derived { Targets::Derived } else { Targets::Recorded },
         split,
-        own_from_first_half: false,
+        own_from_other_half: false,
         stride: 1,
         blocks: groups.blocks.len(),
         floor: None,

@@ -82,8 +82,8 @@ impl Comparison {
 
     fn what_is_compared(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", wrapped("", &self.basis()))?;
-        if self.own_from_first_half {
-            writeln!(f, "{}", wrapped("", OWN_FROM_FIRST_HALF))?;
+        if self.own_from_other_half {
+            writeln!(f, "{}", wrapped("", OWN_FROM_OTHER_HALF))?;
         }
         if let Some(caution) = self.caution() {
             writeln!(f, "{}", wrapped("", &caution))?;
@@ -243,7 +243,11 @@ pub const LEGEND: &str = "* best of the column (of the row, by manoeuvre and reg
 pub const FLOOR: &str = "Floor: what is left of the recorded accelerations without their explainable part, gusts, turbulence and noise; no model can \
                          remove it.";
 
-/// What flights that no fit has seen are judged on, where a model has numbers of each flight.
+/// How flights that no fit has seen are judged, where a model has numbers of each flight, in a comparison.
+pub const OWN_FROM_OTHER_HALF: &str = "What each flight has for itself, wind, biases and trims, is found from its other half: the second half of a \
+                                       flight is judged with numbers from the first, the first with numbers from the second. The same for every row.";
+
+/// The same elsewhere.
 pub const OWN_FROM_FIRST_HALF: &str = "Second halves of these flights: what each flight has for itself, wind and biases, is found from its \
                                        first half. The same for every row.";
 

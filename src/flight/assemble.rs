@@ -13,11 +13,11 @@ use super::source::Read;
 use super::table::RawTable;
 use super::taint::tainted;
 use super::timing::{Clock, Part, cut, parts};
-use super::{Column, Flight, Targets, attitude};
+use super::{Column, Flight, Targets, attitude, within};
 use crate::error::{Error, Result};
 use crate::formula::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 /// What the reader's options say about each flight.
 #[derive(Clone, Copy, Debug)]
@@ -129,7 +129,7 @@ fn of_part(
     cuts: Cuts,
     done: &mut Assembled,
 ) -> Result<()> {
-    let Repaired { note, cut } = repair(&mut table, schema, part.step_s)?;
+    let Repaired { note, cut, aside } = repair(&mut table, schema, part.step_s)?;
     if let Some(note) = note {
         done.own_notes.push(format!("`{name}`: {note}"));
     }
@@ -176,6 +176,16 @@ fn of_part(
         );
         without_lost_ends(&mut used, &lost, name, done);
     }
+    let moved = late.values().map(|late| late.reach(recorded, step_s));
+    let moved = moved.fold([0, 0], |most: [usize; 2], by| [most[0].max(by[0]), most[1].max(by[1])]);
+    let between = usize::from(new_times.is_some());
+    let set_aside = set_aside(&aside, samples, &|sample| row_of(sample).saturating_sub(between)..=row_of(sample), moved);
+    let count: usize = set_aside.iter().map(|rows| used[rows.clone()].iter().filter(|&&used| used).count()).sum();
+    if count > 0 {
+        done.own_notes.push(format!(
+            "`{name}`: {count} of {samples} samples are set aside as near bridged cells: no acceleration is fitted to them or judged by them"
+        ));
+    }
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();
@@ -202,6 +212,7 @@ fn of_part(
         let number = done.flights.len() + 1;
         let mut flight = Flight::new(format!("{name}[{number}]"), manoeuvre, run_start_s, step_s, canonical, targets)?;
         flight.absent = absent.clone();
+        flight.set_aside = within(&set_aside, &run);
         flight.extra = columns.extra.iter().map(|(name, values)| (name.clone(), cut(values))).collect();
         done.flights.push(flight);
     }
@@ -406,6 +417,23 @@ fn cuts_near(cut: &[bool], rows: Range<usize>, schema: &Schema, part: &Part) -> 
     let near = REACH + (latest_s / part.step_s).ceil() as usize;
     let rows = rows.start.saturating_sub(near).min(cut.len())..(rows.end + near).min(cut.len());
     cut[rows].contains(&true)
+}
+
+/// Samples that are set aside because one of the rows of the file that they are made of is, or one from which a moved stream came.
+fn set_aside(
+    aside: &[bool],
+    samples: usize,
+    rows_of: &dyn Fn(usize) -> RangeInclusive<usize>,
+    [before, behind]: [usize; 2],
+) -> Vec<Range<usize>> {
+    if !aside.contains(&true) {
+        return Vec::new();
+    }
+    let is_aside = |sample: usize| {
+        let (first, last) = (rows_of(sample.saturating_sub(before)), rows_of((sample + behind).min(samples - 1)));
+        aside[*first.start()..=*last.end()].contains(&true)
+    };
+    runs(&(0..samples).map(is_aside).collect::<Vec<bool>>())
 }
 
 /// Runs of rows without a value are not used where a rule `cuts`: the flight is cut there.

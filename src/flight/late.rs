@@ -27,6 +27,14 @@ impl Late {
         self.s.abs().max((self.s + self.drift * duration_s).abs())
     }
 
+    /// By how many rows what belongs to a row stands before it at most, and behind it, in so many rows.
+    pub fn reach(self, rows: usize, step_s: f64) -> [usize; 2] {
+        let last = rows.saturating_sub(1);
+        let moves = [0, last].map(|row| self.nearest(row, step_s) - row as isize);
+        let most = |sign: isize| moves.iter().map(|&by| (sign * by).max(0).unsigned_abs()).max().unwrap_or(0);
+        [most(-1), most(1)]
+    }
+
     /// How many rows later stands what belongs to this row: it was written at t' = t + s + drift · t'.
     fn rows(self, row: usize, step_s: f64) -> f64 {
         (self.s / step_s + self.drift * row as f64) / (1.0 - self.drift)

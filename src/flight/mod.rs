@@ -93,6 +93,7 @@ use crate::error::{Error, Result};
 use crate::suggest::did_you_mean;
 use ndarray::Array2;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use store::Store;
 
 /// Standard gravity g₀, m/s² (exact by definition; 3rd CGPM 1901).
@@ -135,6 +136,9 @@ pub struct Flight {
     /// Columns, canonical or further ones, that give an acceleration away as the log's description computes columns, with the reason;
     /// see [`Flight::gives_target_away`].
     pub tainted: BTreeMap<String, String>,
+    /// Rows whose accelerations nothing is fitted to and nothing judged by, though they are part of the record: those near a cell that a repair
+    /// rule with `set_aside_s` bridged. In order and apart from each other; empty unless a description asks for it.
+    pub set_aside: Vec<Range<usize>>,
     /// `[22, samples]`, one row a [`Column`], in the order of [`Column::ALL`].
     canonical: Store,
 }
@@ -181,6 +185,7 @@ impl Flight {
             absent: Vec::new(),
             extra: BTreeMap::new(),
             tainted: BTreeMap::new(),
+            set_aside: Vec::new(),
             canonical: Store::Held(canonical),
             name,
         })
@@ -244,6 +249,30 @@ impl Flight {
         Self { canonical: self.canonical.out_of_memory(), ..self }
     }
 
+    /// The parts of `rows` whose accelerations are fitted and judged: all that is not [set aside](Flight::set_aside).
+    pub fn counted(&self, rows: Range<usize>) -> impl Iterator<Item = Range<usize>> + '_ {
+        let end = rows.end.min(self.len());
+        let first = self.set_aside.partition_point(|aside| aside.end <= rows.start);
+        let mut aside = self.set_aside[first..].iter();
+        let mut next = rows.start;
+        std::iter::from_fn(move || {
+            while next < end {
+                let (stop, after) = aside.next().map_or((end, end), |aside| (aside.start.min(end), aside.end));
+                let part = next..stop;
+                next = after;
+                if !part.is_empty() {
+                    return Some(part);
+                }
+            }
+            None
+        })
+    }
+
+    /// How many of `rows` are fitted and judged.
+    pub fn count(&self, rows: Range<usize>) -> usize {
+        self.counted(rows).map(|part| part.len()).sum()
+    }
+
     /// Time of a sample, s.
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + self.step_s * sample as f64
@@ -274,11 +303,12 @@ impl Flight {
     pub fn with_columns(&self, other: impl Fn(Column) -> Option<Vec<f64>>) -> Result<Self> {
         let columns = Column::ALL.map(|column| other(column).unwrap_or_else(|| self.column(column).to_vec()));
         let made = Self::new(self.name.clone(), self.manoeuvre.clone(), self.start_s, self.step_s, columns, self.targets)?;
-        Ok(Self { absent: self.absent.clone(), extra: self.extra.clone(), tainted: self.tainted.clone(), ..made })
+        let (absent, extra, tainted) = (self.absent.clone(), self.extra.clone(), self.tainted.clone());
+        Ok(Self { absent, extra, tainted, set_aside: self.set_aside.clone(), ..made })
     }
 
     /// The samples `range` as a flight of its own, with a new name. Panics never: the range is cut to what is there.
-    pub fn slice(&self, range: std::ops::Range<usize>, name: impl Into<String>) -> Option<Self> {
+    pub fn slice(&self, range: Range<usize>, name: impl Into<String>) -> Option<Self> {
         let range = range.start.min(self.len())..range.end.min(self.len());
         if range.is_empty() {
             return None;
@@ -292,9 +322,16 @@ impl Flight {
             absent: self.absent.clone(),
             extra: self.extra.iter().map(|(name, values)| (name.clone(), values[range.clone()].to_vec())).collect(),
             tainted: self.tainted.clone(),
+            set_aside: within(&self.set_aside, &range),
             canonical: self.canonical.slice(range),
         })
     }
+}
+
+/// What of `ranges` lies within `rows`, counted from the first of these.
+fn within(ranges: &[Range<usize>], rows: &Range<usize>) -> Vec<Range<usize>> {
+    let shift = |at: usize| at.clamp(rows.start, rows.end) - rows.start;
+    ranges.iter().map(|range| shift(range.start)..shift(range.end)).filter(|range| !range.is_empty()).collect()
 }
 
 /// Samples `[start, end)` of one flight of a data set, by index.
@@ -411,9 +448,34 @@ impl DataSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn ramp(samples: usize) -> [Vec<f64>; Column::COUNT] {
         std::array::from_fn(|column| (0..samples).map(|sample| (column * 1000 + sample) as f64).collect())
+    }
+
+    proptest! {
+        #[test]
+        fn what_counts_is_all_that_is_not_set_aside(
+            is_aside in proptest::collection::vec(any::<bool>(), 1..60), start in 0usize..70, end in 0usize..70
+        ) {
+            let samples = is_aside.len();
+            let mut flight = Flight::new("a", "hover", 0.0, 0.01, ramp(samples), Targets::Recorded).expect("a flight");
+            for row in (0..samples).filter(|&row| is_aside[row]) {
+                match flight.set_aside.last_mut() {
+                    Some(last) if last.end == row => last.end += 1,
+                    _ => flight.set_aside.push(row..row + 1),
+                }
+            }
+            let expected: Vec<usize> = (start..end.min(samples)).filter(|&row| !is_aside[row]).collect();
+            prop_assert_eq!(flight.counted(start..end).flatten().collect::<Vec<_>>(), expected.clone());
+            prop_assert!(flight.counted(start..end).all(|part| !part.is_empty()));
+            prop_assert_eq!(flight.count(start..end), expected.len());
+            if let Some(part) = flight.slice(start..end, "b") {
+                let of_part: Vec<usize> = part.counted(0..part.len()).flatten().map(|row| row + start).collect();
+                prop_assert_eq!(of_part, expected);
+            }
+        }
     }
 
     #[test]

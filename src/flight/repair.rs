@@ -13,6 +13,8 @@ pub(super) struct Repaired {
     pub note: Option<String>,
     /// By row, whether a rule that cuts left a cell of it without a value.
     pub cut: Vec<bool>,
+    /// By row, whether it is as near a bridged cell as its rule sets rows aside.
+    pub aside: Vec<bool>,
 }
 
 /// Applies the rules: runs of bad cells up to the rule's length are interpolated between their good neighbours; bad
@@ -26,6 +28,7 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
     let (mut found, mut left, mut longest) = (0, Vec::new(), 0);
     let mut bridged: [Vec<String>; 2] = Default::default();
     let mut cut = vec![false; table.columns.first().map_or(0, Vec::len)];
+    let mut aside = cut.clone();
     for rule in &schema.repairs {
         let places: Vec<usize> = rule.columns.iter().map(|name| place(table, name)).collect::<Result<_>>()?;
         let together = together(table, rule, &places);
@@ -47,6 +50,11 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
             if count.bridged > 0 {
                 bridged[rule.between as usize].push(format!("{} of `{name}`", count.bridged));
             }
+            if let Some(near_s) = rule.set_aside_s {
+                let near = (near_s / step_s).round() as usize;
+                let around = |run: &Range<usize>| run.start.saturating_sub(near)..(run.end + near).min(aside.len());
+                count.runs.iter().map(around).collect::<Vec<_>>().into_iter().for_each(|rows| aside[rows].fill(true));
+            }
             if rule.longer == Longer::Cut {
                 count.left.iter().for_each(|run| cut[run.clone()].fill(true));
             }
@@ -56,7 +64,7 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
         }
     }
     if found == 0 {
-        return Ok(Repaired { note: None, cut });
+        return Ok(Repaired { note: None, cut, aside });
     }
     let mut sentences = Vec::new();
     let longest_s = longest as f64 * step_s;
@@ -66,7 +74,7 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
     if !left.is_empty() {
         sentences.push(format!("bad cells left without a value: {}", left.join(", ")));
     }
-    Ok(Repaired { note: Some(sentences.join("; ")), cut })
+    Ok(Repaired { note: Some(sentences.join("; ")), cut, aside })
 }
 
 fn place(table: &RawTable, name: &str) -> Result<usize> {
@@ -100,6 +108,8 @@ struct Count {
     found: usize,
     bridged: usize,
     longest_bridged: usize,
+    /// Runs that were bridged.
+    runs: Vec<Range<usize>>,
     /// Runs that stay without a value.
     left: Vec<Range<usize>>,
 }
@@ -126,6 +136,7 @@ fn bridge(values: &mut [f64], bad: &[bool], longest: f64, turn: Option<f64>, bet
             };
             (first..end).for_each(|row| values[row] = shape.at(row));
             count.bridged += length;
+            count.runs.push(first..end);
             count.longest_bridged = count.longest_bridged.max(length);
         } else {
             values[first..end].fill(f64::NAN);
@@ -199,6 +210,7 @@ mod tests {
             max_gap_s: 0.02,
             between: Between::Line,
             longer: Longer::Error,
+            set_aside_s: None,
         }
     }
 
@@ -215,7 +227,8 @@ mod tests {
         let mut table = RawTable { names: vec!["m1".into()], columns: vec![values], ..RawTable::default() };
         let valid = vec![Formula::parse("value > 0")?, Formula::parse("value < 1000")?];
         let rule = Repair { valid, ..rule(&["m1"]) };
-        let Repaired { note, cut } = repair(&mut table, &with(rule), 0.01)?;
+        let Repaired { note, cut, aside } = repair(&mut table, &with(rule), 0.01)?;
+        assert!(!aside.contains(&true), "this rule sets nothing aside");
         assert!(!cut.contains(&true), "this rule does not cut");
         let found = &table.columns[0];
         assert_eq!(found[1..6], [1.0, 2.0, 3.0, 4.0, 5.0]);
@@ -231,8 +244,10 @@ mod tests {
         let wy = vec![2.0, 2.0, 2.0, 4.0, 6.0, 6.0, 6.0, 6.0, 6.0, 8.0];
         let mut table = RawTable { names: vec!["wx".into(), "wy".into()], columns: vec![wx, wy], ..RawTable::default() };
         let rule = Repair { held: true, ..rule(&["wx", "wy"]) };
-        let rule = Repair { longer: Longer::Cut, ..rule };
-        let Repaired { note, cut } = repair(&mut table, &with(rule), 0.01)?;
+        let rule = Repair { longer: Longer::Cut, set_aside_s: Some(0.01), ..rule };
+        let Repaired { note, cut, aside } = repair(&mut table, &with(rule), 0.01)?;
+        // Around row 2, which was bridged; rows 6 to 8 were not.
+        assert_eq!((0..10).filter(|&row| aside[row]).collect::<Vec<_>>(), [1, 2, 3]);
         assert_eq!((0..10).filter(|&row| cut[row]).collect::<Vec<_>>(), [6, 7, 8]);
         // Row 2 repeats row 1; in row 4 wx stands still and wy does not; rows 6 to 8 are longer than can be bridged.
         assert_eq!(table.columns[0][..6], [0.0, 1.0, 2.0, 3.0, 3.0, 5.0]);

@@ -27,7 +27,7 @@
 //! | `exclude` | sub-folders or files that are not flights of this set |
 //! | `leave_out` | flights, by their names, that are read and then left out, with a note |
 //! | `ignore`, `extra` | columns not to read; the only further columns to keep |
-//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly, or with `between = "cubic"`; `longer = "cut"`: where more of them follow each other the flight is cut |
+//! | `[[repair]]` | `columns`, `valid` (comparisons of `value`), `held` (rows that repeat all of `columns` are bad), `zero` (rows in which all of them are 0), `spike` (cells that stick out by so much), `max_gap_s`: bad cells to interpolate linearly, or with `between = "cubic"`; `longer = "cut"`: where more of them follow each other the flight is cut; `set_aside_s`: rows so near a bridged cell are neither fitted nor judged |
 //! | `notes` | sentences to carry to every reader of the data |
 
 use super::attitude::{Axes, QuaternionOrder};
@@ -96,6 +96,8 @@ pub(crate) struct Repair {
     pub between: Between,
     /// What is done with a longer one.
     pub longer: Longer,
+    /// Rows this near a bridged cell are neither fitted nor judged, s.
+    pub set_aside_s: Option<f64>,
 }
 
 /// What bridges a run of bad cells.
@@ -491,8 +493,9 @@ fn repairs(keys: &mut Keys, place: &str) -> Result<Vec<Repair>> {
         };
         let between = rule.choice("between", &Between::NAMES)?.unwrap_or_default();
         let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
+        let set_aside_s = rule.number("set_aside_s", 0.0)?;
         rule.finish()?;
-        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, between, longer });
+        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, between, longer, set_aside_s });
     }
     Ok(repairs)
 }

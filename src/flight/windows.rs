@@ -1,6 +1,6 @@
 //! Overlapping histories inside the spans of one partition.
 
-use super::{Span, Window};
+use super::{Flight, Span, Window};
 
 /// Default distance between training windows, samples. A history of 1000 samples holds one window a 10-s segment; overlapping
 /// ones make the data that a network needs.
@@ -17,6 +17,17 @@ pub fn windows(spans: &[Span], history: usize, stride: usize) -> Vec<Window> {
         (span.start + history - 1..span.end).step_by(stride).map(move |last| Window { flight, last })
     };
     spans.iter().flat_map(of_span).collect()
+}
+
+/// Whether a window ends in a row whose acceleration is fitted and judged; see [`Flight::set_aside`].
+pub fn counts(flights: &[Flight], window: &Window) -> bool {
+    flights.get(window.flight).is_some_and(|flight| flight.count(window.last..window.last + 1) == 1)
+}
+
+/// The windows that [count](counts).
+pub fn counted(flights: &[Flight], mut windows: Vec<Window>) -> Vec<Window> {
+    windows.retain(|window| counts(flights, window));
+    windows
 }
 
 #[cfg(test)]

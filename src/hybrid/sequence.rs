@@ -5,6 +5,7 @@ use super::inputs;
 use super::linear::{Linear, LinearConfig, Signals};
 use super::scaling::{Scale, Scaling};
 use crate::error::{Error, Result};
+use crate::flight::windows::{counted, windows};
 use crate::flight::{Accelerations, Flight, PerChannel, Span, Window};
 use crate::formula::Formula;
 use crate::nn::Architecture;
@@ -143,7 +144,7 @@ pub fn scaling(
 /// # Errors
 /// As [`Linear::fit`] and [`Model::predict`].
 pub fn linear(flights: &[Flight], spans: &[Span], model: &Model, config: &LinearConfig) -> Result<Linear> {
-    let windows = crate::flight::windows::windows(spans, config.lags, 1);
+    let windows = counted(flights, windows(spans, config.lags, 1));
     let baselines: Vec<Accelerations> = flights.iter().map(|flight| model.predict(flight)).collect::<Result<_>>()?;
     let left_over: Vec<Accelerations> =
         flights.iter().zip(&baselines).map(|(flight, baseline)| learned(flight, baseline, true)).collect();

@@ -16,6 +16,7 @@ use super::least_squares::{Cluster, Failure, Hold, residual, solve, step};
 use super::model::Model;
 use super::sign_doubt::{SignDoubt, SignFinding};
 use super::signal::{Stage, signal_named};
+use super::weights::Weights;
 use crate::error::{Error, Result};
 use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::formula::Formula;
@@ -86,6 +87,9 @@ pub struct Calibration {
     pub rows: usize,
     /// Stretches of consecutive rows that the intervals rest on.
     pub clusters: usize,
+    /// What counted alike.
+    #[serde(default)]
+    pub weights: Weights,
     /// Passes over the flights; one, if the model is linear in its numbers.
     pub rounds: usize,
     /// By how much a number would still move, in half intervals.
@@ -188,12 +192,20 @@ impl std::fmt::Display for Calibration {
 /// # }
 /// ```
 pub fn calibrate(model: &Model, flights: &[Flight], spans: &[Span]) -> Result<(Model, Calibration)> {
+    calibrate_weighed(model, flights, spans, Weights::Rows)
+}
+
+/// As [`calibrate`], with rows weighted as `weights` says; intervals and errors allow for it.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_weighed(model: &Model, flights: &[Flight], spans: &[Span], weights: Weights) -> Result<(Model, Calibration)> {
     model.check()?;
     if let Some(span) = spans.iter().find(|span| span.flight >= flights.len()) {
         let (found, expected) = (span.flight.to_string(), format!("an index of the {} flights", flights.len()));
         return Err(Error::Config { place: "calibrate".into(), field: "span.flight".into(), found, expected });
     }
-    let rows = Rows::of(flights, spans)?;
+    let rows = Rows::of(flights, spans, weights)?;
     rows.jobs.iter().try_for_each(|&(flight, _)| composed_for(model, &flights[flight]).map(drop))?;
     let mut current = started(model, &rows)?;
     let mut pass = Pass::at(&current, &rows)?;
@@ -271,17 +283,21 @@ struct Rows<'a> {
     /// Flights with rows, and how many clusters each is cut into.
     jobs: Vec<(usize, usize)>,
     total: usize,
+    weights: Weights,
+    /// Of each flight, what its columns are multiplied by.
+    factors: Vec<PerChannel<f64>>,
 }
 
 impl<'a> Rows<'a> {
-    fn of(flights: &'a [Flight], spans: &[Span]) -> Result<Self> {
+    fn of(flights: &'a [Flight], spans: &[Span], weights: Weights) -> Result<Self> {
         let ranges: Vec<Vec<(usize, usize)>> = (0..flights.len()).map(|flight| union(flight, spans, flights)).collect();
         let rows: Vec<usize> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum()).collect();
         let total: usize = rows.iter().sum();
         if total == 0 {
             return Err(Error::Undetermined("no rows to calibrate on: the spans are empty; give at least one flight".into()));
         }
-        Ok(Self { flights, ranges, jobs: cut(flights, &rows)?, total })
+        let (jobs, factors) = (cut(flights, &rows)?, weights.of(flights, &ranges));
+        Ok(Self { flights, ranges, jobs, total, weights, factors })
     }
 }
 
@@ -313,6 +329,7 @@ impl Solved {
             condition_number: self.condition_number,
             rows: rows.total,
             clusters: self.clusters,
+            weights: rows.weights,
             rounds,
             last_change,
             signs: self.model.sign_doubts(),
@@ -329,7 +346,7 @@ impl Pass {
         let layout = Layout::of(model, regressors);
         layout.check_complete(model)?;
         let reduce = |&(flight, clusters): &(usize, usize)| {
-            layout.reduce((model, &columns), (flight, &rows.flights[flight]), &rows.ranges[flight], clusters)
+            layout.reduce((model, &columns), (flight, &rows.flights[flight]), (&rows.ranges[flight], &rows.factors[flight]), clusters)
         };
         #[cfg(feature = "rayon")]
         let reduced: Result<Vec<Vec<Cluster>>> = {
@@ -571,7 +588,7 @@ pub(super) fn estimate(model: &Model, effect: usize, index: usize) -> Option<Est
     })
 }
 
-/// The samples of one flight that the spans cover, in order, without overlap.
+/// The samples of one flight that the spans cover and that count, in order, without overlap.
 fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize)> {
     let length = flights.get(flight).map_or(0, Flight::len);
     let mut ranges: Vec<(usize, usize)> =
@@ -585,7 +602,10 @@ fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize
             _ => merged.push((start, end)),
         }
     }
-    merged
+    match flights.get(flight) {
+        Some(flight) => merged.into_iter().flat_map(|(start, end)| flight.counted(start..end)).map(|rows| (rows.start, rows.end)).collect(),
+        None => merged,
+    }
 }
 
 #[cfg(test)]

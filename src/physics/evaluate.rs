@@ -277,7 +277,7 @@ impl Model {
     }
 
     /// Root mean square of measured minus predicted acceleration over the given spans, by channel (m/s², rad/s²); rows of
-    /// overlapping spans count once each time they are listed.
+    /// overlapping spans count once each time they are listed, those [set aside](Flight::set_aside) not at all.
     ///
     /// # Errors
     /// As [`Model::predict`]; [`Error::Undetermined`] if the spans hold no row.
@@ -291,11 +291,12 @@ impl Model {
             }
             let predicted = self.predict(flight)?;
             for span in spans {
-                let range = span.start.min(flight.len())..span.end.min(flight.len());
-                rows += range.len();
-                for ((sum, predicted), target) in squares.iter_mut().zip(&predicted).zip(Column::TARGETS) {
-                    let pairs = predicted.iter().zip(flight.column(target)).take(range.end).skip(range.start);
-                    *sum += pairs.map(|(predicted, measured)| (measured - predicted).powi(2)).sum::<f64>();
+                for range in flight.counted(span.start..span.end) {
+                    rows += range.len();
+                    for ((sum, predicted), target) in squares.iter_mut().zip(&predicted).zip(Column::TARGETS) {
+                        let pairs = predicted[range.clone()].iter().zip(&flight.column(target)[range.clone()]);
+                        *sum += pairs.map(|(predicted, measured)| (measured - predicted).powi(2)).sum::<f64>();
+                    }
                 }
             }
         }

@@ -106,12 +106,12 @@ impl Layout {
         PerChannel::from_fn(|channel| self.channels[channel].len() + self.own_channels[channel].len())
     }
 
-    /// Reduces the chosen rows of one flight to clusters of about equal length.
+    /// Reduces the chosen rows of one flight, multiplied by a factor a channel, to clusters of about equal length.
     pub(super) fn reduce(
         &self,
         (model, columns): (&Model, &Columns),
         (index, flight): (usize, &Flight),
-        ranges: &[(usize, usize)],
+        (ranges, factors): (&[(usize, usize)], &PerChannel<f64>),
         clusters: usize,
     ) -> Result<Vec<Cluster>> {
         let nodes: Vec<Node> = self.regressors.iter().map(|regressor| regressor.node).collect();
@@ -138,6 +138,9 @@ impl Layout {
                     None => (matrix.len() - 1, -1.0),
                 };
                 matrix[column].iter_mut().zip(values.column(place)).for_each(|(sum, value)| *sum += sign * value);
+            }
+            for (channel, matrix) in matrices.pairs_mut().filter(|(channel, _)| factors[*channel] != 1.0) {
+                matrix.iter_mut().flatten().for_each(|value| *value *= factors[channel]);
             }
             while let Some((start, end)) = pieces.pop() {
                 if start >= range.end {

@@ -36,10 +36,11 @@ mod signal;
 #[cfg(feature = "files")]
 mod toml_section;
 mod vehicle;
+mod weights;
 
 pub use baseline::PAPER;
 pub(crate) use calibrate::off_zero;
-pub use calibrate::{Calibration, Estimate, calibrate};
+pub use calibrate::{Calibration, Estimate, calibrate, calibrate_weighed};
 pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
 pub use correlation::{Correlation, correlation_matrix};
 pub use definition::{
@@ -59,3 +60,4 @@ pub use sign::Sign;
 pub use sign_doubt::{SignDoubt, SignFinding, doubt, physical_sign};
 pub use signal::{Plain, SIGNALS, Signal, Stage, signal_named};
 pub use vehicle::{Assumed, MASS_KG, ROTOR_RADIUS_M};
+pub use weights::Weights;

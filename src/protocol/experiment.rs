@@ -12,7 +12,7 @@ use crate::critique::{Row, centred_difference, explainable_at, finite_difference
 use crate::disk::write_atomically;
 use crate::error::{Error, Result};
 use crate::flight::split::{Part, SEGMENT_S, STRETCH_S, Split};
-use crate::flight::windows::windows;
+use crate::flight::windows::{counted, windows};
 use crate::flight::{Column, Flight, PerChannel, Span, Window};
 use crate::hybrid::Hybrid;
 use crate::hybrid::linear::LinearConfig;
@@ -193,8 +193,8 @@ impl<'a> Experiment<'a> {
         let split = self.split(run)?;
         let (history, stride) = (self.plan.settings.phyture()?.history, self.plan.settings.training.stride);
         Ok(Extent {
-            training: windows(&split.training, history, stride).len(),
-            validation: windows(&split.validation, history, stride).len(),
+            training: counted(self.flights, windows(&split.training, history, stride)).len(),
+            validation: counted(self.flights, windows(&split.validation, history, stride)).len(),
             test: self.judged(&split)?.len(),
             training_s: split.training.iter().map(|span| (span.end - span.start) as f64 * self.plan.step_s).sum(),
         })
@@ -204,7 +204,7 @@ impl<'a> Experiment<'a> {
     fn judged(&self, split: &Split) -> Result<Vec<Window>> {
         let lead = (self.model.data.split.lead_s() / self.plan.step_s).round() as usize;
         let history = self.plan.settings.phyture()?.history;
-        Ok(windows(&split.test, history.max(lead), self.plan.settings.test_stride))
+        Ok(counted(self.flights, windows(&split.test, history.max(lead), self.plan.settings.test_stride)))
     }
 
     /// The division of a run, with less to train on where the treatment says so.
@@ -379,10 +379,10 @@ impl<'a> Experiment<'a> {
         let settings = &self.plan.settings;
         if !networks {
             let config = LinearConfig::default();
-            return ridge(flights, &windows(&split.training, config.lags, 1), judged, &config);
+            return ridge(flights, &counted(flights, windows(&split.training, config.lags, 1)), judged, &config);
         }
         let inputs = settings.training.inputs.clone();
-        let training = windows(&split.training, settings.phyture()?.history, settings.training.stride);
+        let training = counted(flights, windows(&split.training, settings.phyture()?.history, settings.training.stride));
         // Of few windows no more rows than they determine.
         let most = training.len().saturating_sub(1) / inputs.len().max(1);
         let config = LinearConfig { lags: LinearConfig::default().lags.min(most).max(1), inputs };

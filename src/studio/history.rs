@@ -123,8 +123,8 @@ pub struct Steps {
     pub at: usize,
     /// What the errors are judged on, in words.
     pub judged_on: String,
-    /// Whether flights are judged on their second halves, since some state has numbers of each flight.
-    pub own_from_first_half: bool,
+    /// Whether each half of a flight is judged with numbers from its other half, since some state has numbers of each flight.
+    pub own_from_other_half: bool,
     /// Whether the present state is on disk.
     pub saved: bool,
     /// The model's file.
@@ -185,7 +185,7 @@ impl Studio {
             steps: all.iter().enumerate().map(text).collect(),
             at,
             judged_on: errors.basis,
-            own_from_first_half: errors.halves,
+            own_from_other_half: errors.halves,
             saved: file.holds(&all[at].model) && !file_changed,
             file: file.name(),
             file_changed,

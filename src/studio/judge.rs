@@ -36,7 +36,7 @@ pub enum PartWanted {
     All,
 }
 
-/// A state, a part, and whether flights are judged on their second halves for the sake of another state.
+/// A state, a part, and whether flights are judged by halves for the sake of another state.
 type Key = (u64, PartWanted, bool);
 
 /// How well a state does, by channel.
@@ -50,7 +50,7 @@ pub(super) struct Errors {
     pub r2: ChannelValues,
 }
 
-/// The errors of a state, what they were judged on, and whether that is second halves.
+/// The errors of a state, what they were judged on, and whether that is by halves, each with numbers from the other.
 type Known = (Errors, String, bool);
 
 /// The errors of states on the way to the present one.
@@ -146,7 +146,7 @@ impl Judge {
                     let judged = self.beside(set, split, state, PartWanted::Judged, beside)?;
                     let model = &judged.comparison.models[1];
                     let errors = Errors { rmse: model.rmse, ci95: model.rmse_ci95, r2: model.r2 };
-                    let found = (errors, judged.comparison.basis(), judged.comparison.own_from_first_half);
+                    let found = (errors, judged.comparison.basis(), judged.comparison.own_from_other_half);
                     held(&self.errors).insert(key, found.clone());
                     found
                 }

@@ -6,7 +6,7 @@ use super::rollout_loss::{RolloutLoss, RolloutRule, Rollouts};
 use crate::blocks::Blocks;
 use crate::error::Result;
 use crate::flight::split::Split;
-use crate::flight::windows::windows;
+use crate::flight::windows::{counted, windows};
 use crate::flight::{Flight, PerChannel, Span, Window};
 use crate::hybrid::intervals::FEWEST_BLOCKS;
 use crate::hybrid::{Description, Hybrid, sequence};
@@ -54,8 +54,8 @@ impl Job {
         };
         description.set_envelope(flights, spans)?;
         let sequences = sequence::sequences(flights, &description)?;
-        let all = windows(spans, config.network.history(), config.stride);
-        let validation = windows(&split.validation, config.network.history(), config.stride);
+        let of = |spans: &[Span]| counted(flights, windows(spans, config.network.history(), config.stride));
+        let (all, validation) = (of(spans), of(&split.validation));
         // The gate is six numbers: what they were fitted on is hardly flattered by them, and serves the intervals as well.
         let Blocks { of_window: blocks, keys } = Blocks::new(flights, &all);
         let (every, for_gate) = match config.gate_every {

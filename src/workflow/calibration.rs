@@ -4,7 +4,7 @@ use super::Division;
 use crate::error::Result;
 use crate::flight::split::{Part, Split};
 use crate::flight::{Column, DataSet, PerChannel};
-use crate::physics::{Calibration, Entry, Model, OutputError, calibrate, output_error};
+use crate::physics::{Calibration, Entry, Model, OutputError, Weights, calibrate_weighed, output_error};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value};
 
@@ -15,6 +15,8 @@ pub struct Calibrating<'a> {
     pub set: &'a DataSet,
     /// What trains and what tests.
     pub split: &'a Split,
+    /// What counts alike in the fit to samples.
+    pub weights: Weights,
 }
 
 /// The errors of a model's accelerations on one part of the flights.
@@ -47,9 +49,13 @@ impl Calibrating<'_> {
     /// Least squares of the model's coefficients on the accelerations of the training part.
     ///
     /// # Errors
-    /// As [`calibrate`] and [`Model::rmse`].
+    /// As [`calibrate_weighed`] and [`Model::rmse`].
     pub fn fit(&self, model: &Model) -> Result<Calibrated> {
-        let (model, calibration) = calibrate(model, &self.set.flights, &self.split.training)?;
+        let (mut model, calibration) = calibrate_weighed(model, &self.set.flights, &self.split.training, self.weights)?;
+        match self.weights {
+            Weights::Rows => drop(model.provenance.remove("weights")),
+            Weights::Flights => drop(model.provenance.insert("weights".into(), Entry::Text("flights".into()))),
+        }
         let rmse = self.rmse(&model)?;
         Ok(Calibrated { model, calibration, rmse, output_error: None })
     }

@@ -1,15 +1,15 @@
 //! Models and networks compared on flights that were kept back, beside honest yardsticks. The numbers themselves are made in `critique`.
 
-use crate::critique::diagnose::{Met, met};
+use super::judging::Judging;
 use crate::critique::locate::{Traced, stretches};
 use crate::critique::shares::{self, shares};
 use crate::critique::uncertainty::{Effort, uncertainty};
 use crate::critique::{Comparison, Row, compare, coverage, finite_difference, floor, ridge};
 use crate::error::{Error, Result};
 use crate::flight::split::Split;
-use crate::flight::windows::windows;
+use crate::flight::windows::{self, counted, counts};
 use crate::flight::{Accelerations, DataSet, Flight, PerChannel, Window};
-use crate::hybrid::Hybrid;
+use crate::hybrid::{Hybrid, Stages};
 use crate::hybrid::linear::LinearConfig;
 use crate::physics::Model;
 use crate::stopwatch::Stopwatch;
@@ -123,64 +123,88 @@ impl Contest<'_> {
     /// # Errors
     /// [`Error::Undetermined`] where no window fits; as [`Model::predict`] and [`Hybrid::predict`].
     pub fn run(&self, set: &DataSet, split: &Split) -> Result<Judged> {
-        let of_networks = self.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
-        let all: Vec<&Model> = self.models.iter().map(|(_, model)| model).chain(of_networks).collect();
-        let Met { models: met, judged: spans, own_from_first_half } = met(&set.flights, &all, &split.test)?;
-        let (models, of_networks) = met.split_at(self.models.len());
-        let windows = windows(&spans, self.history, self.stride);
+        let flights = &set.flights;
+        let judging = self.judging(flights, split, self.stride)?.filtered(|window| counts(flights, window));
+        let windows = &judging.windows;
         if windows.is_empty() {
             return Err(Error::Undetermined(format!(
                 "no run of test samples is as long as the {} samples of history{}; give longer flights or lock whole flights with --lock",
                 self.history,
-                if own_from_first_half {
-                    ", second halves of flights judging models that know each flight from its first"
+                if judging.by_halves() {
+                    ", halves of flights judging models that know each flight from its other half"
                 } else {
                     ""
                 }
             )));
         }
-        let mut rows = self.without_networks(set, split, models, &windows)?;
+        let mut rows = self.without_networks(set, split, &judging)?;
         let reference = rows.len() - self.models.len();
         let mut judged = Vec::new();
-        let networks = self.networks.iter().zip(of_networks).map(|((name, hybrid), model)| Ok((name, hybrid.on(model.clone())?)));
-        let networks: Vec<(&String, Hybrid)> = networks.collect::<Result<_>>()?;
-        for (name, hybrid) in &networks {
-            let stages = hybrid.stages(&set.flights, &windows, self.threads)?;
+        for (index, (name, hybrid)) in self.networks.iter().enumerate() {
+            let stages = self.stages(flights, &judging, index)?;
             let own = &hybrid.description().model;
             // The first model is what the shares are of, unless the network was trained on that very model.
-            let other = models.first().is_some_and(|model| model.effects != own.effects);
-            let same = models.iter().position(|model| model.effects == own.effects);
-            let model = same.map_or(&own.name, |index| &self.models[index].0);
+            let other = self.models.first().is_some_and(|(_, model)| model.effects != own.effects);
+            let same = self.models.iter().find(|(_, model)| model.effects == own.effects);
+            let model = same.map_or(&own.name, |(name, _)| name);
             let row = other.then(|| rows.get(reference)).flatten();
-            judged.push(shares(&set.flights, &windows, row, &shares::Judged { name, model, stages: &stages })?);
-            rows.push(Row { name: (*name).clone(), predicted: stages.hybrid });
+            judged.push(shares(flights, windows, row, &shares::Judged { name, model, stages: &stages })?);
+            rows.push(Row { name: name.clone(), predicted: stages.hybrid });
         }
-        let mut comparison = compare(&set.flights, &windows, &rows, split.tested)?;
+        let mut comparison = compare(flights, windows, &rows, split.tested)?;
         comparison.stride = self.stride;
-        comparison.own_from_first_half = own_from_first_half;
+        comparison.own_from_other_half = judging.by_halves();
         comparison.shares = judged;
-        for (name, hybrid) in &networks {
-            comparison.coverage.extend(coverage(name, hybrid, &set.flights, &windows, self.threads)?);
+        for (name, hybrid) in self.networks {
+            comparison.coverage.extend(coverage(name, hybrid, flights, windows, self.threads)?);
         }
-        for (name, hybrid) in networks.iter().filter(|_| self.uncertainty) {
+        // Movements are of first order about the numbers of the flights: one half tells them.
+        let (met, windows) = judging.first().expect("there are windows");
+        for (index, (name, hybrid)) in self.networks.iter().enumerate().filter(|_| self.uncertainty) {
             let effort = Effort::for_history(hybrid.description().config.history(), self.seed);
-            comparison.uncertainty.push(uncertainty(name, hybrid, &set.flights, &windows, effort, self.threads)?);
+            let hybrid = hybrid.on(met[self.models.len() + index].clone())?;
+            comparison.uncertainty.push(uncertainty(name, &hybrid, flights, &windows, effort, self.threads)?);
         }
-        Ok(Judged { comparison, windows, rows, traced: Vec::new() })
+        Ok(Judged { comparison, windows: judging.windows, rows, traced: Vec::new() })
+    }
+
+    /// The windows of the test part with the models, those of the networks behind the others.
+    fn judging(&self, flights: &[Flight], split: &Split, stride: usize) -> Result<Judging> {
+        let of_networks = self.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
+        let all: Vec<&Model> = self.models.iter().map(|(_, model)| model).chain(of_networks).collect();
+        Judging::new(flights, &all, &split.test, self.history, stride)
+    }
+
+    /// What a network predicts, part by part.
+    fn stages(&self, flights: &[Flight], judging: &Judging, index: usize) -> Result<Stages> {
+        let hybrid = &self.networks[index].1;
+        let each = judging.each(|models, windows| {
+            let Stages { physics, with_linear, hybrid } =
+                hybrid.on(models[self.models.len() + index].clone())?.stages(flights, windows, self.threads)?;
+            let with_linear = with_linear.map_or_else(|| vec![None; windows.len()], |values| values.into_iter().map(Some).collect());
+            Ok(physics.into_iter().zip(with_linear).zip(hybrid).collect())
+        })?;
+        let (physics, hybrid): (Vec<_>, Vec<_>) = each.into_iter().unzip();
+        let (physics, with_linear): (Vec<_>, Vec<_>) = physics.into_iter().unzip();
+        Ok(Stages { physics, with_linear: with_linear.into_iter().collect(), hybrid })
     }
 
     /// The rows of all that has no network.
-    fn without_networks(&self, set: &DataSet, split: &Split, models: &[Model], windows: &[Window]) -> Result<Vec<Row>> {
-        let mut rows = vec![finite_difference(&set.flights, windows)?];
+    fn without_networks(&self, set: &DataSet, split: &Split, judging: &Judging) -> Result<Vec<Row>> {
+        let (flights, windows) = (&set.flights, &judging.windows);
+        let mut rows = vec![finite_difference(flights, windows)?];
         if let Some(lags) = self.ridge {
-            let training = crate::flight::windows::windows(&split.training, lags, 1);
-            rows.push(ridge(&set.flights, &training, windows, &LinearConfig { lags, ..LinearConfig::default() })?);
+            let training = counted(flights, windows::windows(&split.training, lags, 1));
+            rows.push(ridge(flights, &training, windows, &LinearConfig { lags, ..LinearConfig::default() })?);
         }
-        let judged_flights: BTreeSet<usize> = windows.iter().map(|window| window.flight).collect();
-        for ((name, _), model) in self.models.iter().zip(models) {
-            let columns = predicted(model, &set.flights, &judged_flights)?;
-            let at = |window: &Window| PerChannel::from_fn(|channel| columns[window.flight][channel][window.last]);
-            rows.push(Row { name: name.clone(), predicted: windows.iter().map(at).collect() });
+        for (index, (name, _)) in self.models.iter().enumerate() {
+            let predicted = judging.each(|models, windows| {
+                let judged: BTreeSet<usize> = windows.iter().map(|window| window.flight).collect();
+                let columns = predicted(&models[index], flights, &judged)?;
+                let at = |window: &Window| PerChannel::from_fn(|channel| columns[window.flight][channel][window.last]);
+                Ok(windows.iter().map(at).collect())
+            })?;
+            rows.push(Row { name: name.clone(), predicted });
         }
         Ok(rows)
     }
@@ -191,21 +215,16 @@ impl Contest<'_> {
     /// As [`Contest::run`].
     pub fn trace(&self, set: &DataSet, split: &Split, judged: &mut Judged) -> Result<()> {
         let found = judged.rows.last().map(|row| stretches(&set.flights, &judged.windows, row)).transpose()?.flatten();
-        let of_networks = self.networks.iter().map(|(_, hybrid)| &hybrid.description().model);
-        let all: Vec<&Model> = self.models.iter().map(|(_, model)| model).chain(of_networks).collect();
-        let Met { models, judged: spans, .. } = met(&set.flights, &all, &split.test)?;
-        let (models, of_networks) = models.split_at(self.models.len());
         for stretch in found.into_iter().flat_map(|found| [found.worst, found.typical]) {
             let inside = |window: &Window| {
                 window.flight == stretch.span.flight && (stretch.span.start..stretch.span.end).contains(&window.last)
             };
-            let windows: Vec<Window> = windows(&spans, self.history, 1).into_iter().filter(inside).collect();
-            let mut rows = self.without_networks(set, split, models, &windows)?;
-            for ((name, hybrid), model) in self.networks.iter().zip(of_networks) {
-                let predicted = hybrid.on(model.clone())?.stages(&set.flights, &windows, self.threads)?.hybrid;
-                rows.push(Row { name: name.clone(), predicted });
+            let judging = self.judging(&set.flights, split, 1)?.filtered(inside);
+            let mut rows = self.without_networks(set, split, &judging)?;
+            for (index, (name, _)) in self.networks.iter().enumerate() {
+                rows.push(Row { name: name.clone(), predicted: self.stages(&set.flights, &judging, index)?.hybrid });
             }
-            judged.traced.push(Traced { stretch, windows, rows });
+            judged.traced.push(Traced { stretch, windows: judging.windows, rows });
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ mod contest;
 mod division;
 mod document;
 mod flights;
+mod judging;
 #[cfg(feature = "disk")]
 mod ledger;
 #[cfg(feature = "files")]

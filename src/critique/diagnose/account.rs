@@ -62,7 +62,7 @@ fn worth(flights: &[Flight], after: &Model, effects: &[&str], split: &Split, bef
     let near = Point::at(&searched, all.clone(), optional.clone())?;
     let there = Point::at(&kept, halves.met(flights, &all, correlation)?, optional)?;
     let judged: Vec<usize> = (0..kept.blocks.len()).filter(|&block| kept.fold[block] == 0).collect();
-    let rows = judged.iter().map(|&block| kept.blocks[block].end - kept.blocks[block].start).sum::<usize>() as f64;
+    let rows = judged.iter().map(|&block| kept.blocks[block].count(kept.flights)).sum::<usize>() as f64;
     // Errors there under the others' numbers without some effects, found here; as they are where the flights do not determine them.
     let errors = |absent: &[usize]| {
         let refitted = near.refitted(&searched, absent);

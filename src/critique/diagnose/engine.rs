@@ -89,7 +89,7 @@ pub(super) fn priors(model: &Model, layout: &Layout, held: &[(String, String)]) 
 
 impl Engine<'_> {
     pub fn rows(&self) -> usize {
-        self.blocks.iter().map(|block| block.end - block.start).sum()
+        self.blocks.iter().map(|block| block.count(self.flights)).sum()
     }
 
     pub fn spans(&self) -> impl Iterator<Item = Span> {

@@ -68,12 +68,12 @@ pub(super) fn failure(flights: &[Flight], measured: &Measured<'_>, unknown: &[Un
     (!channels.is_empty()).then(|| Failure { on: measured.on.into(), channels })
 }
 
-/// Variance of a measured column over spans; `None` where it does not vary.
+/// Variance of a measured column over what counts of spans; `None` where it does not vary.
 pub(super) fn variance(flights: &[Flight], spans: &[Span], column: Column) -> Option<f64> {
     let values = || {
         spans.iter().flat_map(|span| {
-            let whole = flights.get(span.flight).map_or(&[][..], |flight| flight.column(column));
-            whole.iter().take(span.end).skip(span.start)
+            let flight = flights.get(span.flight);
+            flight.into_iter().flat_map(|flight| flight.counted(span.start..span.end).flat_map(|rows| &flight.column(column)[rows]))
         })
     };
     let count = values().count() as f64;

@@ -20,6 +20,16 @@ pub(super) struct Block {
     pub end: usize,
 }
 
+/// Of a block at least this share counts ([`Flight::set_aside`]), or it is left out: an error over a few rows is no block's.
+const LEAST_COUNTED: f64 = 0.25;
+
+impl Block {
+    /// How many of its samples count.
+    pub fn count(&self, flights: &[Flight]) -> usize {
+        flights[self.flight].count(self.start..self.end)
+    }
+}
+
 /// Cuts spans into blocks of about equal length, `block_s` long; a remainder shorter than half joins its neighbour.
 pub(super) fn blocks(flights: &[Flight], spans: &[Span], block_s: f64) -> Vec<Block> {
     let mut blocks = Vec::new();
@@ -30,7 +40,7 @@ pub(super) fn blocks(flights: &[Flight], spans: &[Span], block_s: f64) -> Vec<Bl
         let count = ((samples as f64 / wanted).round() as usize).max(1);
         for index in 0..count {
             let (start, end) = (span.start + index * samples / count, span.start + (index + 1) * samples / count);
-            if end > start {
+            if end > start && flight.count(start..end) as f64 >= LEAST_COUNTED * (end - start) as f64 {
                 blocks.push(Block { flight: span.flight, start, end });
             }
         }
@@ -180,22 +190,24 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
     let mut scratch = Vec::new();
     design.columns.evaluate(&design.nodes, flight, end, &mut |range, values| {
         for (block, gram) in blocks.iter().zip(&mut found) {
-            let (start, end) = (block.start.max(range.start), block.end.min(range.end));
-            if start >= end {
+            let rows = block.start.max(range.start)..block.end.min(range.end);
+            let parts: Vec<Range<usize>> = flight.counted(rows).collect();
+            let count: usize = parts.iter().map(ExactSizeIterator::len).sum();
+            if count == 0 {
                 continue;
             }
-            gram.rows += end - start;
-            let part = start - range.start..end - range.start;
+            gram.rows += count;
             for ((columns, target), sum) in design.channels.iter().zip(Column::TARGETS).zip(&mut gram.channels) {
                 scratch.clear();
                 for column in &sum.places.order {
-                    scratch.extend_from_slice(match column {
-                        Some(column) => &values.column(columns[*column])[part.clone()],
-                        None => &flight.column(target)[start..end],
-                    });
+                    for part in &parts {
+                        scratch.extend_from_slice(match column {
+                            Some(column) => &values.column(columns[*column])[part.start - range.start..part.end - range.start],
+                            None => &flight.column(target)[part.clone()],
+                        });
+                    }
                 }
-                let shape = (columns.len() + 1, part.len());
-                let rows = ArrayView2::from_shape(shape, &scratch).expect("as many columns as rows of the square");
+                let rows = ArrayView2::from_shape((columns.len() + 1, count), &scratch).expect("as many columns as rows of the square");
                 sum.add(&rows);
             }
         }

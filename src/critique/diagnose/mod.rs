@@ -52,7 +52,7 @@ mod watch;
 pub use account::{together, weigh};
 pub use amend::{Amended, amend, calibrated, searched};
 pub use mends::Mends;
-pub use own::{Met, met};
+pub use own::{Met, met, met_both_ways};
 pub use report::{
     Bar, CandidateReport, Confirmation, DependsOn, Diagnosis, Failure, FailureChannel, Influence, Kept, Locked, Method, Number,
     ParameterValue, Status, Step, TriedFormula, UnknownChannel, Verdict, Worth,

@@ -1,5 +1,5 @@
 //! Numbers that each flight has for itself (wind, a bias) on flights that no fit has seen: found from a flight's first half, so that its second
-//! half can judge. Nothing else is fitted here, and nothing judged.
+//! half can judge, or both ways round. Nothing else is fitted here, and nothing judged.
 
 use super::engine::{Engine, Errors, FOLDS};
 use super::gates::CORRELATION_S;
@@ -34,11 +34,21 @@ pub struct Met {
 /// # Errors
 /// As [`Model::predict`].
 pub fn met(flights: &[Flight], models: &[&Model], spans: &[Span]) -> Result<Met> {
-    let halves = Halves::of(flights, models, spans);
-    let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
-    let met = |model: &&Model| halves.met(flights, model, 2.0 * CORRELATION_S / step_s);
-    let models = models.iter().map(met).collect::<Result<_>>()?;
-    Ok(Met { models, judged: halves.judged(), own_from_first_half: !halves.first.is_empty() })
+    Halves::of(flights, models, spans).all_met(flights, models)
+}
+
+/// As [`met`], and then the other way round, where there are such flights: their second halves give the numbers and the first halves are judged, so
+/// that all is judged by numbers that it had no part in.
+///
+/// # Errors
+/// As [`Model::predict`].
+pub fn met_both_ways(flights: &[Flight], models: &[&Model], spans: &[Span]) -> Result<Vec<Met>> {
+    let Halves { seen, first, second } = Halves::of(flights, models, spans);
+    let mut both = vec![Halves { seen, first: first.clone(), second: second.clone() }.all_met(flights, models)?];
+    if !first.is_empty() {
+        both.push(Halves { seen: Vec::new(), first: second, second: first }.all_met(flights, models)?);
+    }
+    Ok(both)
 }
 
 /// Spans of flights that some fit has seen, or that need no numbers of their own; and of the others the first halves, and the second.
@@ -72,6 +82,13 @@ impl Halves {
             }
         }
         halves
+    }
+
+    fn all_met(&self, flights: &[Flight], models: &[&Model]) -> Result<Met> {
+        let step_s = flights.first().map_or(0.01, |flight| flight.step_s);
+        let met = |model: &&Model| self.met(flights, model, 2.0 * CORRELATION_S / step_s);
+        let models = models.iter().map(met).collect::<Result<_>>()?;
+        Ok(Met { models, judged: self.judged(), own_from_first_half: !self.first.is_empty() })
     }
 
     /// What is judged.
@@ -166,21 +183,19 @@ impl OwnColumns {
         let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(left, right)| left * right).sum::<f64>();
         self.columns.evaluate(&self.nodes, log, end, &mut |range, values| {
             for span in spans {
-                let (start, end) = (span.start.max(range.start), span.end.min(range.end));
-                if start >= end {
-                    continue;
-                }
-                let part = start - range.start..end - range.start;
-                for (channel, (matrix, side, square)) in sums.pairs_mut() {
-                    let measured = &log.column(channel.column())[start..end];
-                    let predicted = &values.column(channel.index())[part.clone()];
-                    let rest: Vec<f64> = measured.iter().zip(predicted).map(|(measured, value)| measured - value).collect();
-                    *square += dot(&rest, &rest);
-                    for &(i, left) in &self.by_channel[channel] {
-                        let left = &values.column(left)[part.clone()];
-                        side[i] += dot(left, &rest);
-                        for &(j, right) in &self.by_channel[channel] {
-                            matrix[(i, j)] += dot(left, &values.column(right)[part.clone()]);
+                for rows in log.counted(span.start.max(range.start)..span.end.min(range.end)) {
+                    let part = rows.start - range.start..rows.end - range.start;
+                    for (channel, (matrix, side, square)) in sums.pairs_mut() {
+                        let measured = &log.column(channel.column())[rows.clone()];
+                        let predicted = &values.column(channel.index())[part.clone()];
+                        let rest: Vec<f64> = measured.iter().zip(predicted).map(|(measured, value)| measured - value).collect();
+                        *square += dot(&rest, &rest);
+                        for &(i, left) in &self.by_channel[channel] {
+                            let left = &values.column(left)[part.clone()];
+                            side[i] += dot(left, &rest);
+                            for &(j, right) in &self.by_channel[channel] {
+                                matrix[(i, j)] += dot(left, &values.column(right)[part.clone()]);
+                            }
                         }
                     }
                 }
@@ -214,7 +229,7 @@ fn step(
     };
     #[cfg(not(feature = "rayon"))]
     let found: Vec<Sums> = order.iter().map(one).collect::<Result<_>>()?;
-    let rows: usize = spans.iter().map(|span| span.end - span.start).sum();
+    let rows: usize = spans.iter().map(|span| flights[span.flight].count(span.start..span.end)).sum();
     let mse = PerChannel::from_fn(|channel| found.iter().map(|sums| sums[channel].2).sum::<f64>() / rows.max(1) as f64);
     let mut moved = 0.0_f64;
     for (&flight, sums) in order.iter().zip(&found) {
@@ -263,11 +278,12 @@ pub(super) fn prediction_errors(engine: &Engine<'_>, model: &Model) -> Result<Er
         let mut sums = vec![PerChannel::splat(0.0); run.len()];
         columns.evaluate(nodes.values(), flight, end, &mut |range, values| {
             for (block, sums) in run.iter().zip(&mut sums) {
-                let (start, end) = (block.start.max(range.start), block.end.min(range.end));
-                for (channel, sum) in sums.pairs_mut().filter(|_| start < end) {
-                    let measured = &flight.column(channel.column())[start..end];
-                    let predicted = &values.column(channel.index())[start - range.start..end - range.start];
-                    *sum += measured.iter().zip(predicted).map(|(measured, value)| (measured - value).powi(2)).sum::<f64>();
+                for rows in flight.counted(block.start.max(range.start)..block.end.min(range.end)) {
+                    for (channel, sum) in sums.pairs_mut() {
+                        let measured = &flight.column(channel.column())[rows.clone()];
+                        let predicted = &values.column(channel.index())[rows.start - range.start..rows.end - range.start];
+                        *sum += measured.iter().zip(predicted).map(|(measured, value)| (measured - value).powi(2)).sum::<f64>();
+                    }
                 }
             }
             Ok(())
@@ -308,7 +324,7 @@ pub(super) fn judged_errors(
     if cut.is_empty() {
         return Ok(None);
     }
-    let counts = cut.iter().map(|block| block.end - block.start).collect();
+    let counts = cut.iter().map(|block| block.count(flights)).collect();
     let fold = (0..cut.len()).map(|block| block % FOLDS).collect();
     let engine = Engine { flights, blocks: cut, fold, correlation, held: Vec::new() };
     let one = |model: &Model| prediction_errors(&engine, &halves.met(flights, model, correlation)?);

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::flight::{Accelerations, Column, Flight, PerChannel, Span, derived};
 use crate::formula::Formula;
 use crate::physics::evaluate;
+use std::ops::Range;
 
 /// Length of a row, s: well below the 0.5 s for which a gust lasts and the 1 s of the quickest manoeuvres.
 pub const ROW_S: f64 = 0.1;
@@ -75,7 +76,7 @@ fn candidates(air: bool) -> Vec<Candidate> {
 impl ResidualTable {
     /// Makes the table from the spans of some flights.
     ///
-    /// `residuals` gives measured − predicted of a whole flight, sample by sample. A row is the mean over [`ROW_S`] (at least one
+    /// `residuals` gives measured − predicted of a whole flight, sample by sample. A row is the mean of what counts ([`Flight::set_aside`]) over [`ROW_S`] (at least one
     /// sample), or over longer where that would give more than `rows_max` rows; blocks are `block_s` long. Neither crosses a
     /// flight or a span; what remains of a span after the last whole row is left out. Features of a column that one of the
     /// flights lacks are left out, and so are features that do not vary.
@@ -160,8 +161,17 @@ impl ResidualTable {
             let samples = (row_s / flight.step_s - 1e-9).ceil().max(1.0) as usize;
             let rows_of_block = (block_s / (samples as f64 * flight.step_s)).round().max(1.0) as usize;
             for span in spans.iter().filter(|span| span.flight == index) {
+                let mut last = None;
                 for (row, start) in (span.start..).step_by(samples).take((span.end - span.start) / samples).enumerate() {
-                    let mean = |values: &[f64]| values[start..start + samples].iter().sum::<f64>() / samples as f64;
+                    let parts: Vec<Range<usize>> = flight.counted(start..start + samples).collect();
+                    let count: usize = parts.iter().map(ExactSizeIterator::len).sum();
+                    if count == 0 {
+                        continue;
+                    }
+                    let mean = |values: &[f64]| parts.iter().flat_map(|part| &values[part.clone()]).sum::<f64>() / count as f64;
+                    let of_block = row / rows_of_block;
+                    blocks += usize::from(last.is_some_and(|last| last != of_block));
+                    last = Some(of_block);
                     let middle_s = (start as f64 + 0.5 * (samples - 1) as f64) * flight.step_s;
                     for (out, values) in table.features.iter_mut().zip(&columns) {
                         out.push(mean(values));
@@ -179,11 +189,11 @@ impl ResidualTable {
                         }
                         out.push(value);
                     }
-                    table.block.push(blocks + row / rows_of_block);
+                    table.block.push(blocks);
                     table.flight.push(index);
                     table.time_s.push(middle_s);
                 }
-                blocks = table.block.last().map_or(0, |last| last + 1);
+                blocks += usize::from(last.is_some());
             }
             flight.rest();
         }

@@ -16,7 +16,7 @@ use super::page::{DATA_NOTE, Page, Part, Section, Table, data_notes};
 use crate::critique::digits::significant;
 use crate::critique::locate::Traced;
 use crate::critique::predictions::deviation;
-use crate::critique::table::OWN_FROM_FIRST_HALF;
+use crate::critique::table::OWN_FROM_OTHER_HALF;
 use crate::critique::{ChannelValues, Comparison, ModelError, PartError, Row, Shares, paired};
 use crate::error::{Error, Result};
 use crate::flight::{Channel, Flight, Targets, Window};
@@ -105,7 +105,7 @@ fn summary(report: &CompareReport<'_>, model: &ModelError, deviation: &ChannelVa
         .filter_map(|channel| Some((channel, channels[channel]? / deviation.channels()[channel]?)))
         .collect();
     let mut out = Vec::new();
-    out.extend(report.comparison.own_from_first_half.then(|| OWN_FROM_FIRST_HALF.to_owned()));
+    out.extend(report.comparison.own_from_other_half.then(|| OWN_FROM_OTHER_HALF.to_owned()));
     if model.not_finite > 0 {
         out.push(format!(
             "Beware: {} of {} predictions of {} are not finite numbers. The channels they hit have no error measure.",

@@ -11,7 +11,7 @@ import { read } from './place.js';
  * @typedef {{ version: string, data: string, duration_s: number, parts_s: [number, number], judging: string, flights: Flight[], channels: Channel[],
  *   variables: [string, string][], names: string[], signals: [string, string, string][], check: string, fault: boolean }} Overview
  * @typedef {{ id: number, did: string, rmse: PerChannel | null, ci95: Intervals | null, r2: PerChannel | null, calibrated: boolean }} Step
- * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_first_half: boolean, saved: boolean, file: string | null,
+ * @typedef {{ steps: Step[], at: number, judged_on: string, own_from_other_half: boolean, saved: boolean, file: string | null,
  *   file_changed: boolean, kept: string | null, unkept: string | null, left: Left[], revision: number }} Steps
  * @typedef {{ file: string, written_s: number, steps: string[], search: string | null, fault: string | null }} Left
  * @typedef {{ revision: number, file_changed: boolean, search: Job['progress'], training: Job['progress'] }} Pulse

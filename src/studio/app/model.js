@@ -308,7 +308,7 @@ function falls(app) {
     h(
       'p',
       { class: 'quiet' },
-      `${steps.judged_on}, with 95 % intervals${steps.own_from_first_half ? '; flights are judged on their second halves, as some state has numbers of each flight' : ''}.`,
+      `${steps.judged_on}, with 95 % intervals${steps.own_from_other_half ? '; each half of a flight is judged with what its other half says of it, as some state has numbers of each flight' : ''}.`,
     ),
   );
 }

@@ -6,7 +6,7 @@ use crate::output::Progress;
 use phyture::Result;
 use phyture::critique::wrap::wrapped;
 use phyture::flight::Column;
-use phyture::physics::{Effect, Model};
+use phyture::physics::{Effect, Model, Weights};
 use phyture::workflow::{Calibrated, Calibrating, PartRmse};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
 /// Least squares of the model's coefficients on the training part
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  phyture calibrate flights -m n9.toml -o n9-calibrated.toml\n  phyture calibrate flights -m n9.toml -o n9-ahead.toml --output-error     # so that rollouts of 50 steps fit"
+    after_help = "Examples:\n  phyture calibrate flights -m n9.toml -o n9-calibrated.toml\n  phyture calibrate flights -m n9.toml -o n9-ahead.toml --output-error     # so that rollouts of 50 steps fit\n  phyture calibrate flights -m n9.toml -o n9-even.toml --weights flights   # calm flights count as much as wild ones"
 )]
 pub struct Args {
     /// Flights.
@@ -27,6 +27,10 @@ pub struct Args {
     /// Calibrated model file to write
     #[arg(short, long)]
     pub output: PathBuf,
+    /// What counts alike: every row, or the rows of every flight relative to how much it accelerates, so that a few wild flights do not
+    /// outvote the calm ones
+    #[arg(long, default_value = "rows", value_name = "WHAT", value_parser = Weights::NAMES.map(|(name, _)| name))]
+    pub weights: String,
     /// Then fit the numbers to rollouts (output error): what is predicted over --horizon steps, not the accelerations of each sample
     #[arg(long)]
     pub output_error: bool,
@@ -49,7 +53,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
     let set = context.flights(data, 1)?;
     let model = context.model(model, data)?;
     let split = context.split(&set.flights, &model, division)?;
-    let calibrating = Calibrating { set: &set, split: &split };
+    let calibrating = Calibrating { set: &set, split: &split, weights: Weights::named(&wanted.weights)? };
     let mut calibrated = fit(context, &calibrating, &model)?;
     if wanted.output_error {
         calibrated = fit_rollouts(context, &calibrating, calibrated, wanted.horizon)?;

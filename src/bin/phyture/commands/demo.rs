@@ -18,7 +18,7 @@ use phyture::flight::split::{Protocol, Split};
 use phyture::flight::{DataSet, write};
 use phyture::hybrid::Hybrid;
 use phyture::nn::PhyTureConfig;
-use phyture::physics::Model;
+use phyture::physics::{Model, Weights};
 use phyture::report::{DiagnoseReport, diagnose_page};
 use phyture::sim::{Level, Simulation, simulate_with_explainable};
 use phyture::train::{RunFolder, TrainConfig, Training};
@@ -208,7 +208,7 @@ pub fn run(context: &Context, Args { out, quick, figures }: &Args) -> Result<Exi
     let split = Split::new(&set.flights, &locked, &Protocol::Segments, context.seed())?;
     let mut model = starting_model();
     model.data.locked = locked;
-    let model = calibrate::fit(context, &Calibrating { set: &set, split: &split }, &model)?.model;
+    let model = calibrate::fit(context, &Calibrating { set: &set, split: &split, weights: Weights::Rows }, &model)?.model;
     model.write(out.join("model.toml"))?;
 
     context.say("\n4. What is missing? Found, added, calibrated, until nothing worthwhile is left");

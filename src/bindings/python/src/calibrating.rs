@@ -7,6 +7,7 @@ use crate::model::Model;
 use crate::ranges;
 use crate::work::{Interrupted, work};
 use phyture::critique::check as checking;
+use phyture::physics::Weights;
 use phyture::workflow::Calibrating;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -41,15 +42,16 @@ pub fn calibrate(
     flights: &Flights,
     model: &Model,
     division: Division,
+    weights: &str,
     horizon: Option<usize>,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Found, Model)> {
-    let (set, model) = (Arc::clone(&flights.set), Arc::clone(&model.physics));
+    let (set, model, weights) = (Arc::clone(&flights.set), Arc::clone(&model.physics), Weights::named(weights));
     work(py, progress, Interrupted::IsLeft, move |watched| {
         ranges::check("horizon", horizon, &ranges::HORIZONS)?;
         let (wanted, seed) = (division.wanted()?, division.seed);
         let split = wanted.split(&set.flights, &model, seed)?;
-        let calibrating = Calibrating { set: &set, split: &split };
+        let calibrating = Calibrating { set: &set, split: &split, weights: weights? };
         watched.at("calibrating", 0, 0);
         let mut found = calibrating.fit(&model)?;
         if let Some(horizon) = horizon {

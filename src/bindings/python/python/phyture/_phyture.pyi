@@ -147,7 +147,7 @@ def check(
     flights: Flights, model: Model | None, progress: _Tell
 ) -> tuple[Found, tuple[str, list[str], list[tuple[str, str]]] | None]: ...
 def calibrate(
-    flights: Flights, model: Model, division: dict[str, Any], horizon: int | None, progress: _Tell
+    flights: Flights, model: Model, division: dict[str, Any], weights: str, horizon: int | None, progress: _Tell
 ) -> tuple[Found, Model]: ...
 def compare(
     flights: Flights,

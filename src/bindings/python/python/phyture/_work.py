@@ -80,6 +80,7 @@ def calibrate(
     lock: Sequence[str] = (),
     split: str | None = None,
     seed: int = SEED,
+    weights: str = "rows",
     output_error: bool = False,
     horizon: int = 50,
     progress: Progress = None,
@@ -87,11 +88,12 @@ def calibrate(
     """Least squares of the model's coefficients on the part that trains; with ``output_error`` then on rollouts of ``horizon`` steps.
 
     ``lock`` names manoeuvre classes or flights that are the test part, beside those that the model locks; ``split`` (``"segments"`` or
-    ``"first 0.75"``) divides flights where none is locked.
+    ``"first 0.75"``) divides flights where none is locked. ``weights="flights"`` counts the rows of every flight relative to how much it
+    accelerates, so that a few wild flights do not outvote the calm ones.
     """
     with told(progress) as tell:
         division = _division(lock, split, seed)
-        return Calibration(*_phyture.calibrate(flights, model, division, horizon if output_error else None, tell))
+        return Calibration(*_phyture.calibrate(flights, model, division, weights, horizon if output_error else None, tell))
 
 
 def compare(
