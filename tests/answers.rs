@@ -464,6 +464,28 @@ fn real_flights_get_a_verdict_that_does_not_contradict_itself() -> Result<()> {
     Ok(())
 }
 
+/// What is asked of named physics on each class of these flights in turn, of which no fit has seen any: R² of roll, pitch and yaw.
+#[test]
+fn named_physics_explains_the_turning_of_a_quadrotor_on_every_class_that_was_kept_back() -> Result<()> {
+    let Some([data, dataset, model]) = crazyflie("samples.toml", "named.toml") else { return Ok(()) };
+    let place = folder()?;
+    let at = place.path();
+    for class in ["multisine", "random1", "random2", "square"] {
+        let common = [&data, "--dataset", &dataset, "--lock", class];
+        let [fitted, found] = [format!("{class}.toml"), format!("{class}.json")];
+        run(at, &[&["calibrate", "-m", &model, "-o", &fitted, "--weights", "flights"], &common[..]].concat())?;
+        let said = run(at, &[&["compare", "-m", &fitted, "--stride", "1", "--json", &found], &common[..]].concat())?;
+        let found = json(at, &found)?;
+        assert_eq!(found["own_from_other_half"], true, "each half with the trim that its other half says");
+        let models = found["models"].as_array().cloned().unwrap_or_default();
+        let r2 = models.last().map(|model| model["r2"].clone()).unwrap_or_default();
+        for (channel, asked) in [("wx_dot", 0.40), ("wy_dot", 0.40), ("wz_dot", 0.50)] {
+            assert!(r2[channel].as_f64().is_some_and(|r2| r2 >= asked), "{class}, {channel}: {r2}\n{said}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn a_battery_that_was_put_in_anew_is_named_and_no_wind_indoors() -> Result<()> {
     let Some([data, dataset, model]) = crazyflie("samples.toml", "bare.toml") else { return Ok(()) };

@@ -215,7 +215,7 @@ fn numbers_of_rotors_are_calibrated_back() -> Result<()> {
 
 #[test]
 fn what_a_multirotor_lacks_is_named_where_it_was_hidden() -> Result<()> {
-    for (hidden, seed) in [("trim_shift", 711), ("blowback_climb", 712)] {
+    for (hidden, seed) in [("trim_shift", 711), ("blowback_climb", 712), ("blowback_thrust", 713)] {
         let mut truth = quadrotor(Some((hidden, 0.5)))?;
         // Of each flight as if the battery had been put in anew.
         let own = truth.effects.last_mut().into_iter().flat_map(|effect| &mut effect.coefficients);

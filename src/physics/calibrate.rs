@@ -346,7 +346,12 @@ impl Pass {
         let layout = Layout::of(model, regressors);
         layout.check_complete(model)?;
         let reduce = |&(flight, clusters): &(usize, usize)| {
-            layout.reduce((model, &columns), (flight, &rows.flights[flight]), (&rows.ranges[flight], &rows.factors[flight]), clusters)
+            layout.reduce(
+                (model, &columns),
+                (flight, &rows.flights[flight]),
+                (&rows.ranges[flight], &rows.factors[flight]),
+                clusters,
+            )
         };
         #[cfg(feature = "rayon")]
         let reduced: Result<Vec<Vec<Cluster>>> = {
@@ -603,7 +608,9 @@ fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize
         }
     }
     match flights.get(flight) {
-        Some(flight) => merged.into_iter().flat_map(|(start, end)| flight.counted(start..end)).map(|rows| (rows.start, rows.end)).collect(),
+        Some(flight) => {
+            merged.into_iter().flat_map(|(start, end)| flight.counted(start..end)).map(|rows| (rows.start, rows.end)).collect()
+        }
         None => merged,
     }
 }

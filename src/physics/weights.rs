@@ -42,10 +42,12 @@ impl Weights {
         if self == Self::Rows {
             return plain;
         }
-        let rows: Vec<f64> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum::<usize>() as f64).collect();
+        let rows: Vec<f64> =
+            ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum::<usize>() as f64).collect();
         let mut factors = plain;
         for channel in Channel::ALL {
-            let precisions: Vec<Option<f64>> = flights.iter().zip(ranges).map(|(flight, ranges)| precision(flight, ranges, channel)).collect();
+            let precisions: Vec<Option<f64>> =
+                flights.iter().zip(ranges).map(|(flight, ranges)| precision(flight, ranges, channel)).collect();
             let (mut sum, mut count) = (0.0, 0.0);
             for (precision, rows) in precisions.iter().zip(&rows) {
                 sum += precision.unwrap_or(0.0) * rows;

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::flight::split::Split;
 use crate::flight::windows::{self, counted, counts};
 use crate::flight::{Accelerations, DataSet, Flight, PerChannel, Window};
-use crate::hybrid::{Hybrid, Stages};
 use crate::hybrid::linear::LinearConfig;
+use crate::hybrid::{Hybrid, Stages};
 use crate::physics::Model;
 use crate::stopwatch::Stopwatch;
 use crate::tape::Threads;
@@ -181,7 +181,8 @@ impl Contest<'_> {
         let each = judging.each(|models, windows| {
             let Stages { physics, with_linear, hybrid } =
                 hybrid.on(models[self.models.len() + index].clone())?.stages(flights, windows, self.threads)?;
-            let with_linear = with_linear.map_or_else(|| vec![None; windows.len()], |values| values.into_iter().map(Some).collect());
+            let with_linear =
+                with_linear.map_or_else(|| vec![None; windows.len()], |values| values.into_iter().map(Some).collect());
             Ok(physics.into_iter().zip(with_linear).zip(hybrid).collect())
         })?;
         let (physics, hybrid): (Vec<_>, Vec<_>) = each.into_iter().unzip();

@@ -207,7 +207,8 @@ fn flight_grams(flight: &Flight, blocks: &[Block], design: &Design) -> Result<Ve
                         });
                     }
                 }
-                let rows = ArrayView2::from_shape((columns.len() + 1, count), &scratch).expect("as many columns as rows of the square");
+                let rows =
+                    ArrayView2::from_shape((columns.len() + 1, count), &scratch).expect("as many columns as rows of the square");
                 sum.add(&rows);
             }
         }

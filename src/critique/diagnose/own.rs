@@ -10,6 +10,7 @@ use crate::flight::{Channel, Flight, PerChannel, Span};
 use crate::formula::Node;
 use crate::physics::{Columns, Model, Regressor, Wanted};
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::BTreeMap;
 
 /// Gauss-Newton steps, at most; wind bends the columns a little.
 const MOST_STEPS: usize = 6;
@@ -115,13 +116,29 @@ impl Halves {
         if numbers.is_empty() || self.first.is_empty() {
             return Ok(met);
         }
-        let sizes: Vec<f64> = numbers.iter().map(|&(effect, index)| size_of(model, effect, index)).collect();
+        let expected: Vec<Expected> = numbers.iter().map(|&(effect, index)| Expected::of(model, effect, index)).collect();
         for _ in 0..MOST_STEPS {
-            if step(flights, &self.first, &mut met, (&numbers, &sizes), correlation)? < SETTLED {
+            if step(flights, &self.first, &mut met, (&numbers, &expected), correlation)? < SETTLED {
                 break;
             }
         }
         Ok(met)
+    }
+}
+
+/// What is expected of a number of a flight before that flight has said anything.
+#[derive(Clone, Copy, Debug)]
+struct Expected {
+    centre: f64,
+    size: f64,
+}
+
+impl Expected {
+    /// Around the mean of the flights that are known, which is held near zero itself as one more flight would be: n flights of mean m lead to m n / (n + 1).
+    fn of(model: &Model, effect: usize, index: usize) -> Self {
+        let known = &model.effects[effect].coefficients[index];
+        let flights = known.by_flight.as_ref().map_or(0, BTreeMap::len) as f64;
+        Self { centre: known.value * flights / (flights + 1.0), size: size_of(model, effect, index) }
     }
 }
 
@@ -211,7 +228,7 @@ fn step(
     flights: &[Flight],
     spans: &[Span],
     model: &mut Model,
-    (numbers, sizes): (&[(usize, usize)], &[f64]),
+    (numbers, expected): (&[(usize, usize)], &[Expected]),
     correlation: f64,
 ) -> Result<f64> {
     let columns = OwnColumns::of(model, numbers)?;
@@ -237,9 +254,9 @@ fn step(
         let value = |&(effect, index): &(usize, usize)| model.effects[effect].coefficients[index].in_flight(name);
         let now = DVector::from_iterator(numbers.len(), numbers.iter().map(value));
         // A flight without any error says nothing that a computer can hold.
-        let Some(change) = change(sums, &mse, &now, sizes, correlation) else { continue };
+        let Some(change) = change(sums, &mse, &now, expected, correlation) else { continue };
         for (place, &(effect, index)) in numbers.iter().enumerate() {
-            moved = moved.max(change[place].abs() / sizes[place]);
+            moved = moved.max(change[place].abs() / expected[place].size);
             if let Some(values) = &mut model.effects[effect].coefficients[index].by_flight {
                 values.insert(name.clone(), now[place] + change[place]);
             }
@@ -248,18 +265,18 @@ fn step(
     Ok(moved)
 }
 
-/// By how much the numbers of a flight change, channels weighted by the inverse of their error, each number held near zero by its usual size;
+/// By how much the numbers of a flight change, channels weighted by the inverse of their error, each number held near what is expected by its usual size;
 /// `None` where the equations have no finite solution.
-fn change(sums: &Sums, mse: &PerChannel<f64>, now: &DVector<f64>, sizes: &[f64], correlation: f64) -> Option<DVector<f64>> {
+fn change(sums: &Sums, mse: &PerChannel<f64>, now: &DVector<f64>, expected: &[Expected], correlation: f64) -> Option<DVector<f64>> {
     let (mut matrix, mut side) = (DMatrix::zeros(now.len(), now.len()), DVector::zeros(now.len()));
     for ((own, right, _), mse) in sums.iter().zip(mse) {
         matrix += own / mse.max(f64::MIN_POSITIVE);
         side += right / mse.max(f64::MIN_POSITIVE);
     }
-    for (place, size) in sizes.iter().enumerate() {
+    for (place, Expected { centre, size }) in expected.iter().enumerate() {
         let precision = correlation / (size * size);
         matrix[(place, place)] += precision;
-        side[place] -= precision * now[place];
+        side[place] += precision * (centre - now[place]);
     }
     Cholesky::new(matrix).map(|factor| factor.solve(&side)).filter(|change| change.iter().all(|number| number.is_finite()))
 }

@@ -176,7 +176,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: ANY,
             excitation: "accelerations from hover, forwards and sideways",
-            confusable_with: &["wind", "cg_offset", "rotor_drag", "blowback_climb"],
+            confusable_with: &["wind", "cg_offset", "rotor_drag", "blowback_climb", "blowback_thrust"],
             would_tell_apart: "trimmed flight at several speeds in all four directions",
             fault_of_log: None,
             source: "flapping by advance ratio: Gavrilets, da1/dmu; L_v -5.5, M_u 2.75: Walker & Tischler 2021; of multirotors: Hoffmann et al., AIAA 2007-6461",
@@ -203,6 +203,33 @@ pub(super) const DEFINITIONS: &[Definition] = &[
             would_tell_apart: "level flight, then climbs and descents at the same forward speed",
             fault_of_log: None,
             source: "flapping goes with 4/3 of the collective pitch and the air through the disc from below: Bramwell's Helicopter Dynamics, 2nd ed., ch. 3",
+            searched: true,
+        }),
+    },
+    Definition {
+        kind: "blowback_thrust",
+        meaning: "rotors blow back more the more they lift",
+        coefficients: &[
+            coefficient("l_vt", "rad/(m s)", "roll by side speed, more of it at 2 g of thrust than at 1 g")
+                .within(-30.0, 30.0)
+                .usually(-3.0, 3.0),
+            coefficient("m_ut", "rad/(m s)", "pitch by forward speed, more of it at 2 g of thrust than at 1 g")
+                .within(-30.0, 30.0)
+                .usually(-3.0, 3.0),
+        ],
+        parameters: &[],
+        terms: &[],
+        swaps: &[
+            change("rotor_roll", "rotor_roll - l_vt * air_vy * (thrust / 9.80665 + 1)"),
+            change("rotor_pitch", "rotor_pitch - m_ut * air_vx * (thrust / 9.80665 + 1)"),
+        ],
+        notes: Some(Notes {
+            vehicles: MULTIROTOR,
+            excitation: "collective steps and turns while flying forwards and sideways",
+            confusable_with: &["dihedral_speedstab", "blowback_climb"],
+            would_tell_apart: "the same forward speed with more and with less load",
+            fault_of_log: None,
+            source: "the moment of a thrust that blows back is T h a1, a1 by advance ratio: Mahony, Kumar & Corke 2012; a stiff rotor's goes with its speed",
             searched: true,
         }),
     },

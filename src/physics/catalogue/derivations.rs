@@ -254,6 +254,23 @@ fn rotors_blow_back_more_in_descent() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn rotors_blow_back_more_the_more_they_lift_and_at_1_g_as_they_do() -> Result<()> {
+    let mut state = [0.0; 16];
+    put(&mut state, Column::Vx, [2.0, 3.0, 0.0]);
+    let blowback = || effect("blowback_thrust", &[-1.0, 4.0]);
+    // The thrust of this helicopter, from `trim_shift` above.
+    let hover = (GRAVITY_M_S2 - 0.51) / 20.0;
+    for (stick, beyond) in
+        [(hover, 0.0), (0.6, (20.0 * 0.6 + 0.51) / GRAVITY_M_S2 - 1.0), (0.2, (20.0 * 0.2 + 0.51) / GRAVITY_M_S2 - 1.0)]
+    {
+        state[Column::U4 as usize] = stick;
+        let found = added(blowback()?, state)?;
+        assert_near(&found, &[0.0, 0.0, 0.0, -3.0 * beyond, 4.0 * 2.0 * beyond, 0.0], EXACT);
+    }
+    Ok(())
+}
+
 /// Momentum theory of a rotor whose blades lift, per mass: thrust = pitch - slope * (v + climb) = g / v_h² * v * hypot(speed, v + climb).
 struct Rotor {
     hover_m_s: f64,

@@ -57,7 +57,7 @@ fn the_table_is_complete() {
     let table = "quad_drag vel_cross inertia_cross ctrl_cross flap_tilt tail_side_force collective_torque heave_torque transl_lift \
         climb_inflow inflow_lag vortex_ring ground_effect rate_cross cyclic_lag ctrl_delay servo_rate_limit tail_lag collective_lag \
         rotor_droop rotor_acceleration rotor_inflow rotor_drag rotor_gyro stall_saturation ctrl_nonlin weathercock dihedral_speedstab \
-        blowback_climb speed_damping tail_rotor_inflow wind imu_lever cg_offset trim_shift tilt_misalign sensor_bias sync mass_drift added_mass";
+        blowback_climb blowback_thrust speed_damping tail_rotor_inflow wind imu_lever cg_offset trim_shift tilt_misalign sensor_bias sync mass_drift added_mass";
     let expected: BTreeSet<&str> = table.split_whitespace().collect();
     assert_eq!(definitions().map(|definition| definition.kind).collect::<BTreeSet<_>>(), expected);
     assert_eq!(definitions().filter(|entry| entry.notes.is_some_and(|notes| !notes.searched)).count(), 1);
