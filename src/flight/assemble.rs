@@ -5,7 +5,7 @@
 use super::convert::{Columns, check_finite, convert, source};
 use super::derived::{Derived, derived};
 use super::differentiate::{DEFAULT_CUTOFF_HZ, Differentiator, HIGHEST_CUTOFF};
-use super::late::in_step;
+use super::late::{in_step, reach};
 use super::repair::{Repaired, repair};
 use super::resample::Resampler;
 use super::schema::Schema;
@@ -176,16 +176,10 @@ fn of_part(
         );
         without_lost_ends(&mut used, &lost, name, done);
     }
-    let moved = late.values().map(|late| late.reach(recorded, step_s));
-    let moved = moved.fold([0, 0], |most: [usize; 2], by| [most[0].max(by[0]), most[1].max(by[1])]);
+    let moved = reach(&late, recorded, step_s);
     let between = usize::from(new_times.is_some());
     let set_aside = set_aside(&aside, samples, &|sample| row_of(sample).saturating_sub(between)..=row_of(sample), moved);
-    let count: usize = set_aside.iter().map(|rows| used[rows.clone()].iter().filter(|&&used| used).count()).sum();
-    if count > 0 {
-        done.own_notes.push(format!(
-            "`{name}`: {count} of {samples} samples are set aside as near bridged cells: no acceleration is fitted to them or judged by them"
-        ));
-    }
+    note_set_aside(&set_aside, &used, name, done);
     let runs = runs(&used);
     if !schema.rows.is_empty() {
         let kept = used.iter().filter(|&&used| used).count();
@@ -417,6 +411,16 @@ fn cuts_near(cut: &[bool], rows: Range<usize>, schema: &Schema, part: &Part) -> 
     let near = REACH + (latest_s / part.step_s).ceil() as usize;
     let rows = rows.start.saturating_sub(near).min(cut.len())..(rows.end + near).min(cut.len());
     cut[rows].contains(&true)
+}
+
+fn note_set_aside(set_aside: &[Range<usize>], used: &[bool], name: &str, done: &mut Assembled) {
+    let count: usize = set_aside.iter().map(|rows| used[rows.clone()].iter().filter(|&&used| used).count()).sum();
+    if count > 0 {
+        done.own_notes.push(format!(
+            "`{name}`: {count} of {} samples are set aside as near bridged cells: nothing is fitted to their accelerations or judged by them",
+            used.len()
+        ));
+    }
 }
 
 /// Samples that are set aside because one of the rows of the file that they are made of is, or one from which a moved stream came.

@@ -27,14 +27,6 @@ impl Late {
         self.s.abs().max((self.s + self.drift * duration_s).abs())
     }
 
-    /// By how many rows what belongs to a row stands before it at most, and behind it, in so many rows.
-    pub fn reach(self, rows: usize, step_s: f64) -> [usize; 2] {
-        let last = rows.saturating_sub(1);
-        let moves = [0, last].map(|row| self.nearest(row, step_s) - row as isize);
-        let most = |sign: isize| moves.iter().map(|&by| (sign * by).max(0).unsigned_abs()).max().unwrap_or(0);
-        [most(-1), most(1)]
-    }
-
     /// How many rows later stands what belongs to this row: it was written at t' = t + s + drift · t'.
     fn rows(self, row: usize, step_s: f64) -> f64 {
         (self.s / step_s + self.drift * row as f64) / (1.0 - self.drift)
@@ -59,6 +51,13 @@ fn between(values: &[f64], row: f64) -> f64 {
     let (before, part) = (row as usize, row.fract());
     let value = values[before];
     if part == 0.0 { value } else { value + part * (values[before + 1] - value) }
+}
+
+/// By how many rows what belongs to a row stands before it at most, and behind it, in so many rows.
+pub(super) fn reach(late: &BTreeMap<Column, Late>, rows: usize, step_s: f64) -> [usize; 2] {
+    let ends = [0, rows.saturating_sub(1)];
+    let moves = late.values().flat_map(|late| ends.map(|row| late.nearest(row, step_s) - row as isize));
+    moves.fold([0, 0], |[before, behind], by| [before.max((-by).max(0).unsigned_abs()), behind.max(by.max(0).unsigned_abs())])
 }
 
 /// Moves columns that come late by so much (early, if negative) to where they belong, to the nearest sample, and with them the further columns

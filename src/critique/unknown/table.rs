@@ -133,12 +133,7 @@ impl ResidualTable {
         (block_s, row_s, rows_max): (f64, f64, usize),
     ) -> Result<Self> {
         let shape = |message: String| Error::Shape { operation: "residual table", message };
-        let mut seconds = 0.0;
-        for span in spans {
-            let flight = flights.get(span.flight).filter(|flight| span.start <= span.end && span.end <= flight.len());
-            let flight = flight.ok_or_else(|| shape(format!("span {span:?} lies outside the {} flights", flights.len())))?;
-            seconds += (span.end - span.start) as f64 * flight.step_s;
-        }
+        let seconds = seconds(flights, spans).map_err(shape)?;
         let row_s = row_s.max(seconds / rows_max.max(1) as f64);
         let used = |flight: &usize| spans.iter().any(|span| span.flight == *flight);
         let of_spans: Vec<usize> = (0..flights.len()).filter(used).collect();
@@ -237,6 +232,16 @@ impl ResidualTable {
     pub fn blocks(&self) -> Vec<std::ops::Range<usize>> {
         super::runs(&self.block)
     }
+}
+
+/// Length of all spans, s; the first that lies outside its flight, in words.
+fn seconds(flights: &[Flight], spans: &[Span]) -> std::result::Result<f64, String> {
+    let length_s = |span: &Span| {
+        let flight = flights.get(span.flight).filter(|flight| span.start <= span.end && span.end <= flight.len());
+        let outside = || format!("span {span:?} lies outside the {} flights", flights.len());
+        flight.map(|flight| (span.end - span.start) as f64 * flight.step_s).ok_or_else(outside)
+    };
+    spans.iter().map(length_s).sum()
 }
 
 /// A feature of a whole flight, whose velocity against the air may be known.
