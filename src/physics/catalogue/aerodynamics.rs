@@ -199,7 +199,7 @@ pub(super) const DEFINITIONS: &[Definition] = &[
         notes: Some(Notes {
             vehicles: MULTIROTOR,
             excitation: "climbs and descents while flying forwards and sideways",
-            confusable_with: &["dihedral_speedstab"],
+            confusable_with: &["dihedral_speedstab", "blowback_thrust"],
             would_tell_apart: "level flight, then climbs and descents at the same forward speed",
             fault_of_log: None,
             source: "flapping goes with 4/3 of the collective pitch and the air through the disc from below: Bramwell's Helicopter Dynamics, 2nd ed., ch. 3",
