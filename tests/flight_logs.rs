@@ -360,6 +360,7 @@ fn rows_near_bridged_cells_are_set_aside_as_asked_also_where_streams_move_and_ra
     assert_eq!(aside(&pieces), [(0, 3)]);
     let slow = read_one(&bad.csv(), &format!("resample_hz = 50\n{rule}\nset_aside_s = 0"))?;
     assert_eq!(aside(&slow), [(30, 32)]);
+    assert_eq!(aside(&read_one(&bad.csv(), &format!("{rule}\nset_aside_s = 1e300"))?), [(0, 400)]);
     assert_says(&refusal(read_one(&bad.csv(), &format!("{rule}\nset_aside_s = -1"))), &["set_aside_s", "-1"]);
     Ok(())
 }

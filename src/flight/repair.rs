@@ -52,7 +52,7 @@ pub(super) fn repair(table: &mut RawTable, schema: &Schema, step_s: f64) -> Resu
             }
             if let Some(near_s) = rule.set_aside_s {
                 let near = (near_s / step_s).round() as usize;
-                let around = |run: &Range<usize>| run.start.saturating_sub(near)..(run.end + near).min(aside.len());
+                let around = |run: &Range<usize>| run.start.saturating_sub(near)..run.end.saturating_add(near).min(aside.len());
                 count.runs.iter().map(around).collect::<Vec<_>>().into_iter().for_each(|rows| aside[rows].fill(true));
             }
             if rule.longer == Longer::Cut {

@@ -13,7 +13,7 @@ use crate::critique::diagnose::{Diagnosis, calibrated, searched};
 use crate::critique::locate::{Bin, Variable, dependences};
 use crate::disk::{Existing, Target, write_atomically};
 use crate::error::Result;
-use crate::flight::windows::windows;
+use crate::flight::windows::{counted, windows};
 use crate::flight::{Accelerations, Channel, PerChannel, Window};
 use crate::physics::Model;
 use crate::report::{DiagnoseReport, diagnose_page, page};
@@ -109,7 +109,7 @@ impl Studio {
     fn made_curves(&self, state: &State, after: &Model) -> Result<Curves> {
         let (flights, spans) = (&self.set.flights, searched(&self.split));
         let samples: usize = spans.iter().map(|span| span.end - span.start).sum();
-        let windows = windows(&spans, 1, samples.div_ceil(MOST_WINDOWS).max(1));
+        let windows = counted(flights, windows(&spans, 1, samples.div_ceil(MOST_WINDOWS).max(1)));
         let before = self.before_search(state)?;
         let row = |model: &Model| -> Result<Row> {
             let wanted = |flight: usize| spans.iter().any(|span| span.flight == flight);
