@@ -1,20 +1,21 @@
 //! Calibration: the numbers of a model's enabled effects by least squares on recorded flights (paper eq. 33), with units,
 //! 95 % intervals and a condition number; and a refusal that names the reason where the data do not determine them.
 //!
-//! What stands in which column is in `layout`, the algebra in `least_squares`, and coefficients that belong to a flight in `by_flight`.
+//! Which samples count is in `rows`, what stands in which column in `layout`, the algebra in `least_squares`, coefficients that belong to a
+//! flight in `by_flight`, and what came of it in `calibration`.
 
 use super::by_flight;
+use super::calibration::{Calibration, SETTLED, estimate};
 use super::catalogue;
 use super::columns::{Columns, Wanted};
 use super::compose::Free;
 use super::correlation::Correlation;
-use super::digits::printer;
 use super::effect::Effect;
 use super::evaluate::{composed_for, standard_names};
 use super::layout::Layout;
-use super::least_squares::{Cluster, Failure, Hold, residual, solve, step};
+use super::least_squares::{Cluster, Failure, Hold, Problem, Step, residual, solve, step};
 use super::model::Model;
-use super::sign_doubt::{SignDoubt, SignFinding};
+use super::rows::Rows;
 use super::signal::{Stage, signal_named};
 use super::weights::Weights;
 use crate::error::{Error, Result};
@@ -23,18 +24,8 @@ use crate::formula::Formula;
 use nalgebra::DVector;
 use std::collections::BTreeMap;
 
-/// Clusters that the whole of the data is cut into for the intervals, unless it is cut into more by flights.
-const CLUSTERS: usize = 40;
-
-/// Clusters are not made shorter than this, s.
-const SHORTEST_CLUSTER_S: f64 = 1.0;
-
 /// Passes over the flights, at most; a model of twenty effects takes about ten.
 const MOST_ROUNDS: usize = 40;
-
-/// Numbers have settled when none would move by more than this share of its standard error, were residuals independent. They are not,
-/// so the intervals are some times wider.
-const SETTLED: f64 = 1e-2;
 
 /// A standard error counts as at least this share of the number: where the flights know it to the last digit, that digit does not matter.
 const SMALLEST_ERROR: f64 = 1e-7;
@@ -46,112 +37,11 @@ const DAMPING: f64 = 1.0;
 const DAMPING_FACTOR: f64 = 10.0;
 const LARGEST_DAMPING: f64 = 1e12;
 
+/// Weight of what holds a number on a value, in units of its usual size: beyond anything that flights say.
+const HELD: f64 = 1e9;
+
 /// Share of its usual size at which a coefficient starts whose effect has shape parameters: at 0 these do nothing, and have no slope.
 const START: f64 = 0.1;
-
-/// One calibrated coefficient.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Estimate {
-    /// Name of the effect.
-    pub effect: String,
-    /// Name of the coefficient.
-    pub name: String,
-    /// Value, in [`Estimate::unit`]; for a property of each flight, the mean over the flights.
-    pub value: f64,
-    /// 95 % confidence interval, valid for residuals that are correlated in time. `None` for a property of each flight; the intervals
-    /// of the others hold given those properties, whose own uncertainty they leave out.
-    pub ci95: Option<[f64; 2]>,
-    /// Unit.
-    pub unit: String,
-    /// Values that physics allows, where the catalogue knows them. Calibration does not enforce them.
-    pub bounds: Option<[f64; 2]>,
-    /// For a property of each flight: its value by name of the flight.
-    pub by_flight: Option<BTreeMap<String, f64>>,
-}
-
-impl Estimate {
-    /// Whether the value lies where physics does not allow it.
-    pub fn is_implausible(&self) -> bool {
-        self.bounds.is_some_and(|[low, high]| !(low..=high).contains(&self.value))
-    }
-}
-
-/// What a calibration found.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Calibration {
-    /// Coefficients in the order of the model.
-    pub coefficients: Vec<Estimate>,
-    /// Largest condition number of the column-scaled regressor matrices.
-    pub condition_number: f64,
-    /// Rows used, each with six accelerations.
-    pub rows: usize,
-    /// Stretches of consecutive rows that the intervals rest on.
-    pub clusters: usize,
-    /// What counted alike.
-    #[serde(default)]
-    pub weights: Weights,
-    /// Passes over the flights; one, if the model is linear in its numbers.
-    pub rounds: usize,
-    /// By how much a number would still move, in half intervals.
-    pub last_change: f64,
-    /// Coefficients whose sign physics fixes and this calibration does not show.
-    #[serde(default)]
-    pub signs: Vec<SignDoubt>,
-}
-
-impl std::fmt::Display for Calibration {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        writeln!(f, "{:<20} {:<8} {:>12}   {:<27} unit", "effect", "name", "value", "95 % interval")?;
-        for estimate in &self.coefficients {
-            let Estimate { effect, name, value, ci95, unit, bounds, by_flight } = estimate;
-            let shown = printer(5, ci95.iter().flatten().copied().chain([*value]));
-            let interval = match (ci95, by_flight) {
-                (Some([low, high]), _) => format!("[{:>11}, {:>11}]", shown(*low), shown(*high)),
-                (None, Some(flights)) => {
-                    let (low, high) = flights
-                        .values()
-                        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(*value), high.max(*value)));
-                    format!("{low:.3} to {high:.3} in {} flights", flights.len())
-                }
-                (None, None) => String::new(),
-            };
-            write!(f, "{effect:<20} {name:<8} {:>12}   {interval:<27} {unit}", shown(*value))?;
-            let doubt = self.signs.iter().find(|doubt| doubt.effect == *effect && doubt.name == *name);
-            match (bounds, doubt.map(|doubt| doubt.finding)) {
-                (Some([low, high]), _) if estimate.is_implausible() => {
-                    writeln!(f, "   outside its physical bounds {low} to {high}")?
-                }
-                (_, Some(SignFinding::Wrong)) => writeln!(f, "   WRONG SIGN")?,
-                (_, Some(SignFinding::NotDetermined)) => writeln!(f, "   sign not determined")?,
-                _ => writeln!(f)?,
-            }
-        }
-        if self.last_change > SETTLED {
-            let change = self.last_change;
-            writeln!(f, "numbers still moved by {change:.1e} of half their intervals after {} passes", self.rounds)?;
-        }
-        write!(
-            f,
-            "{} rows; condition number {:.1}; intervals from {} stretches of consecutive rows",
-            self.rows, self.condition_number, self.clusters
-        )?;
-        let wrong: Vec<&SignDoubt> = self.signs.iter().filter(|doubt| doubt.finding == SignFinding::Wrong).collect();
-        wrong.iter().try_for_each(|doubt| write!(f, "\nCAUTION: {doubt}"))?;
-        if !wrong.is_empty() {
-            write!(
-                f,
-                "\n         Such a number stands in for physics that the model lacks, or a control acts otherwise than the log says."
-            )?;
-        }
-        if self.signs.iter().any(|doubt| doubt.finding == SignFinding::NotDetermined) {
-            write!(
-                f,
-                "\nWhere a sign is not determined, zero is possible: leave the effect out, or fly what moves it more and calibrate again."
-            )?;
-        }
-        Ok(())
-    }
-}
 
 /// Fits the numbers of the enabled effects to the measured accelerations in `spans` and returns the model with the values and
 /// intervals set: coefficients, and parameters that are not known beforehand (time constants, shapes).
@@ -274,31 +164,6 @@ fn leans_on_others(model: &Model, effect: &Effect) -> bool {
         None => !standard_names().contains(&name) && effect.number_named(name).is_none() && model.coefficient_named(name).is_some(),
     };
     !effect.swaps.is_empty() || effect.formulas().flat_map(Formula::names).any(reads)
-}
-
-/// The rows that a calibration sees.
-struct Rows<'a> {
-    flights: &'a [Flight],
-    ranges: Vec<Vec<(usize, usize)>>,
-    /// Flights with rows, and how many clusters each is cut into.
-    jobs: Vec<(usize, usize)>,
-    total: usize,
-    weights: Weights,
-    /// Of each flight, what its columns are multiplied by.
-    factors: Vec<PerChannel<f64>>,
-}
-
-impl<'a> Rows<'a> {
-    fn of(flights: &'a [Flight], spans: &[Span], weights: Weights) -> Result<Self> {
-        let ranges: Vec<Vec<(usize, usize)>> = (0..flights.len()).map(|flight| union(flight, spans, flights)).collect();
-        let rows: Vec<usize> = ranges.iter().map(|ranges| ranges.iter().map(|range| range.1 - range.0).sum()).collect();
-        let total: usize = rows.iter().sum();
-        if total == 0 {
-            return Err(Error::Undetermined("no rows to calibrate on: the spans are empty; give at least one flight".into()));
-        }
-        let (jobs, factors) = (cut(flights, &rows)?, weights.of(flights, &ranges));
-        Ok(Self { flights, ranges, jobs, total, weights, factors })
-    }
 }
 
 /// A model's columns on the rows, at its present numbers.
@@ -451,83 +316,118 @@ impl Pass {
         damped: Option<(f64, &BTreeMap<Free, f64>)>,
         with_intervals: bool,
     ) -> Result<Solved> {
-        let layout = &self.layout;
-        let mut clusters = self.clusters.clone();
         let mut found = model.clone();
         found.correlations.clear();
-        let hold = |members: &[Free]| {
-            damped.map(|(damping, held)| Hold {
-                weights: self.weights.clone(),
-                rows: members
-                    .iter()
-                    .map(|free| match held.get(free) {
-                        Some(&bound) => (1e9 / usual_size(model, *free), bound),
-                        None => (
-                            damping.sqrt() / usual_size(model, *free),
-                            model.effects[free.0].number(free.1).map_or(0.0, |number| number.value),
-                        ),
-                    })
-                    .collect(),
-            })
-        };
-        if !layout.own.is_empty() {
-            let all = hold(&layout.free);
-            let shape = by_flight::Shape {
-                free: layout.free.len(),
-                channels: layout.channels.values(),
-                own: &layout.own_columns(model),
-                hold: all.as_ref(),
-            };
-            let settled =
-                by_flight::settle(&shape, &mut clusters).map_err(|failure| layout.explain(model, &layout.free, &failure))?;
-            clusters = settled.clusters;
-            for (place, &(effect, index)) in layout.own.iter().enumerate() {
-                let coefficient = &mut found.effects[effect].coefficients[index];
-                let values: BTreeMap<String, f64> = settled
-                    .values
-                    .iter()
-                    .filter_map(|(&flight, values)| Some((rows.flights.get(flight)?.name.clone(), *values.get(place)?)))
-                    .collect();
-                coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
-                (coefficient.ci95, coefficient.by_flight) = (None, Some(values));
-            }
+        let mut clusters = self.clusters.clone();
+        if !self.layout.own.is_empty() {
+            let all = damped.map(|damped| self.hold(model, &self.layout.free, damped));
+            clusters = self.settle(model, rows, all.as_ref(), clusters, &mut found)?;
         }
         let (mut condition_number, mut largest_move) = (1.0_f64, 0.0_f64);
-        for (members, problem) in layout.problems() {
-            let failed = |failure: Failure| layout.explain(model, &members, &failure);
-            let hold = hold(&members);
-            let (values, errors, ci95): (Vec<f64>, Vec<f64>, Vec<Option<[f64; 2]>>) = if with_intervals {
-                let solution = solve(&problem, &mut clusters, hold.as_ref()).map_err(failed)?;
-                condition_number = condition_number.max(solution.condition_number);
-                if let Some(vague) = (0..members.len()).find(|&at| !solution.ci95[at].iter().all(|end| end.is_finite())) {
-                    return Err(failed(Failure::OneCluster(vague)));
-                }
+        for (members, problem) in self.layout.problems() {
+            let hold = damped.map(|damped| self.hold(model, &members, damped));
+            let failed = |failure: Failure| self.layout.explain(model, &members, &failure);
+            let fitted = Fitted::of(&problem, &mut clusters, hold.as_ref(), with_intervals).map_err(failed)?;
+            condition_number = condition_number.max(fitted.condition_number);
+            if with_intervals {
                 let label = |&(effect, index): &Free| {
                     let number = model.effects[effect].number(index).expect("a number of the model");
                     Correlation::label(&model.effects[effect], &number.name)
                 };
-                found.correlations.extend(Correlation::of_deviations(members.iter().map(label).collect(), &solution.deviations));
-                let halves = solution.ci95.iter().map(|[low, high]| 0.5 * (high - low)).collect();
-                (solution.values, halves, solution.ci95.into_iter().map(Some).collect())
-            } else {
-                let step = step(&problem, &mut clusters, hold.as_ref()).map_err(failed)?;
-                condition_number = condition_number.max(step.fit.condition_number());
-                let errors = (0..members.len()).map(|at| step.fit.standard_error(at)).collect();
-                (step.fit.values.iter().copied().collect(), errors, vec![None; members.len()])
-            };
+                found.correlations.extend(Correlation::of_deviations(members.iter().map(label).collect(), &fitted.deviations));
+            }
             for (at, &(effect, index)) in members.iter().enumerate() {
                 // On a bound to the last digit.
-                let value = damped.and_then(|(_, held)| held.get(&(effect, index)).copied()).unwrap_or(values[at]);
+                let value = damped.and_then(|(_, held)| held.get(&(effect, index)).copied()).unwrap_or(fitted.values[at]);
                 if let Some((known, interval)) = found.effects[effect].number_mut(index) {
-                    let error = errors[at].max(SMALLEST_ERROR * value.abs());
+                    let error = fitted.errors[at].max(SMALLEST_ERROR * value.abs());
                     if error > 0.0 {
                         largest_move = largest_move.max((value - *known).abs() / error);
                     }
-                    (*known, *interval) = (value, ci95[at]);
+                    (*known, *interval) = (value, fitted.ci95[at]);
                 }
             }
         }
         Ok(Solved { model: found, condition_number, clusters: clusters.len(), largest_move })
+    }
+
+    /// What keeps numbers where they are, as far as they are damped, and on the values where they are held.
+    fn hold(&self, model: &Model, members: &[Free], (damping, held): (f64, &BTreeMap<Free, f64>)) -> Hold {
+        let row = |free: &Free| match held.get(free) {
+            Some(&bound) => (HELD / usual_size(model, *free), bound),
+            None => {
+                let value = model.effects[free.0].number(free.1).map_or(0.0, |number| number.value);
+                (damping.sqrt() / usual_size(model, *free), value)
+            }
+        };
+        Hold { weights: self.weights.clone(), rows: members.iter().map(row).collect() }
+    }
+
+    /// Puts the coefficients that belong to a flight into `found`; the clusters that come back are without them.
+    fn settle(
+        &self,
+        model: &Model,
+        rows: &Rows<'_>,
+        hold: Option<&Hold>,
+        mut clusters: Vec<Cluster>,
+        found: &mut Model,
+    ) -> Result<Vec<Cluster>> {
+        let layout = &self.layout;
+        let own = &layout.own_columns(model);
+        let shape = by_flight::Shape { free: layout.free.len(), channels: layout.channels.values(), own, hold };
+        let settled = by_flight::settle(&shape, &mut clusters).map_err(|failure| layout.explain(model, &layout.free, &failure))?;
+        for (place, &(effect, index)) in layout.own.iter().enumerate() {
+            let of_flight =
+                |(&flight, values): (&usize, &Vec<f64>)| Some((rows.flights.get(flight)?.name.clone(), *values.get(place)?));
+            let values: BTreeMap<String, f64> = settled.values.iter().filter_map(of_flight).collect();
+            let coefficient = &mut found.effects[effect].coefficients[index];
+            coefficient.value = values.values().sum::<f64>() / values.len().max(1) as f64;
+            (coefficient.ci95, coefficient.by_flight) = (None, Some(values));
+        }
+        Ok(settled.clusters)
+    }
+}
+
+/// The numbers of one group of channels.
+struct Fitted {
+    values: Vec<f64>,
+    /// Half intervals or, without these, standard errors.
+    errors: Vec<f64>,
+    ci95: Vec<Option<[f64; 2]>>,
+    /// How each cluster pulls the numbers; empty without intervals.
+    deviations: Vec<Vec<f64>>,
+    condition_number: f64,
+}
+
+impl Fitted {
+    fn of(
+        problem: &Problem,
+        clusters: &mut [Cluster],
+        hold: Option<&Hold>,
+        with_intervals: bool,
+    ) -> std::result::Result<Self, Failure> {
+        if !with_intervals {
+            let Step { fit, .. } = step(problem, clusters, hold)?;
+            let numbers = 0..fit.values.len();
+            return Ok(Self {
+                values: fit.values.iter().copied().collect(),
+                errors: numbers.clone().map(|at| fit.standard_error(at)).collect(),
+                ci95: numbers.map(|_| None).collect(),
+                deviations: Vec::new(),
+                condition_number: fit.condition_number(),
+            });
+        }
+        let solution = solve(problem, clusters, hold)?;
+        if let Some(vague) = solution.ci95.iter().position(|ends| !ends.iter().all(|end| end.is_finite())) {
+            return Err(Failure::OneCluster(vague));
+        }
+        Ok(Self {
+            values: solution.values,
+            errors: solution.ci95.iter().map(|[low, high]| 0.5 * (high - low)).collect(),
+            ci95: solution.ci95.into_iter().map(Some).collect(),
+            deviations: solution.deviations,
+            condition_number: solution.condition_number,
+        })
     }
 }
 
@@ -548,70 +448,6 @@ pub(super) fn usual_size(model: &Model, (effect, index): Free) -> f64 {
         Some([low, high]) => low.abs().max(high.abs()),
         None if number.value != 0.0 => number.value.abs(),
         None => 1.0,
-    }
-}
-
-/// How many clusters each flight with rows is cut into.
-///
-/// # Errors
-/// [`Error::Undetermined`] where intervals would rest on nothing: they need two clusters of twice the length.
-fn cut(flights: &[Flight], rows: &[usize]) -> Result<Vec<(usize, usize)>> {
-    let total: usize = rows.iter().sum();
-    let jobs: Vec<(usize, usize)> = (0..flights.len())
-        .filter(|&flight| rows[flight] > 0)
-        .map(|flight| {
-            let shortest = (SHORTEST_CLUSTER_S / flights[flight].step_s) as usize;
-            let length = (total / CLUSTERS).max(shortest).max(1);
-            (flight, ((rows[flight] + length / 2) / length).max(1).min(rows[flight]))
-        })
-        .collect();
-    if jobs.iter().map(|(_, clusters)| clusters.div_ceil(2)).sum::<usize>() < 2 {
-        let length_s: f64 = jobs.iter().map(|&(flight, _)| rows[flight] as f64 * flights[flight].step_s).sum();
-        return Err(Error::Undetermined(format!(
-            "the training part is {length_s:.2} s of one flight, too little to tell how certain a coefficient is; give at least \
-             {:.1} s, or a second flight",
-            2.5 * SHORTEST_CLUSTER_S
-        )));
-    }
-    Ok(jobs)
-}
-
-pub(super) fn estimate(model: &Model, effect: usize, index: usize) -> Option<Estimate> {
-    let effect = model.effects.get(effect)?;
-    let number = effect.number(index)?;
-    let definition = catalogue::definition(&effect.kind);
-    let of_coefficient = definition.and_then(|definition| definition.coefficient(&number.name)).map(|known| known.bounds);
-    let of_parameter = definition.and_then(|definition| definition.parameter(&number.name)).map(|known| known.bounds);
-    Some(Estimate {
-        effect: effect.name.clone(),
-        name: number.name,
-        value: number.value,
-        ci95: number.ci95,
-        unit: number.unit,
-        bounds: of_coefficient.or(of_parameter).filter(|bounds| bounds.iter().all(|bound| bound.is_finite())),
-        by_flight: number.by_flight,
-    })
-}
-
-/// The samples of one flight that the spans cover and that count, in order, without overlap.
-fn union(flight: usize, spans: &[Span], flights: &[Flight]) -> Vec<(usize, usize)> {
-    let length = flights.get(flight).map_or(0, Flight::len);
-    let mut ranges: Vec<(usize, usize)> =
-        spans.iter().filter(|span| span.flight == flight).map(|span| (span.start.min(length), span.end.min(length))).collect();
-    ranges.retain(|range| range.0 < range.1);
-    ranges.sort_unstable();
-    let mut merged: Vec<(usize, usize)> = Vec::new();
-    for (start, end) in ranges {
-        match merged.last_mut() {
-            Some(last) if start <= last.1 => last.1 = last.1.max(end),
-            _ => merged.push((start, end)),
-        }
-    }
-    match flights.get(flight) {
-        Some(flight) => {
-            merged.into_iter().flat_map(|(start, end)| flight.counted(start..end)).map(|rows| (rows.start, rows.end)).collect()
-        }
-        None => merged,
     }
 }
 

@@ -8,6 +8,7 @@ mod assumptions;
 mod baseline;
 mod by_flight;
 mod calibrate;
+mod calibration;
 pub mod catalogue;
 mod columns;
 mod compose;
@@ -30,6 +31,7 @@ pub mod rollout;
 #[cfg(feature = "files")]
 mod rotor_file;
 mod rotors;
+mod rows;
 mod sign;
 mod sign_doubt;
 mod signal;
@@ -40,7 +42,8 @@ mod weights;
 
 pub use baseline::PAPER;
 pub(crate) use calibrate::off_zero;
-pub use calibrate::{Calibration, Estimate, calibrate, calibrate_weighed};
+pub use calibrate::{calibrate, calibrate_weighed};
+pub use calibration::{Calibration, Estimate};
 pub use columns::{Columns, Regressor, Wanted, evaluate_blocks, missing_input};
 pub use correlation::{Correlation, correlation_matrix};
 pub use definition::{

@@ -5,7 +5,8 @@
 //! Jategaonkar, *Flight Vehicle System Identification*, 2nd ed., ch. 4 and 9). Gauss-Newton with Levenberg's damping, derivatives by finite differences
 //! of whole rollouts. How a rollout is integrated is in `rollout`.
 
-use super::calibrate::{Estimate, estimate, parameter_bounds, usual_size};
+use super::calibrate::{parameter_bounds, usual_size};
+use super::calibration::{Estimate, estimate};
 use super::correlation::Correlation;
 use super::model::Model;
 use super::rollout::{HUBER, Measure, Rollout, size, starts};

@@ -55,8 +55,15 @@ pub fn unseen(kept: Kept, duration_s: f64) -> String {
     format!("{duration_s:.0} s of {} that no search has seen", kept.words())
 }
 
+/// A channel of which so much of the variance is left is not called explained.
+const MUCH: f64 = 0.5;
+
 /// The verdict in a few words, the head of everything that is said.
 pub fn headline(diagnosis: &Diagnosis) -> String {
+    let worst = diagnosis.failure.as_ref().and_then(|failure| failure.channels.first());
+    if let Some(worst) = worst.filter(|worst| diagnosis.verdict == Verdict::Explained && worst.unexplained >= MUCH) {
+        return format!("nothing to name, though {} is not explained", worst.channel);
+    }
     let confirmation = diagnosis.confirmation.filter(|_| diagnosis.verdict == Verdict::EffectsMissing);
     match confirmation {
         Some(Confirmation::Contradicted) => "nothing to add; what fits the searched flights fails on others".into(),
@@ -415,6 +422,19 @@ mod tests {
         let said = effects(&with(Some(locked("vz_dot", OPEN))), Confirmation::Open);
         assert!(said.ends_with("which may be none: not confirmed."), "{said}");
         assert!(effects(&with(None), Confirmation::NothingKept).contains("No flights were kept"));
+    }
+
+    #[test]
+    fn a_channel_that_is_mostly_left_is_not_called_explained() {
+        let of = |verdict: Verdict, unexplained: f64| {
+            let channels = vec![FailureChannel { channel: "wy_dot".into(), share: 0.9, unexplained, depends_on: Vec::new() }];
+            let failure = Some(Failure { on: "locked".into(), channels });
+            headline(&Diagnosis { failure, ..Diagnosis::nothing(verdict, String::new()) })
+        };
+        assert_eq!(of(Verdict::Explained, 0.49), "explained");
+        assert_eq!(of(Verdict::Explained, 0.6), "nothing to name, though wy_dot is not explained");
+        assert_eq!(of(Verdict::NotInCatalogue, 0.6), "not in the catalogue");
+        assert_eq!(headline(&Diagnosis::nothing(Verdict::Explained, String::new())), "explained");
     }
 
     #[test]
