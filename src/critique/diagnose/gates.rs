@@ -50,3 +50,5 @@ pub(super) const SMALLEST_AMPLITUDE: f64 = 0.05;
 pub(super) const SMALLEST_AMPLITUDE_OF_RIVAL: f64 = 0.15;
 /// Standard errors by which one of two that are mistaken for each other has to be better to take the other's place; within them they are told as a tie.
 pub(super) const CLEARLY: f64 = 2.0;
+/// A channel of which more than this part of its variance is left is mostly unexplained: it is not called explained, and what removes little of it is not named.
+pub(super) const MOSTLY_UNEXPLAINED: f64 = 0.5;

@@ -1,7 +1,7 @@
 //! What a diagnosis says in words, one function a sentence. Numbers come in finished; nothing is measured or judged here but which
 //! words fit a number. Text, JSON and page take their sentences from here, so that they cannot contradict each other.
 
-use super::gates::SMALLEST_FALL;
+use super::gates::{MOSTLY_UNEXPLAINED, SMALLEST_FALL};
 use super::report::{Bar, Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict, Worth};
 use crate::critique::shares::Share;
 use crate::flight::Column;
@@ -55,13 +55,10 @@ pub fn unseen(kept: Kept, duration_s: f64) -> String {
     format!("{duration_s:.0} s of {} that no search has seen", kept.words())
 }
 
-/// A channel of which so much of the variance is left is not called explained.
-const MUCH: f64 = 0.5;
-
 /// The verdict in a few words, the head of everything that is said.
 pub fn headline(diagnosis: &Diagnosis) -> String {
     let worst = diagnosis.failure.as_ref().and_then(|failure| failure.channels.first());
-    if let Some(worst) = worst.filter(|worst| diagnosis.verdict == Verdict::Explained && worst.unexplained >= MUCH) {
+    if let Some(worst) = worst.filter(|worst| diagnosis.verdict == Verdict::Explained && worst.unexplained > MOSTLY_UNEXPLAINED) {
         return format!("nothing to name, though {} is not explained", worst.channel);
     }
     let confirmation = diagnosis.confirmation.filter(|_| diagnosis.verdict == Verdict::EffectsMissing);

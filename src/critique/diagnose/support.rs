@@ -7,12 +7,11 @@
 //! 2006, "Measurement Error in Nonlinear Models", chapter 3): the mean of what was, given what was recorded, is a straight line only for
 //! normal variables. The bend is then small beside the error that makes it; that of a linkage leaves none.
 
+use super::gates::MOSTLY_UNEXPLAINED;
 use super::rest::Share;
 use crate::flight::{Channel, PerChannel};
 
-/// A channel of which so much of its variance is left is mostly unexplained …
-const MOSTLY_UNEXPLAINED: f64 = 0.5;
-/// … and an effect has to remove this share of what is left there.
+/// Of a channel that is mostly unexplained an effect has to remove this share of what is left there.
 const LEAST_OF_LEFT: f64 = 0.1;
 /// A channel of which so much of its variance is left has an error that may be that of a stick's record …
 const PARTLY_UNEXPLAINED: f64 = 0.2;
