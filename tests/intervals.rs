@@ -1,4 +1,5 @@
-//! What a hybrid promises of its predictions: intervals that hold on flights no training saw, and an envelope that such flights may leave.
+//! What a hybrid promises of its predictions: intervals that hold on flights no training saw, an envelope that such flights may leave, and a gate that
+//! leaves to the physics what the network did not learn.
 #![cfg(all(feature = "disk", feature = "sim"))]
 
 use phyture::critique::{Coverage, coverage};
@@ -11,7 +12,7 @@ use phyture::nn::PhyTureConfig;
 use phyture::physics::{Model, calibrate};
 use phyture::sim::{Simulation, simulate};
 use phyture::tape::Threads;
-use phyture::train::{Ended, RunFolder, TrainConfig, Training};
+use phyture::train::{Ended, Job, RunFolder, TrainConfig, Training};
 use phyture::{Error, Result};
 use std::path::Path;
 
@@ -27,7 +28,7 @@ fn config() -> TrainConfig {
         moving_average: 5,
         ..PhyTureConfig::default()
     };
-    TrainConfig { network: network.into(), epochs: 2, stride: 40, interval_every: 8, ..TrainConfig::default() }
+    TrainConfig { network: network.into(), epochs: 2, stride: 40, ..TrainConfig::in_minutes() }
 }
 
 /// The baseline calibrated on what trains, and a network on top of it.
@@ -130,6 +131,47 @@ fn nothing_of_what_trained_lies_outside_and_of_a_little_flight_no_intervals_are_
             envelope.place(&values) != Place::Inside
         });
         assert_eq!(outside, None, "{}", flight.name);
+    }
+    Ok(())
+}
+
+#[test]
+fn a_gate_is_made_of_what_did_not_train() -> Result<()> {
+    let set = simulate(&Simulation { minutes: 3.0, seed: 9612, ..Simulation::default() })?;
+    let model = Model::paper("n9", 4.58, [0.18, 0.34, 0.28], 0.8);
+    let job = |split: &Split, gate_every| {
+        Job::new(&set.flights, split, &model, &TrainConfig { gate_every, interval_every: gate_every, ..config() })
+    };
+    let (validated, lone) = (Split::new(&set.flights, &[], &Protocol::Segments, 1)?, set.manoeuvres()[0].to_owned());
+    let (gated, plain) = (job(&validated, 8)?, job(&validated, 0)?);
+    assert!(!gated.validation.is_empty());
+    assert_eq!((&gated.gate_windows, &gated.windows), (&gated.validation, &plain.windows));
+    // Without a validation part, blocks of what would have trained.
+    let locked = Split::new(&set.flights, &[lone], &Protocol::Segments, 1)?;
+    let (gated, plain) = (job(&locked, 8)?, job(&locked, 0)?);
+    assert!(gated.validation.is_empty() && !gated.gate_windows.is_empty());
+    assert!(gated.gate_windows.iter().all(|window| !gated.windows.contains(window)));
+    assert_eq!(gated.windows.len() + gated.gate_windows.len(), plain.windows.len());
+    Ok(())
+}
+
+#[test]
+fn where_physics_lacks_nothing_the_network_is_shut_out() -> Result<()> {
+    let set = simulate(&Simulation { minutes: 8.0, seed: 9620, ..Simulation::baseline() })?;
+    let lone = set.manoeuvres()[0].to_owned();
+    let split = Split::new(&set.flights, &[lone], &Protocol::Segments, 1)?;
+    let hybrid = trained(&set, &split, &folder()?.path().join("run"))?;
+    let judged = windows(&split.test, HISTORY, 11);
+    let predicted = hybrid.predict(&set.flights, &judged, Threads(2))?;
+    let physics = set.flights.iter().map(|flight| hybrid.description().model.predict(flight)).collect::<Result<Vec<_>>>()?;
+    for channel in Channel::ALL {
+        let (mut with, mut without) = (0.0, 0.0);
+        for (window, predicted) in judged.iter().zip(&predicted) {
+            let measured = set.flights[window.flight].column(channel.column())[window.last];
+            with += (measured - predicted[channel]).powi(2);
+            without += (measured - physics[window.flight][channel][window.last]).powi(2);
+        }
+        assert!(with <= 1.01 * without, "{channel}: {with} beside {without} of the physics, gate {:?}", hybrid.description().gate);
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ mod floor;
 pub mod init;
 pub mod locate;
 pub mod predictions;
+pub mod prose;
 pub mod regime;
 pub mod residual_views;
 pub mod rollout;

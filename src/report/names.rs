@@ -39,14 +39,6 @@ pub fn channel_panels() -> Vec<(String, String)> {
     Column::TARGETS.iter().map(|column| (named(column.name()), column.unit().to_owned())).collect()
 }
 
-/// `a, b and c`.
-pub fn listed(items: &[String]) -> String {
-    match items.split_last() {
-        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
-        _ => items.concat(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,6 +52,5 @@ mod tests {
             );
         }
         assert_eq!((named("load"), said("vx")), ("load".into(), "forward speed (vx)".into()));
-        assert_eq!(listed(&["a", "b", "c"].map(str::to_owned)), "a, b and c");
     }
 }

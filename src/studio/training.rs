@@ -123,6 +123,8 @@ pub struct TrainingText {
     pub error: Option<String>,
     /// The network, once it is written.
     pub trained: Option<TrainedNetwork>,
+    /// What its gate lets through, in words.
+    pub gate: Option<String>,
 }
 
 /// Who explains what of the accelerations on flights that no fit sees.
@@ -481,6 +483,7 @@ impl TrainingJob {
             seconds: seen.ended.as_ref().map_or_else(|| self.watched.begun.elapsed().as_secs_f64(), |ended| ended.0),
             left_s: seen.ended.is_none().then(|| seen.left_s()).flatten(),
             error,
+            gate: trained.as_ref().and_then(TrainedNetwork::gate_in_words),
             trained,
         }
     }
@@ -505,6 +508,7 @@ impl TrainingText {
             left_s: None,
             error: None,
             trained: None,
+            gate: None,
         }
     }
 }

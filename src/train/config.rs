@@ -43,7 +43,9 @@ pub struct TrainConfig {
     /// Weight of each channel's squared error in the loss is 1/σ² of the residual instead of 1. Default off (paper eq. 13).
     pub standardise_loss: bool,
     /// Every so many-th 10-s block of the training part is kept from the network to fit its gate on, one factor a channel
-    /// between 0 and 1; 0 keeps none and sets no gate, as in the paper. Default 0.
+    /// between 0 and 1 ([`Hybrid::fit_gate`](crate::hybrid::Hybrid::fit_gate)); where the split has a validation part, that serves and no block is kept.
+    /// 0 sets no gate, as in the paper. Default 0; in [`TrainConfig::in_minutes`] 8, and in a file over these that leaves it out as
+    /// `interval_every`, or 0 beside `rollout`.
     pub gate_every: usize,
     /// Every so many-th 10-s block of the training part is kept from the network to measure how far its predictions stray, where neither a gate
     /// nor the split keeps any; 0 keeps none, and then there are no intervals. Default 0; 8 in [`TrainConfig::in_minutes`].
@@ -127,10 +129,11 @@ impl TrainConfig {
     pub const MOST_STRIDE: usize = 1_000_000;
 
     /// What ends in a few minutes on two cores and half an hour of flight at 100 Hz: a history of 128 samples, width 32, 20 epochs, a
-    /// window every 12 samples.
+    /// window every 12 samples; a gate, since on so little flight a network adds an error of its own to what physics explains.
     pub fn in_minutes() -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        Self { network: network.into(), epochs: 20, warmup_epochs: 2, stride: 12, interval_every: 8, ..Self::default() }
+        let kept = Self { gate_every: 8, interval_every: 8, ..Self::default() };
+        Self { network: network.into(), epochs: 20, warmup_epochs: 2, stride: 12, ..kept }
     }
 
     /// Checks every field against its range, and that no input is a target or made of one.

@@ -21,10 +21,9 @@ pub struct Job {
     pub sequences: Vec<sequence::Sequence>,
     /// Windows that train.
     pub windows: Vec<Window>,
-    /// Windows kept from training, for the gate; empty without one.
+    /// Windows that did not train, for the gate: the validation part, else blocks of the training part; empty without a gate.
     pub gate_windows: Vec<Window>,
-    /// Windows kept from training that intervals are made of: those of the gate where there is one, else those of the validation part, else
-    /// blocks of the training part.
+    /// Windows that did not train, for the intervals: the validation part, else blocks of the training part.
     pub interval_windows: Vec<Window>,
     /// Where rollouts may train: the training part, without what is kept from training.
     pub rollout_spans: Vec<Span>,
@@ -56,12 +55,13 @@ impl Job {
         let sequences = sequence::sequences(flights, &description)?;
         let of = |spans: &[Span]| counted(flights, windows(spans, config.network.history(), config.stride));
         let (all, validation) = (of(spans), of(&split.validation));
-        // The gate is six numbers: what they were fitted on is hardly flattered by them, and serves the intervals as well.
         let Blocks { of_window: blocks, keys } = Blocks::new(flights, &all);
-        let (every, for_gate) = match config.gate_every {
-            // Of too few blocks nothing is made: then all of them train.
-            0 if validation.is_empty() && keys.len() >= config.interval_every * FEWEST_BLOCKS => (config.interval_every, false),
-            every => (every, true),
+        let every = match config.gate_every {
+            _ if !validation.is_empty() => 0,
+            // Of too few blocks no intervals are made: then all of them train.
+            0 if keys.len() < config.interval_every * FEWEST_BLOCKS => 0,
+            0 => config.interval_every,
+            every => every,
         };
         let is_kept = |block: usize| every > 0 && block % every == every - 1;
         let choose =
@@ -71,8 +71,9 @@ impl Job {
             true => spans.clone(),
             false => between(&all, &blocks.iter().map(|block| is_kept(*block)).collect::<Vec<_>>(), config.network.history()),
         };
-        let interval_windows = if kept.is_empty() { validation.clone() } else { kept.clone() };
-        let gate_windows = if for_gate { kept } else { Vec::new() };
+        // The gate is six numbers: what they were fitted on is hardly flattered by them, and serves the intervals as well.
+        let interval_windows = if kept.is_empty() { validation.clone() } else { kept };
+        let gate_windows = if config.gate_every > 0 { interval_windows.clone() } else { Vec::new() };
         Ok(Self { description, sequences, windows: training, gate_windows, interval_windows, rollout_spans, validation })
     }
 

@@ -14,6 +14,9 @@ const NETWORK: &str = "network";
 const KIND: &str = "kind";
 const PHYTURE: &str = "phyture";
 
+/// Field whose default follows from others.
+const GATE: &str = "gate_every";
+
 /// Comments of the fields, in the order in which they are written.
 const FIELDS: [(&str, &str); 14] = [
     ("epochs", "Passes over the training windows; the paper does not state its number."),
@@ -22,7 +25,10 @@ const FIELDS: [(&str, &str); 14] = [
     ("peak_rate", "Peak learning rate."),
     ("warmup_epochs", "Epochs of linear warm-up; at most a tenth of all where there are ten or fewer. Half a cosine follows."),
     ("standardise_loss", "Divide each channel's error by its standard deviation in the loss."),
-    ("gate_every", "Keep every so many-th 10-s block from the network to fit a gate on, a factor a channel; 0: no gate."),
+    (
+        "gate_every",
+        "Keep every so many-th 10-s block from the network to fit a gate on, a factor a channel, where the split has no validation part; 0: no gate.",
+    ),
     (
         "interval_every",
         "Keep every so many-th 10-s block from the network for its intervals, where neither gate nor split keeps any; 0: no intervals.",
@@ -99,8 +105,13 @@ impl TrainConfig {
         toml::from_str::<Self>(text).map_err(|error| fault(&error))?;
         let given: Table = text.parse().map_err(|error: toml::de::Error| fault(&error))?;
         let mut merged = table(base)?;
+        let leaves_gate = !given.contains_key(GATE);
         overlay(&mut merged, given);
-        let config: Self = merged.try_into().map_err(|error: toml::de::Error| fault(&error))?;
+        let mut config: Self = merged.try_into().map_err(|error: toml::de::Error| fault(&error))?;
+        if leaves_gate && base.gate_every > 0 {
+            // The blocks that are kept anyway; a gate and rollouts exclude each other, and what was asked for goes before a default.
+            config.gate_every = if config.rollout.is_some() { 0 } else { config.interval_every };
+        }
         config.check().map_err(|error| match error {
             Error::Config { field, found, expected, .. } => {
                 Error::Config { place: path.display().to_string(), field, found, expected }
@@ -272,6 +283,17 @@ mod tests {
         assert_eq!((other.network.name(), other.network.history(), other.epochs), ("TCN", 128, 20));
         assert_eq!(read("[network]\nkind = \"tcn\"\nhistory = 64\n", &base)?.network.history(), 64);
         assert_eq!(read("", &TrainConfig::default())?, TrainConfig::default());
+        Ok(())
+    }
+
+    #[test]
+    fn a_gate_that_is_left_out_takes_the_blocks_of_the_intervals_and_none_beside_rollouts() -> Result<()> {
+        let gate = |text: &str| Ok::<_, Error>(read(text, &TrainConfig::in_minutes())?.gate_every);
+        assert_eq!((gate("epochs = 3\n")?, gate("interval_every = 5\n")?, gate("interval_every = 0\n")?), (8, 5, 0));
+        assert_eq!((gate("gate_every = 3\n")?, gate("gate_every = 0\n")?, gate("[rollout]\n")?), (3, 0, 0));
+        // Asked for, it is refused there as ever; and the paper has none.
+        assert!(gate("gate_every = 8\n[rollout]\n").is_err_and(|error| error.to_string().contains("`gate_every` is 8")));
+        assert_eq!(read("interval_every = 8\n", &TrainConfig::default())?.gate_every, 0);
         Ok(())
     }
 }

@@ -1,9 +1,11 @@
 //! The training run of a residual network in its folder: begun or gone on with, its network written, and what came of it as data. The run itself
 //! is [`Training`]'s.
 
+use crate::critique::digits::significant;
+use crate::critique::prose::listed;
 use crate::error::{Error, Result};
-use crate::flight::DataSet;
 use crate::flight::split::Split;
+use crate::flight::{Channel, DataSet, PerChannel};
 use crate::hybrid::Hybrid;
 use crate::physics::Model;
 use crate::train::{Ended, EpochLoss, Event, Report, Trained, Training};
@@ -11,6 +13,9 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// From this factor on a gate lets everything through, as far as words say.
+const IN_FULL: f64 = 0.995;
 
 /// What tells one set of training data from another, as a number: of a text that does.
 pub fn digest(identity: &str) -> u64 {
@@ -85,16 +90,44 @@ pub struct TrainedNetwork {
     pub curve: Vec<EpochLoss>,
     /// The epoch whose weights these are, from 1: the last one, or the best where that is to be kept.
     pub epoch: usize,
+    /// What share of the network's word is taken, channel by channel, 0 to 1; none if there is no gate.
+    pub gate: Option<PerChannel<f64>>,
+    /// Windows that did not train and made the gate; 0 if there is none.
+    pub gate_windows: usize,
     /// Time that it took, s.
     pub seconds: f64,
+}
+
+impl TrainedNetwork {
+    /// What the gate lets through, as a sentence; none if there is no gate.
+    pub fn gate_in_words(&self) -> Option<String> {
+        let gate = self.gate.as_ref()?;
+        let of = |wanted: &dyn Fn(f64) -> bool| gate.pairs().filter(|(_, factor)| wanted(**factor)).collect::<Vec<_>>();
+        let names = |channels: Vec<(Channel, &f64)>| channels.iter().map(|(channel, _)| channel.to_string()).collect::<Vec<_>>();
+        let (full, shut) = (names(of(&|factor| factor >= IN_FULL)), names(of(&|factor| factor <= 0.0)));
+        let part = of(&|factor| factor > 0.0 && factor < IN_FULL);
+        let mut open: Vec<String> =
+            part.into_iter().map(|(channel, factor)| format!("by {} in {channel}", significant(*factor, 2))).collect();
+        if !full.is_empty() {
+            open.insert(0, format!("fully in {}", listed(&full)));
+        }
+        let on = format!("{} windows that did not train", self.gate_windows);
+        Some(match (open.is_empty(), shut.is_empty()) {
+            (true, _) => format!("the network brought nothing on {on}; physics stands alone"),
+            (_, true) => format!("the network counts {}, fitted on {on}", open.join(", ")),
+            _ => format!(
+                "the network counts {}; in {} it brought nothing on {on}, and physics stands alone",
+                open.join(", "),
+                listed(&shut)
+            ),
+        })
+    }
 }
 
 /// What a run ended in.
 pub struct Run {
     /// Physics and network.
     pub hybrid: Hybrid,
-    /// Windows kept from training for the gate; 0 if there is none.
-    pub gate_windows: usize,
     /// The rest as data.
     pub network: TrainedNetwork,
 }
@@ -143,7 +176,49 @@ pub fn train(training: &Training<'_>, resume: bool, observe: &mut dyn FnMut(Even
         last_epoch_loss: epoch.loss(),
         curve,
         epoch: of_epoch + 1,
+        gate: (gate_windows > 0).then_some(hybrid.description().gate),
+        gate_windows,
         seconds: begun.elapsed().as_secs_f64(),
     };
-    Ok(Run { hybrid, gate_windows, network })
+    Ok(Run { hybrid, network })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gate_is_said_in_words() {
+        let said = |gate: Option<[f64; 6]>| {
+            let of_nothing = TrainedNetwork {
+                network: PathBuf::new(),
+                parameters: 0,
+                windows: 0,
+                steps: 0,
+                training_loss: 0.0,
+                validation_loss: None,
+                validation_windows: 0,
+                last_epoch_loss: None,
+                curve: Vec::new(),
+                epoch: 1,
+                gate: gate.map(PerChannel::new),
+                gate_windows: 90,
+                seconds: 0.0,
+            };
+            of_nothing.gate_in_words().unwrap_or_default()
+        };
+        assert_eq!(said(None), "");
+        assert_eq!(said(Some([0.0; 6])), "the network brought nothing on 90 windows that did not train; physics stands alone");
+        assert_eq!(
+            said(Some([0.743, 0.0, 0.96, 0.0, 1.0, 0.998])),
+            "the network counts fully in wy_dot and wz_dot, by 0.74 in vx_dot, by 0.96 in vz_dot; in vy_dot and wx_dot it brought \
+             nothing on 90 windows that did not train, and physics stands alone"
+        );
+        let all = said(Some([1.0; 6]));
+        assert!(
+            all.starts_with("the network counts fully in vx_dot, vy_dot")
+                && all.ends_with("fitted on 90 windows that did not train"),
+            "{all}"
+        );
+    }
 }

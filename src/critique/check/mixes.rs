@@ -8,6 +8,7 @@ use super::groups::{Of, apart};
 use super::robust::median;
 use super::sticks::{AXES, EXPLAINED, FIRST, Regressions, STICKS, Sticks};
 use super::told::plus;
+use crate::critique::prose::listed;
 use crate::flight::Flight;
 use std::collections::BTreeSet;
 
@@ -115,11 +116,7 @@ fn in_some(such: &[(Pair, Vec<usize>, f64)], flights: &[Flight]) -> Vec<Finding>
 /// All sticks of the pairs.
 fn names(pairs: impl Iterator<Item = Pair>) -> String {
     let all: BTreeSet<usize> = pairs.flatten().collect();
-    let names: Vec<&str> = all.into_iter().map(|stick| STICKS[stick]).collect();
-    match names.as_slice() {
-        [some @ .., last] if !some.is_empty() => format!("{} and {last}", some.join(", ")),
-        names => names.concat(),
-    }
+    listed(&all.into_iter().map(|stick| STICKS[stick]).collect::<Vec<_>>())
 }
 
 fn told(pairs: &[(Pair, f64)]) -> String {

@@ -12,6 +12,7 @@ use super::regression::{BlockRegression, Estimate};
 use super::robust::median;
 use super::throws::Sides;
 use super::unexplained::{Fit, Left};
+use crate::critique::prose::listed;
 use crate::flight::Flight;
 use crate::flight::attitude::cross;
 use std::collections::BTreeSet;
@@ -195,7 +196,7 @@ impl Sticks {
                 (0..4).filter(|&axis| !whole.as_ref().is_some_and(|all| all.is_own(axis))).map(|axis| AXES[axis]).collect();
             let (verdict, message) = match open.as_slice() {
                 [] => (Severity::Ok, "each axis answers to its own stick, alike in all flights".into()),
-                open => (Severity::Undetermined, format!("these flights do not tell which stick moves {}", joined(open))),
+                open => (Severity::Undetermined, format!("these flights do not tell which stick moves {}", listed(open))),
             };
             findings.push(finding("sticks", verdict, message, None));
         }
@@ -396,7 +397,7 @@ fn exchange(order: &[usize; 4]) -> String {
     let moved = || (0..4).filter(|&axis| order[axis] != axis);
     let answers: Vec<String> = moved().map(|axis| format!("{} answers to {}", AXES[axis], STICKS[order[axis]])).collect();
     let sticks: Vec<&str> = moved().map(|axis| STICKS[axis]).collect();
-    format!("{} are exchanged: {}", joined(&sticks), answers.join(", "))
+    format!("{} are exchanged: {}", listed(&sticks), answers.join(", "))
 }
 
 /// What mends it.
@@ -404,13 +405,6 @@ fn swap(order: &[usize; 4]) -> String {
     let moved = (0..4).filter(|&axis| order[axis] != axis);
     let set: Vec<String> = moved.map(|axis| format!("{} = \"{}\"", STICKS[axis], STICKS[order[axis]])).collect();
     format!("[columns] {}, with the file's names", set.join(", "))
-}
-
-fn joined(names: &[&str]) -> String {
-    match names {
-        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        names => names.join(", "),
-    }
 }
 
 #[cfg(test)]

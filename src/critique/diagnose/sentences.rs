@@ -3,6 +3,7 @@
 
 use super::gates::{MOSTLY_UNEXPLAINED, SMALLEST_FALL};
 use super::report::{Bar, Confirmation, Diagnosis, Failure, Kept, Locked, Step, TriedFormula, UnknownChannel, Verdict, Worth};
+use crate::critique::prose::listed;
 use crate::critique::shares::Share;
 use crate::flight::Column;
 
@@ -87,14 +88,6 @@ pub fn names(diagnosis: &Diagnosis) -> String {
     let first: Vec<String> = diagnosis.by_worth().iter().take(NAMED).map(|(step, _)| format!("`{}`", step.effect)).collect();
     let how = if diagnosis.worth.is_empty() { "first" } else { "above all" };
     format!("{} effects, {how} {}", steps.len(), listed(&first))
-}
-
-/// `a, b and c`.
-fn listed(items: &[String]) -> String {
-    match items.split_last() {
-        Some((last, others)) if !others.is_empty() => format!("{} and {last}", others.join(", ")),
-        _ => items.concat(),
-    }
 }
 
 /// What a list of effects is sorted by; `of` says of which flights.

@@ -2,11 +2,12 @@
 
 use super::super::compare::bar_of;
 use super::super::figures::{self, Fall, FallPanel, Kind};
-use super::super::names::{channel_panels, listed, named, said};
+use super::super::names::{channel_panels, named, said};
 use super::super::page::Part;
 use super::DiagnoseReport;
 use crate::critique::diagnose::sentences::{self, Told, change, percent, removable, rises, unseen};
 use crate::critique::diagnose::{Bar, Confirmation, Diagnosis, Step, Verdict};
+use crate::critique::prose::listed;
 use crate::critique::table::{OWN_FROM_FIRST_HALF, ordinal};
 use crate::flight::Channel;
 

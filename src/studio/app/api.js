@@ -70,7 +70,7 @@ import { read } from './place.js';
  * @typedef {{ progress: Job['progress'], says: string, folder: string, name: string, state: number | null, state_did: string | null,
  *   parameters: number | null, windows: [number, number], steps: [number, number], epochs: [number, number], loss: number | null, curve: EpochLoss[],
  *   seconds: number, left_s: number | null, error: string | null,
- *   trained: { epoch: number, training_loss: number, validation_loss: number | null, curve: EpochLoss[] } | null }} Training
+ *   trained: { epoch: number, training_loss: number, validation_loss: number | null, curve: EpochLoss[] } | null, gate: string | null }} Training
  * @typedef {Record<keyof PerChannel, Share | null>} ShareOf
  * @typedef {{ says: string, rmse: [PerChannel, PerChannel], ci95: [Intervals, Intervals], basis: string, shares: { physics: ShareOf, network: ShareOf,
  *   neither: ShareOf, of_network: { linear_history: ShareOf, network_itself: ShareOf } | null } }} Explained

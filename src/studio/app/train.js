@@ -266,7 +266,7 @@ function sizes({ parameters, windows }) {
  * How far it is, in words.
  * @param {import('./api.js').Training} training
  */
-function says({ progress, steps, epochs, loss, seconds, left_s, error, trained, folder }) {
+function says({ progress, steps, epochs, loss, seconds, left_s, error, trained, gate, folder }) {
   const at = `epoch ${Math.min(epochs[0] + 1, epochs[1])} of ${epochs[1]}, step ${steps[0]} of ${steps[1]}`;
   const left = left_s === null ? '' : `, about ${roughly(left_s)} left`;
   if (progress === 'stopping') return 'stopping after this step; it saves where it is';
@@ -275,7 +275,7 @@ function says({ progress, steps, epochs, loss, seconds, left_s, error, trained, 
   if (progress === 'failed') return error ?? '';
   if (!trained) return '';
   const validation = trained.validation_loss === null ? '' : `, validation loss ${number(trained.validation_loss)}`;
-  return `trained in ${roughly(seconds)}: weights of epoch ${trained.epoch} of ${trained.curve.length}, training loss ${number(trained.training_loss)}${validation}`;
+  return `trained in ${roughly(seconds)}: weights of epoch ${trained.epoch} of ${trained.curve.length}, training loss ${number(trained.training_loss)}${validation}${gate === null ? '' : `; ${gate}`}`;
 }
 
 /**

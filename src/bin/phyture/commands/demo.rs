@@ -65,21 +65,13 @@ struct Scale {
 
 impl Scale {
     fn new(quick: bool, seed: u64) -> Self {
-        let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
-        let full = TrainConfig {
-            network: network.clone().into(),
-            epochs: 6,
-            stride: 12,
-            interval_every: 8,
-            seed,
-            ..TrainConfig::default()
-        };
+        let full = TrainConfig { epochs: 6, seed, ..TrainConfig::in_minutes() };
         if !quick {
             return Self { minutes: 20.0, config: full };
         }
         // 20 flights of 30 s: one of each class, so that the locked ones are among them.
-        let network = PhyTureConfig { history: 64, d_model: 16, ..network };
-        Self { minutes: 10.0, config: TrainConfig { network: network.into(), epochs: 6, ..full } }
+        let network = PhyTureConfig { history: 64, d_model: 16, ..PhyTureConfig::default() };
+        Self { minutes: 10.0, config: TrainConfig { network: network.into(), ..full } }
     }
 }
 

@@ -6,7 +6,6 @@ use crate::output::{Progress, warn};
 use crate::pages::Pages;
 use phyture::critique::digits::significant;
 use phyture::critique::wrap::wrapped;
-use phyture::flight::Column;
 use phyture::hybrid::Hybrid;
 use phyture::physics::Model;
 use phyture::report::{TrainingReport, training_page};
@@ -214,11 +213,9 @@ fn say_intervals(context: &Context, hybrid: &Hybrid) {
 }
 
 /// Says what came of it.
-fn say_trained(context: &Context, Run { hybrid, gate_windows, network }: &Run) {
-    if *gate_windows > 0 {
-        let factors = Column::TARGETS.iter().zip(hybrid.description().gate);
-        let shown: Vec<String> = factors.map(|(column, factor)| format!("{} {factor:.2}", column.name())).collect();
-        context.say(format!("gate, from {gate_windows} windows kept from training: {}", shown.join("  ")));
+fn say_trained(context: &Context, Run { hybrid, network }: &Run) {
+    if let Some(gate) = network.gate_in_words() {
+        context.say(wrapped("", &format!("gate: {gate}")));
     }
     say_intervals(context, hybrid);
     let validation = network.validation_loss.map_or("none, no validation part".to_owned(), |loss| format!("{loss:.4}"));
