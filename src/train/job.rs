@@ -21,7 +21,8 @@ pub struct Job {
     pub sequences: Vec<sequence::Sequence>,
     /// Windows that train.
     pub windows: Vec<Window>,
-    /// Windows that did not train, for the gate: the validation part, else blocks of the training part; empty without a gate.
+    /// Windows that did not train, for the gate: the validation part, else blocks of the training part; empty without a gate, and
+    /// of a network that predicts the acceleration itself.
     pub gate_windows: Vec<Window>,
     /// Windows that did not train, for the intervals: the validation part, else blocks of the training part.
     pub interval_windows: Vec<Window>,
@@ -73,7 +74,8 @@ impl Job {
         };
         // The gate is six numbers: what they were fitted on is hardly flattered by them, and serves the intervals as well.
         let interval_windows = if kept.is_empty() { validation.clone() } else { kept };
-        let gate_windows = if config.gate_every > 0 { interval_windows.clone() } else { Vec::new() };
+        let gated = config.gate_every > 0 && config.network.predicts_residual();
+        let gate_windows = if gated { interval_windows.clone() } else { Vec::new() };
         Ok(Self { description, sequences, windows: training, gate_windows, interval_windows, rollout_spans, validation })
     }
 

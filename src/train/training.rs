@@ -151,7 +151,7 @@ impl Training<'_> {
         };
         let State { parameters, curve, best, .. } = trainer.into_state();
         let epoch = best.map_or(curve.len().saturating_sub(1), |best| best.epoch);
-        let gate_windows = if job.description.config.predicts_residual() { job.gate_windows.len() } else { 0 };
+        let gate_windows = job.gate_windows.len();
         let interval_windows = std::mem::take(&mut job.interval_windows);
         let mut hybrid = job.hybrid(flights, parameters, threads)?;
         if with_losses {
