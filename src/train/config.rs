@@ -129,8 +129,7 @@ impl TrainConfig {
     pub const MOST_STRIDE: usize = 1_000_000;
 
     /// What ends in a few minutes on two cores and half an hour of flight at 100 Hz: a history of 128 samples, width 32, 20 epochs, a
-    /// window every 12 samples; a gate, since so many epochs, which a bare baseline
-    /// needs, are too many where physics leaves little to learn.
+    /// window every 12 samples; a gate, since so many epochs, which a bare baseline needs, are too many where physics leaves little to learn.
     pub fn in_minutes() -> Self {
         let network = PhyTureConfig { history: 128, d_model: 32, ..PhyTureConfig::default() };
         let kept = Self { gate_every: 8, interval_every: 8, ..Self::default() };
