@@ -37,8 +37,15 @@ use super::late::Late;
 use super::{Column, Targets, units};
 use crate::error::{Error, Result};
 use crate::formula::Formula;
+use repairs::repairs;
+pub(crate) use repairs::{Between, Longer, Repair};
+use single_logs::of_single_logs;
+pub(crate) use single_logs::{Cut, LateIn, OfLog};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
+
+mod repairs;
+mod single_logs;
 
 /// Components the file's velocity is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,82 +83,6 @@ pub(crate) enum Damaged {
     Refuse,
     /// It is read up to there.
     Stop,
-}
-
-/// A rule for known-bad cells of some columns of the file.
-#[derive(Clone, Debug)]
-pub(crate) struct Repair {
-    pub columns: Vec<String>,
-    /// All must be true of `value`, else the cell is bad. NaN is bad always.
-    pub valid: Vec<Formula>,
-    /// Whether a row that repeats the row before in all these columns is bad: the recorder held it where a packet was lost.
-    pub held: bool,
-    /// Whether a row in which all these columns hold 0 is bad: that is written where nothing was received.
-    pub zero: bool,
-    /// A cell that lies farther than this beyond both its neighbours, on the same side, is bad; in the unit of the file.
-    pub spike: Option<f64>,
-    /// Longest run of bad cells that is bridged, s.
-    pub max_gap_s: f64,
-    /// What a run is bridged by.
-    pub between: Between,
-    /// What is done with a longer one.
-    pub longer: Longer,
-    /// Rows this near a bridged cell are neither fitted nor judged, s.
-    pub set_aside_s: Option<f64>,
-}
-
-/// What bridges a run of bad cells.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Between {
-    /// A straight line between the good cells at its ends.
-    #[default]
-    Line,
-    /// A cubic through them, with the slopes that the next good cells beyond give: for streams that are slow beside what they tell of.
-    Cubic,
-}
-
-impl Between {
-    const NAMES: [(&'static str, Self); 2] = [("line", Self::Line), ("cubic", Self::Cubic)];
-}
-
-/// What is done with a run of bad cells that is too long to be bridged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Longer {
-    /// It is an error in a row that is used.
-    #[default]
-    Error,
-    /// Its rows are left out: what lies before and behind become flights of their own.
-    Cut,
-}
-
-impl Longer {
-    const NAMES: [(&'static str, Self); 2] = [("error", Self::Error), ("cut", Self::Cut)];
-}
-
-/// Streams that come late in some flights.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct LateIn {
-    /// Names of flights, as a person writes them.
-    pub flights: Vec<String>,
-    /// On top of what holds for all, s.
-    pub late: BTreeMap<Column, f64>,
-}
-
-/// Where some flights are cut.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Cut {
-    /// Names of flights, as a person writes them.
-    pub flights: Vec<String>,
-    /// A piece begins with the row at this time of the log or the next one, s.
-    pub at_s: Vec<f64>,
-}
-
-/// What is said of a log alone.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct OfLog<'a> {
-    pub late: Vec<&'a LateIn>,
-    /// Where it is cut, s.
-    pub cut_at_s: Vec<f64>,
 }
 
 /// A parsed `dataset.toml`; the default is the canonical form.
@@ -261,31 +192,6 @@ const OF_CANONICAL_COLUMNS: [&str; 12] = [
     "leave_out",
     "notes",
 ];
-
-/// The rules of single logs.
-fn of_single_logs(keys: &mut Keys) -> Result<(Vec<LateIn>, Vec<Cut>)> {
-    let (mut all_late, mut cuts) = (Vec::new(), Vec::new());
-    for mut rule in keys.sections("late_in")? {
-        let flights = rule.texts("flights")?.unwrap_or_default();
-        let late = rule.times()?;
-        rule.finish()?;
-        if flights.is_empty() || late.is_empty() {
-            let expected = "`flights` and at least one stream, as `controls = 0.01`";
-            return Err(keys.fault("late_in", "an incomplete rule".into(), expected.into()));
-        }
-        all_late.push(LateIn { flights, late });
-    }
-    for mut rule in keys.sections("cut")? {
-        let flights = rule.texts("flights")?.unwrap_or_default();
-        let at_s = rule.numbers("at")?.unwrap_or_default();
-        rule.finish()?;
-        if flights.is_empty() || at_s.is_empty() {
-            return Err(keys.fault("cut", "an incomplete rule".into(), "`flights` and `at`, as `at = [12.5]`".into()));
-        }
-        cuts.push(Cut { flights, at_s });
-    }
-    Ok((all_late, cuts))
-}
 
 impl Schema {
     /// Understands a `dataset.toml`; `place` is named in errors.
@@ -474,30 +380,6 @@ fn manoeuvre(keys: &mut Keys) -> Result<Manoeuvre> {
         }
         Some(other) => Err(keys.fault("manoeuvre", other.to_string(), EXPECTED.into())),
     }
-}
-
-/// `[[repair]]`, each rule.
-fn repairs(keys: &mut Keys, place: &str) -> Result<Vec<Repair>> {
-    let mut repairs = Vec::new();
-    for mut rule in keys.sections("repair")? {
-        let columns = rule.texts("columns")?.unwrap_or_default();
-        let valid = formulas(&rule.texts("valid")?.unwrap_or_default(), &format!("{place}, `repair.valid`"), &["value"])?;
-        let held = rule.flag("held")?.unwrap_or(false);
-        let zero = rule.flag("zero")?.unwrap_or(false);
-        let spike = rule.number("spike", f64::MIN_POSITIVE)?;
-        let max_gap_s = rule.number("max_gap_s", f64::MIN_POSITIVE)?;
-        let (false, Some(max_gap_s)) = (columns.is_empty(), max_gap_s) else {
-            let expected =
-                "`columns` and `max_gap_s`; `valid`, `held`, `zero` or `spike` if NaN is not the only sign of a bad cell";
-            return Err(keys.fault("repair", "an incomplete rule".into(), expected.into()));
-        };
-        let between = rule.choice("between", &Between::NAMES)?.unwrap_or_default();
-        let longer = rule.choice("longer", &Longer::NAMES)?.unwrap_or_default();
-        let set_aside_s = rule.number("set_aside_s", 0.0)?;
-        rule.finish()?;
-        repairs.push(Repair { columns, valid, held, zero, spike, max_gap_s, between, longer, set_aside_s });
-    }
-    Ok(repairs)
 }
 
 /// `missing`, of the columns that may be.

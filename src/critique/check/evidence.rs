@@ -43,10 +43,21 @@ pub(super) const SCALE: &str = "scale_";
 /// What both the state of a vector and its own change say it is scaled by is no error of either relation from so far on: ten times what a sensor is calibrated
 /// to.
 const SCALED: f64 = 0.05;
-type Between = (&'static str, &'static str, &'static str, [&'static str; 3]);
-/// Vectors between two relations: of its state, and of its change.
-const BETWEEN: [(&str, &str, &str, [&str; 3]); 2] =
-    [("velocity", POSITION_RATE, VELOCITY_TARGETS, ["vx", "vy", "vz"]), ("rates", ATTITUDE_RATE, RATE_TARGETS, ["wx", "wy", "wz"])];
+
+/// A vector that stands in two relations.
+struct InTwoRelations {
+    name: &'static str,
+    /// In which it is the change of a state.
+    of_state: &'static str,
+    /// In which it is the state that changes.
+    of_change: &'static str,
+    columns: [&'static str; 3],
+}
+
+const IN_TWO_RELATIONS: [InTwoRelations; 2] = [
+    InTwoRelations { name: "velocity", of_state: POSITION_RATE, of_change: VELOCITY_TARGETS, columns: ["vx", "vy", "vz"] },
+    InTwoRelations { name: "rates", of_state: ATTITUDE_RATE, of_change: RATE_TARGETS, columns: ["wx", "wy", "wz"] },
+];
 
 /// The accumulators of all checks that need no physics of the aircraft, and of the places of gravity.
 pub(super) struct Evidence {
@@ -217,7 +228,7 @@ fn targets_step(findings: Vec<Finding>) -> Vec<Finding> {
 /// A vector whose three columns are all the same factor too large for what they are the change of, and for what is their change: a scale of its own, as that
 /// of counts that were read with the sensitivity of another sensor. Where a unit or another reading is named already, nothing is added.
 fn scaled(findings: Vec<Finding>) -> Vec<Finding> {
-    let of = |(vector, of_state, of_change, columns): Between| {
+    let of = |InTwoRelations { name: vector, of_state, of_change, columns }: InTwoRelations| {
         let gains = |relation: &str| AXES.map(|axis| findings.iter().find(|finding| finding.name == format!("{relation}_{axis}")));
         let own = [gains(of_state), gains(of_change)];
         let off: Vec<f64> = own.iter().flatten().filter_map(|finding| scale(finding.as_ref()?)).collect();
@@ -235,15 +246,18 @@ fn scaled(findings: Vec<Finding>) -> Vec<Finding> {
             Finding { name: format!("{SCALE}{vector}"), ..step(Severity::Fault, mean, message, Some(&set)) }
         })
     };
-    let found: Vec<Finding> = BETWEEN.into_iter().filter_map(of).collect();
+    let found: Vec<Finding> = IN_TWO_RELATIONS.into_iter().filter_map(of).collect();
     found.into_iter().chain(findings.iter().cloned()).collect()
 }
 
 /// Gains that a scale explains say nothing more. Those of single flights stay: they are held against those of others.
 pub(super) fn without_scaled(findings: Vec<Finding>) -> Vec<Finding> {
     let is_scaled = |vector: &str| findings.iter().any(|finding| finding.name == format!("{SCALE}{vector}"));
-    let relations: Vec<&str> =
-        BETWEEN.into_iter().filter(|between| is_scaled(between.0)).flat_map(|between| [between.1, between.2]).collect();
+    let relations: Vec<&str> = IN_TWO_RELATIONS
+        .into_iter()
+        .filter(|vector| is_scaled(vector.name))
+        .flat_map(|vector| [vector.of_state, vector.of_change])
+        .collect();
     let is_gain = |name: &str| relations.iter().any(|relation| name.strip_prefix(relation).is_some_and(|axis| !axis.is_empty()));
     findings.into_iter().filter(|finding| !is_gain(&finding.name)).collect()
 }
