@@ -1,6 +1,7 @@
 //! `dataset.toml`: how logs that are not in the canonical form are to be read. Strict: an unknown key is an error.
 //!
-//! This file parses the description and checks what can be checked without a log; applying it is `assemble`'s. The keys:
+//! This file parses the description and checks what can be checked without a log; applying it is `assemble`'s. The rules for
+//! bad cells and those of single logs are in `repairs` and `single_logs`. The keys:
 //!
 //! | key | meaning |
 //! | --- | --- |

@@ -47,9 +47,9 @@ const SCALED: f64 = 0.05;
 /// A vector that stands in two relations.
 struct InTwoRelations {
     name: &'static str,
-    /// In which it is the change of a state.
+    /// The relation in which it is the change of a state.
     of_state: &'static str,
-    /// In which it is the state that changes.
+    /// The relation in which it is the state that changes.
     of_change: &'static str,
     columns: [&'static str; 3],
 }
