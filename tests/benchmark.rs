@@ -54,6 +54,9 @@ fn killed_ten_times_cut_into_shards_or_left_alone_the_tables_are_the_same_bytes(
         "{said}"
     );
     assert!(said.contains("95 % interval over segments") && said.contains("± 0.02"), "{said}");
+    let page = std::fs::read_to_string(at.join("whole/tables/report.html")).map_err(Error::io("report.html"))?;
+    assert!(said.contains("TimesNet: its periods are chosen for each window by itself"), "{said}");
+    assert!(page.contains("Losses by epoch"), "the losses of training and validation are drawn");
     assert!(said.contains("SCALED DOWN") && said.contains("Conv–Informer") && said.contains("As the paper prints it"), "{said}");
 
     // Moments spread over the length of the work by a fixed rule, from the first file on.
@@ -97,7 +100,12 @@ fn an_estimate_is_printed_and_nothing_is_done() -> Result<()> {
     let place = place()?;
     let said = succeed(place.path(), &planned("none", &["--estimate", "--seeds", "3"]))?;
     assert!(said.contains("runs to do, about") && said.contains("3 x TCN") && said.contains("1 x Ridge regression"), "{said}");
+    assert!(said.contains("are judged\nnote: with fewer than 3000 windows judged") && said.contains("--split stretches"), "{said}");
     assert!(!place.path().join("none").exists());
+    // The paper's plan divides by stretches unasked.
+    let paper = ["benchmark", "flights", "--config", "train.toml", "--table", "1", "--method", "ridge", "--estimate", "-o", "none"];
+    let said = succeed(place.path(), &paper)?;
+    assert!(said.contains("are judged") && !said.contains("--split stretches"), "{said}");
     Ok(())
 }
 

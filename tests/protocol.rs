@@ -7,7 +7,7 @@ use phyture::nn::PhyTureConfig;
 use phyture::physics::Model;
 use phyture::protocol::outcome::Sums;
 use phyture::protocol::{Division, Experiment, METHODS, Outcome, Plan, Run, Settings, TableId, Treatment};
-use phyture::sim::{Level, Simulation, simulate};
+use phyture::sim::{Level, Like, Simulation, simulate};
 use phyture::tape::Threads;
 use phyture::train::TrainConfig;
 use phyture::{Error, Result};
@@ -185,6 +185,21 @@ fn where_stretches_have_a_lead_every_history_is_judged_on_the_same_samples() -> 
     let short = judged(32)?;
     assert!(!short.is_empty());
     assert_eq!(short, judged(1000)?);
+    Ok(())
+}
+
+#[test]
+fn of_two_hours_more_than_3000_windows_of_ten_seconds_are_judged() -> Result<()> {
+    let (flights, mut model) =
+        (simulate(&Simulation { like: Like::Stanford, seed: 63, ..Simulation::baseline() })?.flights, model()?);
+    let plan = Plan { settings: Settings::paper(), ..plan(&flights, &model)? };
+    let run = run("phyture", Treatment::Plain);
+    let mut judged = |split: Protocol| {
+        model.data.split = split;
+        Ok::<_, Error>(Experiment::new(&plan, &flights, &model, Threads(2), "").extent(&run)?.test)
+    };
+    let (stretches, segments) = (judged(Protocol::Stretches)?, judged(Protocol::Segments)?);
+    assert!(stretches >= 3000 && segments < 1000, "{stretches} of stretches, {segments} where segments happen to join");
     Ok(())
 }
 

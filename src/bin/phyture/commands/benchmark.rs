@@ -82,8 +82,8 @@ pub struct Args {
     /// day and a half), an hour's for table 1, or one that only shows that it works
     #[arg(long, value_enum, default_value_t = Plans::Paper)]
     pub plan: Plans,
-    /// How flights are divided where none is locked: `segments`, `stretches` or `first SHARE` [default: the model file's; stretches in the plan
-    /// `question`]
+    /// How flights are divided where none is locked: `segments`, `stretches` or `first SHARE` [default: stretches in the plans `paper` and
+    /// `question`, else the model file's]
     #[arg(long)]
     pub split: Option<Protocol>,
     /// The explainable part of simulated flights, as `simulate --explainable` writes it: adds the row of the floor
@@ -134,6 +134,13 @@ pub enum Plans {
     Quick,
 }
 
+impl Plans {
+    /// How a plan divides the flights unless asked otherwise. Of a segment of ten seconds a history of ten seconds leaves nothing to judge.
+    fn split(self) -> Option<Protocol> {
+        matches!(self, Self::Paper | Self::Question).then_some(Protocol::Stretches)
+    }
+}
+
 /// What `--json` writes after runs.
 #[derive(Serialize)]
 struct Output<'a> {
@@ -163,8 +170,7 @@ pub fn run(context: &Context, wanted: &Args) -> Result<ExitCode> {
 fn make(context: &Context, data: &Data, output: &Path, wanted: &Args) -> Result<ExitCode> {
     let begun = Instant::now();
     let (settings, mut model) = (settings(context, wanted)?, context.model(wanted.model.as_deref(), data)?);
-    let of_plan = (wanted.plan == Plans::Question).then_some(Protocol::Stretches);
-    model.data.split = wanted.split.clone().or(of_plan).unwrap_or(model.data.split);
+    model.data.split = wanted.split.clone().or(wanted.plan.split()).unwrap_or(model.data.split);
     let set = context.flights(data, settings.phyture()?.history)?;
     let explainable = wanted.explainable.as_deref().map(|folder| explainable::read_set(data, folder)).transpose()?;
     let plan = plan(&set, explainable.as_ref(), data, settings, &model, wanted)?;
@@ -232,10 +238,16 @@ fn settings(context: &Context, wanted: &Args) -> Result<Settings> {
 fn estimate_only(context: &Context, plan: &Plan, set: &DataSet, model: &Model) -> Result<ExitCode> {
     let runs = plan.runs()?;
     let experiment = Experiment::new(plan, &set.flights, model, context.threads(), "");
-    let costs = costs(&experiment, &runs)?;
+    let work = Work::of(&experiment, &runs)?;
     context.say(format!("\n{}", plan.settings.budget(plan.step_s)));
-    announce(context, &runs, &costs);
-    context.json(&json!({ "plan": plan, "runs": runs.len(), "estimated_seconds": costs.iter().sum::<f64>() }))?;
+    announce(context, &model.data.split, &runs, &work);
+    let judged = |least: fn(usize, usize) -> usize| work.extents.iter().map(|(.., extent)| extent.test).reduce(least);
+    context.json(&json!({
+        "plan": plan,
+        "runs": runs.len(),
+        "estimated_seconds": work.costs.iter().sum::<f64>(),
+        "judged_windows": [judged(usize::min), judged(usize::max)],
+    }))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -304,9 +316,10 @@ struct Queue<'a> {
 impl Queue<'_> {
     fn work(&self, interrupted: &AtomicBool) -> Result<()> {
         let plan = self.experiment.plan;
-        let costs = costs(self.experiment, self.left)?;
+        let work = Work::of(self.experiment, self.left)?;
+        announce(self.context, &self.experiment.model.data.split, self.left, &work);
+        let Work { costs, .. } = work;
         let total: f64 = costs.iter().sum();
-        announce(self.context, self.left, &costs);
         // In milliseconds of the estimate.
         let mut progress = Progress::new("benchmark", (1e3 * total) as u64, 0);
         let mut behind = 0.0;
@@ -367,13 +380,30 @@ impl Queue<'_> {
     }
 }
 
-/// What is to be done, by method, with the time that it will take.
-fn announce(context: &Context, left: &[Run], costs: &[f64]) {
+/// Windows that a test part should have: at the plans' tenth of a second from one to the next, five minutes of flight.
+const FEW_JUDGED: usize = 3000;
+
+/// What is to be done, on how many windows, and by method the time that it will take.
+fn announce(context: &Context, split: &Protocol, left: &[Run], Work { costs, extents }: &Work) {
     if left.is_empty() {
         context.say("nothing left to do");
         return;
     }
     context.say(format!("{} runs to do, about {} on this machine", left.len(), duration(costs.iter().sum())));
+    let counted = |of: fn(&Extent) -> usize| {
+        let counts = extents.iter().map(|(.., extent)| of(extent));
+        match (counts.clone().min(), counts.max()) {
+            (Some(least), Some(most)) if least < most => format!("{least} to {most}"),
+            (least, _) => least.unwrap_or(0).to_string(),
+        }
+    };
+    let counts = [counted(|extent| extent.training), counted(|extent| extent.validation), counted(|extent| extent.test)];
+    context.say(format!("windows: {} train, {} validate, {} are judged", counts[0], counts[1], counts[2]));
+    if extents.iter().any(|(.., extent)| extent.test < FEW_JUDGED) {
+        let hint = if *split == Protocol::Segments { "; --split stretches judges more where the history is long" } else { "" };
+        context
+            .say(format!("note: with fewer than {FEW_JUDGED} windows judged, methods that are close cannot be told apart{hint}"));
+    }
     let mut methods: Vec<(&str, Vec<f64>)> = Vec::new();
     for (run, cost) in left.iter().zip(costs) {
         match methods.iter_mut().find(|(id, _)| *id == run.method) {
@@ -387,28 +417,37 @@ fn announce(context: &Context, left: &[Run], costs: &[f64]) {
     }
 }
 
-/// Seconds that each run will take, about.
-fn costs(experiment: &Experiment<'_>, left: &[Run]) -> Result<Vec<f64>> {
-    let plan = experiment.plan;
-    let mut window_s: BTreeMap<String, f64> = BTreeMap::new();
-    let mut extents: Vec<(Division, Treatment, Extent)> = Vec::new();
-    let mut costs = Vec::new();
-    for run in left {
-        if let (Some(config), None) = (plan.training(run)?, window_s.get(&run.method)) {
-            window_s.insert(run.method.clone(), estimate::window_s(&config, experiment.threads)?);
-        }
-        let known = extents.iter().find(|(division, treatment, _)| (*division, *treatment) == (run.division, run.treatment));
-        let extent = match known {
-            Some((.., extent)) => *extent,
-            None => {
-                let extent = experiment.extent(run)?;
-                extents.push((run.division, run.treatment, extent));
-                extent
+/// What there is to do.
+struct Work {
+    /// Seconds that each run will take, about.
+    costs: Vec<f64>,
+    /// Windows of each part that runs train and are judged on.
+    extents: Vec<(Division, Treatment, Extent)>,
+}
+
+impl Work {
+    fn of(experiment: &Experiment<'_>, left: &[Run]) -> Result<Self> {
+        let plan = experiment.plan;
+        let mut window_s: BTreeMap<String, f64> = BTreeMap::new();
+        let mut extents: Vec<(Division, Treatment, Extent)> = Vec::new();
+        let mut costs = Vec::new();
+        for run in left {
+            if let (Some(config), None) = (plan.training(run)?, window_s.get(&run.method)) {
+                window_s.insert(run.method.clone(), estimate::window_s(&config, experiment.threads)?);
             }
-        };
-        costs.push(estimate::run_s(plan, run, window_s.get(&run.method).copied().unwrap_or(0.0), extent)?);
+            let known = extents.iter().find(|(division, treatment, _)| (*division, *treatment) == (run.division, run.treatment));
+            let extent = match known {
+                Some((.., extent)) => *extent,
+                None => {
+                    let extent = experiment.extent(run)?;
+                    extents.push((run.division, run.treatment, extent));
+                    extent
+                }
+            };
+            costs.push(estimate::run_s(plan, run, window_s.get(&run.method).copied().unwrap_or(0.0), extent)?);
+        }
+        Ok(Self { costs, extents })
     }
-    Ok(costs)
 }
 
 fn duration(seconds: f64) -> String {
