@@ -78,7 +78,7 @@ pub struct Args {
     /// Seeds of each network, at most 1000 [default: the plan's]
     #[arg(long, allow_negative_numbers = true, value_parser = count(1..=Settings::MOST_SEEDS))]
     pub seeds: Option<usize>,
-    /// Budget: the paper's (on two cores some twelve days for table 1 alone, months for all), `question` (a history of 1.28 s trained to the end, a
+    /// Budget: the paper's (on two cores some fifteen days for table 1 alone, months for all), `question` (a history of 1.28 s trained to the end, a
     /// day and a half), an hour's for table 1, or one that only shows that it works
     #[arg(long, value_enum, default_value_t = Plans::Paper)]
     pub plan: Plans,
