@@ -88,6 +88,7 @@ kernels! {
         conv1d_backward_weight_sequences: conv1d::BackwardWeightSequences,
         gemm_product: gemm::Product,
         gemm_transposed_product: gemm::TransposedProduct,
+        conv1d_general_pack: conv1d_general::Pack,
         conv1d_general_forward: conv1d_general::Forward,
         conv1d_general_backward_input: conv1d_general::BackwardInput,
         conv1d_general_backward_weight: conv1d_general::BackwardWeight,

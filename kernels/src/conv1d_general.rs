@@ -18,10 +18,17 @@
 
 use crate::activation::{self, Activation};
 use crate::conv1d::Epilogue;
+pub use crate::conv1d::Weight;
 use crate::dropout::Mask;
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, LeftRows, Sink, Store};
 use crate::{Real, Rows, RowsMut, Write};
+
+mod packing;
+
+pub(crate) use packing::Pack;
+use packing::panels;
+pub use packing::{pack, pack_adjoint, packed_len};
 
 /// What lies beyond the ends of x.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -89,20 +96,30 @@ impl Geometry {
     pub fn source(self, t: usize, tap: usize, n: usize) -> Option<usize> {
         self.row((t * self.stride + tap * self.dilation).cast_signed() - self.left, n)
     }
+
+    /// Row s = `remainder` of x is read by tap j as that of row `reader(s, j)/stride` of y, if the division leaves nothing.
+    #[inline(always)]
+    const fn reader(self, remainder: usize, tap: usize) -> isize {
+        remainder.cast_signed() + self.left - (tap * self.dilation).cast_signed()
+    }
+
+    /// The taps that read rows `remainder + q·stride` of x.
+    #[inline(always)]
+    fn reading(self, remainder: usize) -> impl Iterator<Item = usize> + Clone {
+        (0..self.taps).filter(move |j| self.reader(remainder, *j).rem_euclid(self.stride.cast_signed()) == 0)
+    }
 }
 
 /// Scratch, in numbers, that any function of this file needs.
 pub fn scratch_len(geometry: Geometry, inputs: usize, outputs: usize) -> usize {
-    let taps = geometry.taps;
-    let forward = tile::panels_len(taps * inputs, outputs) + inputs;
-    let input = tile::panels_len(taps * outputs, inputs) + outputs;
-    forward.max(input).max(taps * inputs * outputs)
+    let forward = packed_len(geometry, inputs, outputs) + inputs;
+    let input = packed_len(geometry, outputs, inputs) + outputs;
+    forward.max(input).max(geometry.taps * inputs * outputs)
 }
 
-fn check<T>(geometry: Geometry, x: (usize, usize), weight: &[T], y: (usize, usize)) {
-    assert!(geometry.is_sound(x.0) || y.0 == 0, "conv1d_general: {geometry:?} on {} rows", x.0);
-    assert_eq!(y.0, geometry.rows, "conv1d_general: rows of y");
-    assert_eq!(weight.len(), geometry.taps * x.1 * y.1, "conv1d_general: length of the weight");
+fn check(geometry: Geometry, n: usize, rows: usize) {
+    assert!(geometry.is_sound(n) || rows == 0, "conv1d_general: {geometry:?} on {n} rows");
+    assert_eq!(rows, geometry.rows, "conv1d_general: rows of y");
 }
 
 /// y = dropout(f(conv(x) + b)).
@@ -113,47 +130,38 @@ pub fn forward<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
     x: Rows<'_, T>,
-    (weight, bias): (&[T], Option<&[T]>),
+    (weight, bias): (Weight<'_, T>, Option<&[T]>),
     epilogue: Epilogue,
     y: RowsMut<'_, T>,
     scratch: &mut [T],
 ) {
-    check(geometry, (x.rows(), x.cols()), weight, (y.rows(), y.cols()));
+    check(geometry, x.rows(), y.rows());
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d_general: length of the bias");
-    T::conv1d_general_forward(isa, Forward { geometry, x, weight, bias, epilogue, y, scratch });
+    let (zeros, scratch) = scratch.split_at_mut(x.cols());
+    zeros.fill(T::ZERO);
+    let packed = panels(isa, geometry, (x.cols(), y.cols()), (weight, false), scratch);
+    T::conv1d_general_forward(isa, Forward { left: Sources { geometry, x, zeros }, packed, bias, epilogue, y });
 }
 
 pub(crate) struct Forward<'a, T> {
-    geometry: Geometry,
-    x: Rows<'a, T>,
-    weight: &'a [T],
+    left: Sources<'a, T>,
+    packed: &'a [T],
     bias: Option<&'a [T]>,
     epilogue: Epilogue,
     y: RowsMut<'a, T>,
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for Forward<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let (taps, inputs, outputs) = (self.geometry.taps, self.x.cols(), self.y.cols());
-        if self.y.rows() == 0 {
+        let Self { left, packed, bias, epilogue, y } = self;
+        let outputs = y.cols();
+        if y.rows() == 0 {
             return;
         }
-        let (zeros, rest) = self.scratch.split_at_mut(inputs);
-        zeros.fill(T::ZERO);
-        let panels = &mut rest[..taps * inputs * outputs.next_multiple_of(NR)];
-        if !panels.is_empty() {
-            for j in 0..taps {
-                let row = |o: usize| &self.weight[o * inputs * taps + j..(o + 1) * inputs * taps];
-                let panels = &mut panels[j * inputs * NR..];
-                tile::pack_transposed::<T, NR>(inputs, outputs, taps, row, taps * inputs * NR, panels);
-            }
-        }
-        let left = Sources { geometry: self.geometry, x: self.x, zeros };
-        let scale = T::of(self.epilogue.dropout.map_or(1.0, Mask::scale));
-        let mut sink = Finish { y: self.y, bias: self.bias, epilogue: self.epilogue, scale };
-        tile::rows::<T, I, _, _, MR, NR>(&left, outputs, panels, &mut sink);
+        let panels = &packed[..left.geometry.taps * left.x.cols() * outputs.next_multiple_of(NR)];
+        let scale = T::of(epilogue.dropout.map_or(1.0, Mask::scale));
+        tile::rows::<T, I, _, _, MR, NR>(&left, outputs, panels, &mut Finish { y, bias, epilogue, scale });
     }
 }
 
@@ -221,49 +229,44 @@ pub fn backward_input<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
     dz: Rows<'_, T>,
-    weight: &[T],
+    weight: Weight<'_, T>,
     dx: RowsMut<'_, T>,
     write: Write,
     scratch: &mut [T],
 ) {
-    check(geometry, (dx.rows(), dx.cols()), weight, (dz.rows(), dz.cols()));
-    T::conv1d_general_backward_input(isa, BackwardInput { geometry, dz, weight, dx, write, scratch });
+    check(geometry, dx.rows(), dz.rows());
+    let (zeros, scratch) = scratch.split_at_mut(dz.cols());
+    zeros.fill(T::ZERO);
+    let packed = panels(isa, geometry, (dx.cols(), dz.cols()), (weight, true), scratch);
+    T::conv1d_general_backward_input(isa, BackwardInput { geometry, dz, zeros, packed, dx, write });
 }
 
 pub(crate) struct BackwardInput<'a, T> {
     geometry: Geometry,
     dz: Rows<'a, T>,
-    weight: &'a [T],
+    zeros: &'a [T],
+    packed: &'a [T],
     dx: RowsMut<'a, T>,
     write: Write,
-    scratch: &'a mut [T],
 }
 
 impl<T: Real> Tiled<T> for BackwardInput<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(mut self) {
-        let Geometry { taps, stride, dilation, left, .. } = self.geometry;
-        let (n, inputs, outputs) = (self.dx.rows(), self.dx.cols(), self.dz.cols());
-        let (zeros, rest) = self.scratch.split_at_mut(outputs);
-        zeros.fill(T::ZERO);
-        for remainder in 0..stride.min(n) {
-            // Row remainder + q·stride reads row q + at/stride of dz by the taps for which the division leaves nothing.
-            let at = |j: usize| remainder.cast_signed() + left - (j * dilation).cast_signed();
-            let whole = |j: &usize| at(*j).rem_euclid(stride.cast_signed()) == 0;
-            let count = (0..taps).filter(whole).count();
-            let first = (0..taps).find(whole).map_or(0, |j| at(j) / stride.cast_signed());
-            let next = (0..taps).filter(whole).nth(1).map_or(0, |j| at(j) / stride.cast_signed());
-            let rows = (n - remainder).div_ceil(stride);
-            let reversed = Reversed { dz: self.dz, zeros, taps: count, first, step: first - next, rows, ends: self.geometry.ends };
-            let panels = &mut rest[..count * outputs * inputs.next_multiple_of(NR)];
-            if !panels.is_empty() {
-                for (place, j) in (0..taps).filter(whole).enumerate() {
-                    let row = |c: usize| &self.weight[c * taps + j..];
-                    let panels = &mut panels[place * outputs * NR..];
-                    tile::pack_transposed::<T, NR>(outputs, inputs, inputs * taps, row, count * outputs * NR, panels);
-                }
-            }
-            let mut sink = Store { c: self.dx.reborrow().every(remainder, stride), bias: None, write: self.write };
+        let Self { geometry, dz, zeros, .. } = self;
+        let (n, inputs, outputs) = (self.dx.rows(), self.dx.cols(), dz.cols());
+        let mut packed = self.packed;
+        for remainder in 0..geometry.stride.min(n) {
+            // Row remainder + q·stride reads row q + reader/stride of dz.
+            let mut reading = geometry.reading(remainder);
+            let taps = reading.clone().count();
+            let mut row = || reading.next().map_or(0, |j| geometry.reader(remainder, j) / geometry.stride.cast_signed());
+            let (first, next) = (row(), row());
+            let rows = (n - remainder).div_ceil(geometry.stride);
+            let reversed = Reversed { dz, zeros, taps, first, step: first - next, rows, ends: geometry.ends };
+            let (panels, rest) = packed.split_at(taps * outputs * inputs.next_multiple_of(NR));
+            packed = rest;
+            let mut sink = Store { c: self.dx.reborrow().every(remainder, geometry.stride), bias: None, write: self.write };
             tile::rows::<T, I, _, _, MR, NR>(&reversed, inputs, panels, &mut sink);
         }
     }
@@ -305,24 +308,29 @@ impl<T> LeftRows<T> for Reversed<'_, T> {
     }
 }
 
-/// dW {=, +=} `Σ_t dz[t, o]·x[t·stride + j·dilation − left, c]`.
+/// dW {=, +=} `Σ_t dz[t, o]·x[t·stride + j·dilation − left, c]`, of one sequence or summed over several of the same shape.
 ///
 /// # Panics
 /// If shapes disagree.
 pub fn backward_weight<T: Real>(
     isa: InstructionSet,
     geometry: Geometry,
-    x: Rows<'_, T>,
-    dz: Rows<'_, T>,
+    sequences: &[(Rows<'_, T>, Rows<'_, T>)],
     dweight: &mut [T],
     write: Write,
     scratch: &mut [T],
 ) {
-    check(geometry, (x.rows(), x.cols()), dweight, (dz.rows(), dz.cols()));
+    let (inputs, outputs) = sequences.first().map_or((0, 0), |(x, dz)| (x.cols(), dz.cols()));
+    let taps = geometry.taps;
+    assert_eq!(dweight.len(), taps * inputs * outputs, "conv1d_general: length of the weight's gradient");
     let gradient = &mut scratch[..dweight.len()];
     gradient.fill(T::ZERO);
-    T::conv1d_general_backward_weight(isa, BackwardWeight { geometry, x, dz, gradient });
-    let (taps, inputs, outputs) = (geometry.taps, x.cols(), dz.cols());
+    for &(x, dz) in sequences {
+        check(geometry, x.rows(), dz.rows());
+        assert_eq!((x.cols(), dz.cols()), (inputs, outputs), "conv1d_general: channels of the sequences");
+        T::conv1d_general_backward_weight(isa, BackwardWeight { geometry, x, dz, gradient });
+    }
+    // To the order of the weight once, whatever the number of sequences.
     for (o, target) in dweight.chunks_exact_mut((inputs * taps).max(1)).enumerate() {
         for (c, target) in target.chunks_exact_mut(taps).enumerate() {
             let source = gradient.iter().skip(c * outputs + o).step_by(inputs * outputs);
@@ -338,7 +346,7 @@ pub(crate) struct BackwardWeight<'a, T> {
     geometry: Geometry,
     x: Rows<'a, T>,
     dz: Rows<'a, T>,
-    /// `[taps, in, out]`, zeros.
+    /// `[taps, in, out]`, added to.
     gradient: &'a mut [T],
 }
 
@@ -414,16 +422,52 @@ mod tests {
         for isa in InstructionSet::available() {
             let mut scratch = vec![T::NAN; scratch_len(geometry, inputs, outputs)];
             let mut y = Matrix::<T>::poisoned(seed, (geometry.rows, outputs));
-            forward(isa, geometry, x.view(), (&weight, Some(&bias)), Epilogue::NONE, y.view_mut(), &mut scratch);
+            forward(isa, geometry, x.view(), (Weight::Plain(&weight), Some(&bias)), Epilogue::NONE, y.view_mut(), &mut scratch);
             y.check_gaps();
             assert_near(&format!("forward at {isa}"), &y.to_vec(), &z.to_vec(), Tolerance::Close);
             check_writes(&format!("dx at {isa}"), &dx, Tolerance::Close, |dx, write| {
-                backward_input(isa, geometry, dz.view(), &weight, dx, write, &mut scratch);
+                backward_input(isa, geometry, dz.view(), Weight::Plain(&weight), dx, write, &mut scratch);
             });
             check_writes(&format!("dW at {isa}"), &dw, Tolerance::Close, |mut dw, write| {
-                backward_weight(isa, geometry, x.view(), dz.view(), dw.row_mut(0), write, &mut scratch);
+                backward_weight(isa, geometry, &[(x.view(), dz.view())], dw.row_mut(0), write, &mut scratch);
             });
+            check_packed(isa, p, (&x, &weight, &bias, &dz), &y, &mut scratch);
         }
+    }
+
+    /// A weight that is packed beforehand gives the same bits, and two sequences give the sum of their gradients.
+    fn check_packed<T: Real>(
+        isa: InstructionSet,
+        p: Problem,
+        (x, weight, bias, dz): (&Matrix<T>, &[T], &[T], &Matrix<T>),
+        y: &Matrix<T>,
+        scratch: &mut [T],
+    ) {
+        let Problem { geometry, n, inputs, outputs, seed } = p;
+        let mut packed = vec![T::NAN; packed_len(geometry, inputs, outputs)];
+        pack(isa, geometry, (inputs, outputs), weight, &mut packed);
+        let mut again = Matrix::<T>::poisoned(seed, (geometry.rows, outputs));
+        let weights = (Weight::Packed(&packed[..]), Some(bias));
+        forward(isa, geometry, x.view(), weights, Epilogue::NONE, again.view_mut(), scratch);
+        assert_near("forward, packed", &again.to_vec(), &y.to_vec(), Tolerance::Exact);
+
+        let mut packed = vec![T::NAN; packed_len(geometry, outputs, inputs)];
+        pack_adjoint(isa, geometry, (inputs, outputs), weight, &mut packed);
+        let [plain, packed] = [Weight::Plain(weight), Weight::Packed(&packed)].map(|weight| {
+            let mut dx = Matrix::<T>::poisoned(seed, (n, inputs));
+            backward_input(isa, geometry, dz.view(), weight, dx.view_mut(), Write::Set, scratch);
+            dx.to_vec()
+        });
+        assert_near("dx, packed", &packed, &plain, Tolerance::Exact);
+
+        let (other, other_dz) =
+            (Matrix::<T>::random(seed + 4, (n, inputs)), Matrix::<T>::random(seed + 5, (geometry.rows, outputs)));
+        let pairs = [(x.view(), dz.view()), (other.view(), other_dz.view())];
+        let [mut both, mut one_by_one] = [(); 2].map(|()| vec![T::NAN; weight.len()]);
+        backward_weight(isa, geometry, &pairs, &mut both, Write::Set, scratch);
+        backward_weight(isa, geometry, &pairs[..1], &mut one_by_one, Write::Set, scratch);
+        backward_weight(isa, geometry, &pairs[1..], &mut one_by_one, Write::Add, scratch);
+        assert_near("dW of two sequences", &both, &one_by_one, Tolerance::Close);
     }
 
     proptest! {
@@ -450,8 +494,8 @@ mod tests {
                 for isa in InstructionSet::available() {
                     let mut scratch = vec![f32::NAN; scratch_len(geometry, channels, 3).max(conv1d::scratch_len(same, channels, 3))];
                     let [mut y, mut expected] = [(); 2].map(|()| Matrix::<f32>::poisoned(seed, (rows, 3)));
-                    forward(isa, geometry, x.view(), (&weight, None), epilogue, y.view_mut(), &mut scratch);
-                    conv1d::forward(isa, same, x.view(), (conv1d::Weight::Plain(&turned), None), epilogue, expected.view_mut(), &mut scratch);
+                    forward(isa, geometry, x.view(), (Weight::Plain(&weight), None), epilogue, y.view_mut(), &mut scratch);
+                    conv1d::forward(isa, same, x.view(), (Weight::Plain(&turned), None), epilogue, expected.view_mut(), &mut scratch);
                     assert_near("conv1d and conv1d_general", &y.to_vec(), &expected.to_vec(), Tolerance::Exact);
                 }
             }

@@ -7,13 +7,16 @@
 //! | [`abt`] | a·bᵀ | `[m, k]` | `[n, k]` |
 //!
 //! c is `[m, n]` and is overwritten or added to; an empty k gives zeros. The summed index is taken in blocks whose panel of b
-//! stays in the first-level cache; a is read where it lies (tile.rs). A result of a few rows is computed from b where it lies, for
-//! packing would cost more than the product; and the tile is tall or wide as suits the result. Written for the sizes of this project:
+//! stays in the first-level cache; a is read where it lies (tile.rs). A result of a few rows has its own way (few_rows.rs); and the tile is tall or
+//! wide as suits the result. Written for the sizes of this project:
 //! n from 6 to a few hundred, k up to a few thousand, any m.
 
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::tile::{self, Store};
-use crate::{Real, Rows, RowsMut, Write, row_reductions};
+use crate::{Real, Rows, RowsMut, Write};
+use few_rows::FEW;
+
+mod few_rows;
 
 /// Longest block of the summed index: a panel of 16 numbers a line is 16 KiB in f32 (8 numbers in f64), half the first-level cache.
 pub const LONGEST_BLOCK: usize = 256;
@@ -78,46 +81,13 @@ pub(crate) struct Product<'a, T> {
     scratch: &'a mut [T],
 }
 
-/// Results of fewer rows than this are not worth packing for.
-const FEW: usize = 4;
-
 impl<T: Real> Tiled<T> for Product<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        if self.c.rows() < FEW {
-            self.few_rows::<I>();
+        if self.c.rows() <= FEW {
+            self.few_rows::<I, NR>();
         } else {
             tile::run_for::<T, I, MR, NR>(self.c.cols(), ByTiles(self));
-        }
-    }
-}
-
-impl<T: Real> Product<'_, T> {
-    /// Each row of c from the rows of b: sums of them, or inner products with them.
-    #[inline(always)]
-    fn few_rows<I: Isa>(mut self) {
-        for i in 0..self.c.rows() {
-            let (a, c) = (self.a.row(i), self.c.row_mut(i));
-            match (self.write, self.bias) {
-                (Write::Set, None) => c.fill(T::ZERO),
-                (Write::Set, Some(bias)) => c.copy_from_slice(bias),
-                (Write::Add, None) => {}
-                (Write::Add, Some(bias)) => c.iter_mut().zip(bias).for_each(|(c, bias)| *c += *bias),
-            }
-            match &self.b {
-                Right::Plain(b) => {
-                    for (p, a) in a.iter().enumerate() {
-                        for (c, b) in c.iter_mut().zip(b.row(p)) {
-                            *c = I::mul_add(*a, *b, *c);
-                        }
-                    }
-                }
-                Right::Transposed(b) => {
-                    for (j, c) in c.iter_mut().enumerate() {
-                        *c += row_reductions::dot::<T, I>(a, b.row(j));
-                    }
-                }
-            }
         }
     }
 }
@@ -152,6 +122,10 @@ impl<T: Real> Tiled<T> for ByTiles<'_, T> {
     }
 }
 
+/// Rows of a result that lie far apart are written in blocks of so many, several panels wide: a panel at a time would touch as many places in
+/// memory as there are rows, and only two lines of the cache at each.
+const FAR_ROWS: usize = 24;
+
 pub(crate) struct TransposedProduct<'a, T> {
     a: Rows<'a, T>,
     b: Rows<'a, T>,
@@ -172,23 +146,47 @@ struct TransposedByTiles<'a, T>(TransposedProduct<'a, T>);
 impl<T: Real> Tiled<T> for TransposedByTiles<'_, T> {
     #[inline(always)]
     fn run<I: Isa, const MR: usize, const NR: usize>(self) {
-        let TransposedProduct { a, b, mut c, write } = self.0;
-        if a.rows() == 0 && write == Write::Set {
+        let mut product = self.0;
+        let TransposedProduct { a, c, write, .. } = &mut product;
+        if a.rows() == 0 && *write == Write::Set {
             (0..c.rows()).for_each(|i| c.row_mut(i).fill(T::ZERO));
         }
-        let n = b.cols();
-        let mut panel = [[T::ZERO; NR]; tile::COLUMN_DEPTH];
+        if c.stride() * size_of::<T>() < FAR_BYTES {
+            product.by_panels::<I, MR, NR, { tile::COLUMN_DEPTH }>(usize::MAX);
+        } else {
+            product.by_panels::<I, MR, NR, { 2 * tile::COLUMN_DEPTH }>(FAR_ROWS);
+        }
+    }
+}
+
+impl<T: Real> TransposedProduct<'_, T> {
+    /// As many panels at a time as have LINES lines, and for them `height` rows of c, the last time what is left, too.
+    #[inline(always)]
+    fn by_panels<I: Isa, const MR: usize, const NR: usize, const LINES: usize>(self, height: usize) {
+        let TransposedProduct { a, b, mut c, write } = self;
+        let mut panels = [[T::ZERO; NR]; LINES];
         for start in (0..a.rows()).step_by(tile::COLUMN_DEPTH) {
-            let end = a.rows().min(start + tile::COLUMN_DEPTH);
+            let depth = tile::COLUMN_DEPTH.min(a.rows() - start);
             let write = if start == 0 { write } else { Write::Add };
+            let (a, b) = (a.range(start, start + depth), b.range(start, start + depth));
             if a.stride() * size_of::<T>() >= FAR_BYTES {
-                a.range(start, end).touch();
+                a.touch();
             }
-            for j in (0..n).step_by(NR) {
-                let panel = &mut panel[..end - start];
-                tile::pack_panel(&b.range(start, end), j, panel);
-                let (a, mut sink) = (a.range(start, end), Store { c: c.reborrow(), bias: None, write });
-                tile::columns::<T, I, _, MR, NR>((|p| a.row(p), a.cols()), panel, (j, NR.min(n - j)), &mut sink);
+            let together = if height < usize::MAX { LINES / depth } else { 1 };
+            for first in (0..b.cols()).step_by(together * NR) {
+                let columns = (first..b.cols()).step_by(NR).take(together);
+                for (panel, j) in panels.chunks_exact_mut(depth).zip(columns.clone()) {
+                    tile::pack_panel(&b, j, panel);
+                }
+                let blocks = (c.rows() / height).max(1);
+                for top in (0..blocks).map(|block| block * height) {
+                    let bottom = if c.rows() - top < 2 * height.min(c.rows()) { c.rows() } else { top + height };
+                    for (panel, j) in panels.chunks_exact(depth).zip(columns.clone()) {
+                        let mut sink = Store { c: c.reborrow().range(top, bottom), bias: None, write };
+                        let left = |p| &a.row(p)[top..bottom];
+                        tile::columns::<T, I, _, MR, NR>((left, bottom - top), panel, (j, NR.min(b.cols() - j)), &mut sink);
+                    }
+                }
             }
         }
     }
@@ -245,6 +243,9 @@ mod tests {
             (64, 513, 16),
             (241, 256, 257),
             (3, 9, 35),
+            (4, 300, 1100),
+            (128, 32, 1100),
+            (30, 200, 600),
         ] {
             check::<f32>(m, k, n, 3);
             check::<f64>(m, k, n, 3);

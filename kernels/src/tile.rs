@@ -88,7 +88,7 @@ pub(crate) type Pair<T, I> = [<I as Isa>::Vector<T>; 2];
 
 /// Whether rows of NR numbers take two registers.
 #[inline(always)]
-fn is_pair<T: Real, I: Isa, const NR: usize>() -> bool {
+pub(crate) fn is_pair<T: Real, I: Isa, const NR: usize>() -> bool {
     let lanes = I::Vector::<T>::LANES;
     assert!(NR == lanes || NR == 2 * lanes, "a panel is one or two registers wide");
     NR > lanes
@@ -235,7 +235,7 @@ macro_rules! store_rows {
 
 /// The accumulators in memory, where variables may index them, for the tiles at the edges.
 #[inline(always)]
-fn spill<T: Real, I: Isa, const MR: usize, const NR: usize>(acc: [Pair<T, I>; MR]) -> [[T; NR]; MR] {
+pub(crate) fn spill<T: Real, I: Isa, const MR: usize, const NR: usize>(acc: [Pair<T, I>; MR]) -> [[T; NR]; MR] {
     let mut rows = [[T::ZERO; NR]; MR];
     // A loop, not a closure: a closure that is not inlined would be compiled without the level's instructions.
     for (row, pair) in rows.iter_mut().zip(acc) {

@@ -15,13 +15,13 @@ pub const fn packed_len(geometry: Geometry, inputs: usize, outputs: usize) -> us
     }
 }
 
-/// A weight `[taps, in, out]`, as it is or as packed once for many calls.
+/// A weight in the layout of its convolution, `[taps, in, out]` or `[out, in, taps]`, as it is or as packed once for many calls.
 #[derive(Clone, Copy, Debug)]
 pub enum Weight<'a, T> {
     /// Packed by the call, in its scratch.
     Plain(&'a [T]),
-    /// By [`pack`] for [`forward`](super::forward), by [`pack_transposed`] for [`backward_input`](super::backward_input), at the same
-    /// level.
+    /// At the same level, for the pass that it is given to: by [`pack`] for [`forward`](super::forward), by [`pack_transposed`] for
+    /// [`backward_input`](super::backward_input), or by their like of [`conv1d_general`](crate::conv1d_general).
     Packed(&'a [T]),
 }
 

@@ -17,7 +17,7 @@ use phyture_kernels::random::Stream;
 use phyture_kernels::{Real, Rows, RowsMut, Write};
 
 /// The operand after the weight.
-const BIAS: usize = WEIGHT + 1;
+pub(super) const BIAS: usize = WEIGHT + 1;
 
 /// What follows the convolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ pub struct Conv1d {
 }
 
 /// The weight as it was packed once a step, or as it is.
-fn weight<'a, T>(plain: &'a [T], packed: &'a [T]) -> Weight<'a, T> {
+pub(super) fn weight<'a, T>(plain: &'a [T], packed: &'a [T]) -> Weight<'a, T> {
     if packed.is_empty() { Weight::Plain(plain) } else { Weight::Packed(packed) }
 }
 

@@ -4,17 +4,20 @@
 //! x [n, in], W [out, in, k] as PyTorch stores it, b [out] or absent, y [rows, out]. The backward pass reads x, W, and y instead of z;
 //! a dropout mask is drawn again.
 
+use super::conv1d::{BIAS, weight};
 use super::{rows, rows_mut};
 use crate::tape::Shape;
 use crate::tape::error::Result;
-use crate::tape::op::{Backward, Differentiable, Forward, Memory, Op, Reads, misfit};
+use crate::tape::op::{
+    Backward, Differentiable, Forward, MICRO_BATCH, Memory, MicroBatched, Op, Pack, Pass, Reads, WEIGHT, misfit,
+};
 use phyture_kernels::activation::Activation;
 use phyture_kernels::conv1d::{self, Epilogue};
 pub use phyture_kernels::conv1d_general::Ends;
 use phyture_kernels::conv1d_general::{self, Geometry};
 use phyture_kernels::dropout::Mask;
 use phyture_kernels::random::Stream;
-use phyture_kernels::{Real, Rows, RowsMut};
+use phyture_kernels::{InstructionSet, Real, Rows, RowsMut, Write};
 
 /// Which rows are computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +91,31 @@ impl GeneralConv1d {
     fn is_bare(&self) -> bool {
         self.activation == Activation::Identity && self.dropout <= 0.0
     }
+
+    fn forward_one<T: Real>(&self, io: &mut Forward<'_, T>) {
+        let ([x, _, bias @ ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
+        let y = RowsMut::packed(io.y, sizes.geometry.rows, sizes.outputs);
+        let bias = (!bias.is_empty()).then_some(io.x[BIAS]);
+        let weight = weight(io.x[WEIGHT], io.packed);
+        conv1d_general::forward(io.isa, sizes.geometry, rows(io.x[0], x), (weight, bias), self.epilogue(io.stream), y, io.scratch);
+    }
+
+    /// dz of one sample: dy itself where nothing follows the sums, else in `to`.
+    fn backward_epilogue<'a, T: Real>(
+        &self,
+        (geometry, outputs): (Geometry, usize),
+        (isa, stream): (InstructionSet, Option<Stream>),
+        (y, dy): (&[T], &'a [T]),
+        to: &'a mut [T],
+    ) -> Rows<'a, T> {
+        let dy = Rows::packed(dy, geometry.rows, outputs);
+        if self.is_bare() {
+            return dy;
+        }
+        let y = Rows::packed(y, geometry.rows, outputs);
+        conv1d::backward_epilogue(isa, self.epilogue(stream), y, dy, RowsMut::packed(&mut *to, geometry.rows, outputs));
+        Rows::packed(to, geometry.rows, outputs)
+    }
 }
 
 impl<T: Real> Op<T> for GeneralConv1d {
@@ -114,19 +142,33 @@ impl<T: Real> Op<T> for GeneralConv1d {
     fn memory(&self, operands: &[Shape]) -> Memory {
         let Some(Sizes { geometry, inputs, outputs }) = self.sizes(operands) else { return Memory::default() };
         let scratch = conv1d_general::scratch_len(geometry, inputs, outputs);
-        // Gradient of z in front.
-        Memory { forward_scratch: scratch, backward_scratch: geometry.rows * outputs + scratch, ..Memory::default() }
+        Memory {
+            workspace: 0,
+            forward_scratch: scratch,
+            // Gradient of z in front.
+            backward_scratch: geometry.rows * outputs + scratch,
+            forward_packed: conv1d_general::packed_len(geometry, inputs, outputs),
+            backward_packed: conv1d_general::packed_len(geometry, outputs, inputs),
+        }
     }
 
-    fn forward(&self, io: Forward<'_, T>) {
-        let ([x, _, bias @ ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
-        let y = RowsMut::packed(io.y, sizes.geometry.rows, sizes.outputs);
-        let bias = (!bias.is_empty()).then_some(io.x[2]);
-        let epilogue = self.epilogue(io.stream);
-        conv1d_general::forward(io.isa, sizes.geometry, rows(io.x[0], x), (io.x[1], bias), epilogue, y, io.scratch);
+    fn pack(&self, io: Pack<'_, T>) {
+        let Some(Sizes { geometry, inputs, outputs }) = self.sizes(io.shapes) else { return };
+        match io.pass {
+            Pass::Forward => conv1d_general::pack(io.isa, geometry, (inputs, outputs), io.weight, io.packed),
+            Pass::Backward => conv1d_general::pack_adjoint(io.isa, geometry, (inputs, outputs), io.weight, io.packed),
+        }
+    }
+
+    fn forward(&self, mut io: Forward<'_, T>) {
+        self.forward_one(&mut io);
     }
 
     fn differentiable(&self) -> Option<&dyn Differentiable<T>> {
+        Some(self)
+    }
+
+    fn micro_batched(&self, _operands: &[Shape]) -> Option<&dyn MicroBatched<T>> {
         Some(self)
     }
 }
@@ -138,28 +180,43 @@ impl<T: Real> Differentiable<T> for GeneralConv1d {
     }
 
     fn backward(&self, io: Backward<'_, T>) {
-        let ([x, ..], Some(sizes)) = (io.shapes, self.sizes(io.shapes)) else { return };
-        let Sizes { geometry, outputs, .. } = sizes;
-        let (dz, scratch) = io.scratch.split_at_mut(geometry.rows * outputs);
-        let dy = Rows::packed(io.dy, geometry.rows, outputs);
-        let dz = if self.is_bare() {
-            dy
-        } else {
-            let y = Rows::packed(io.y, geometry.rows, outputs);
-            let to = RowsMut::packed(&mut *dz, geometry.rows, outputs);
-            conv1d::backward_epilogue(io.isa, self.epilogue(io.stream), y, dy, to);
-            Rows::packed(dz, geometry.rows, outputs)
-        };
-        let [dx, dweight, dbias, ..] = io.dx;
-        if let Some(dx) = dx {
-            conv1d_general::backward_input(io.isa, geometry, dz, io.x[1], rows_mut(dx.values, x), dx.write, scratch);
+        self.backward_micro_batch(&mut [io]);
+    }
+}
+
+impl<T: Real> MicroBatched<T> for GeneralConv1d {
+    fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]) {
+        micro_batch.iter_mut().for_each(|io| self.forward_one(io));
+    }
+
+    fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]) {
+        let count = micro_batch.len();
+        let Some(first) = micro_batch.first_mut() else { return };
+        let ([x, ..], Some(sizes), isa) = (first.shapes, self.sizes(first.shapes), first.isa) else { return };
+        let Sizes { geometry, inputs, outputs } = sizes;
+        let (dweight, dbias) = (first.dx[WEIGHT].take(), first.dx[BIAS].take());
+        // Each has dz in its own scratch; the products work in that of the first.
+        let (own, scratch) = std::mem::take(&mut first.scratch).split_at_mut(geometry.rows * outputs);
+        first.scratch = own;
+        let mut pairs = [(Rows::packed(&[], 0, inputs), Rows::packed(&[], 0, outputs)); MICRO_BATCH];
+        for (pair, io) in pairs.iter_mut().zip(micro_batch) {
+            let dz = &mut io.scratch[..geometry.rows * outputs];
+            let dz = self.backward_epilogue((geometry, outputs), (isa, io.stream), (io.y, io.dy), dz);
+            *pair = (rows(io.x[0], x), dz);
+            if let Some(dx) = &mut io.dx[0] {
+                let weight = weight(io.x[WEIGHT], io.packed);
+                conv1d_general::backward_input(isa, geometry, dz, weight, rows_mut(dx.values, x), dx.write, scratch);
+            }
         }
+        let pairs = &pairs[..count];
         if let Some(dweight) = dweight {
-            let (to, write) = (dweight.values, dweight.write);
-            conv1d_general::backward_weight(io.isa, geometry, rows(io.x[0], x), dz, to, write, scratch);
+            conv1d_general::backward_weight(isa, geometry, pairs, dweight.values, dweight.write, scratch);
         }
         if let Some(dbias) = dbias {
-            conv1d::backward_bias(io.isa, dz, dbias.values, dbias.write);
+            for (index, (_, dz)) in pairs.iter().enumerate() {
+                let write = if index == 0 { dbias.write } else { Write::Add };
+                conv1d::backward_bias(isa, *dz, dbias.values, write);
+            }
         }
     }
 }

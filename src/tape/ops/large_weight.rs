@@ -3,14 +3,15 @@
 //! x [inputs, channels], W [outputs, inputs], b [outputs] or absent, y [outputs, channels].
 //!
 //! Samples are laid side by side, `[.., samples·channels]`, so that each product is one: a micro-batch of them for y and dx, and for dW as
-//! many as a kernel sums over at once. Beside a large W these copies are small.
+//! many as a kernel sums over at once. Samples of one channel are laid below each other, `[samples, ..]`, for they are rows already. Beside a large
+//! W these copies are small.
 
 use crate::tape::Shape;
 use crate::tape::op::{
     Backward, Differentiable, Forward, LARGE_WEIGHT, LargeWeight, MICRO_BATCH, MicroBatched, WEIGHT, WeightGradient,
 };
 use phyture_kernels::instruction_set::InstructionSet;
-use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, strided, temporal};
+use phyture_kernels::{Real, Rows, RowsMut, Write, gemm, linear, strided, temporal};
 
 /// The operand after the weight.
 const BIAS: usize = WEIGHT + 1;
@@ -94,13 +95,13 @@ pub(super) fn large_weight<'a, T: Real, O: Product + Differentiable<T>>(
 impl<T: Real, O: Product + Differentiable<T>> MicroBatched<T> for O {
     fn forward_micro_batch(&self, micro_batch: &mut [Forward<'_, T>]) {
         if let Some(sizes) = micro_batch.first().and_then(|io| self.sizes(io.shapes)) {
-            forward(micro_batch, sizes);
+            if sizes.channels == 1 { forward_rows(micro_batch, sizes) } else { forward(micro_batch, sizes) }
         }
     }
 
     fn backward_micro_batch(&self, micro_batch: &mut [Backward<'_, T>]) {
         if let Some(sizes) = micro_batch.first().and_then(|io| self.sizes(io.shapes)) {
-            backward(micro_batch, sizes);
+            if sizes.channels == 1 { backward_rows(micro_batch, sizes) } else { backward(micro_batch, sizes) }
         }
     }
 }
@@ -123,6 +124,50 @@ fn join<'a, T: Real>(isa: InstructionSet, sizes: Sizes, values: impl Iterator<It
     for (index, values) in values.enumerate() {
         let x = Rows::packed(values, rows, sizes.channels);
         strided::copy(isa, x, sizes.sample(index, all.reborrow()), Write::Set);
+    }
+}
+
+/// Copies samples of one channel below each other.
+fn stack<'a, T: Real>(values: impl Iterator<Item = &'a [T]>, all: &mut [T], length: usize) {
+    all.chunks_exact_mut(length).zip(values).for_each(|(row, values)| row.copy_from_slice(values));
+}
+
+/// y of every sample of one channel: the rows of x·Wᵀ + b.
+fn forward_rows<T: Real>(samples: &mut [Forward<'_, T>], sizes: Sizes) {
+    let (count, Sizes { inputs, outputs, .. }) = (samples.len(), sizes);
+    let Some(first) = samples.first_mut() else { return };
+    let (isa, [_, weight, bias, ..], scratch) = (first.isa, first.x, std::mem::take(&mut first.scratch));
+    let (x, rest) = scratch.split_at_mut(count * inputs);
+    let (y, scratch) = rest.split_at_mut(count * outputs);
+    stack(samples.iter().map(|io| io.x[0]), x, inputs);
+    let bias = (!bias.is_empty()).then_some(bias);
+    linear::forward(isa, Rows::packed(x, count, inputs), weight, bias, RowsMut::packed(y, count, outputs), scratch);
+    samples.iter_mut().zip(y.chunks_exact(outputs)).for_each(|(io, y)| io.y.copy_from_slice(y));
+}
+
+/// Gradients of x of every sample of one channel, the rows of dy·W; and that of b.
+fn backward_rows<T: Real>(samples: &mut [Backward<'_, T>], sizes: Sizes) {
+    let (count, Sizes { inputs, outputs, .. }) = (samples.len(), sizes);
+    let Some(first) = samples.first_mut() else { return };
+    let (isa, weight, scratch) = (first.isa, first.x[WEIGHT], std::mem::take(&mut first.scratch));
+    let dbias = first.dx[BIAS].take();
+    let (dx, rest) = scratch.split_at_mut(count * inputs);
+    let (dy, scratch) = rest.split_at_mut(count * outputs);
+    stack(samples.iter().map(|io| io.dy), dy, outputs);
+    let dy = Rows::packed(dy, count, outputs);
+    if let Some(dbias) = dbias {
+        linear::backward_bias(isa, dy, dbias.values, dbias.write);
+    }
+    // All samples ask for the gradient of x, or none does.
+    if samples.iter().all(|io| io.dx[0].is_none()) {
+        return;
+    }
+    linear::backward_input(isa, dy, weight, RowsMut::packed(dx, count, inputs), Write::Set, scratch);
+    for (gradient, dx) in samples.iter_mut().map(|io| io.dx[0].as_mut()).zip(dx.chunks_exact(inputs)) {
+        if let Some(gradient) = gradient {
+            let to = RowsMut::packed(&mut *gradient.values, 1, inputs);
+            strided::copy(isa, Rows::packed(dx, 1, inputs), to, gradient.write);
+        }
     }
 }
 
