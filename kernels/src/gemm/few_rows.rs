@@ -51,8 +51,8 @@ fn sums_of_rows<T: Real, I: Isa, const R: usize, const NR: usize>(a: [&[T]; R], 
         let width = NR.min(n - j);
         let mut acc = [[I::Vector::splat(T::ZERO); 2]; R];
         let mut last = [T::ZERO; NR];
-        for p in 0..b.rows() {
-            let columns = &b.row(p)[j..];
+        for (p, row) in (0..b.rows()).map(|p| b.row(p)).enumerate() {
+            let columns = &row[j..];
             let line = match columns.first_chunk::<NR>() {
                 Some(line) => line,
                 None => {
@@ -123,7 +123,8 @@ fn total<T: Real, const NR: usize>(mut numbers: [T; NR]) -> T {
     let mut half = NR / 2;
     while half > 0 {
         for i in 0..half {
-            numbers[i] = numbers[i] + numbers[i + half];
+            let upper = numbers[i + half];
+            numbers[i] += upper;
         }
         half /= 2;
     }
