@@ -179,8 +179,9 @@ impl<T: Real> TransposedProduct<'_, T> {
                     tile::pack_panel(&b, j, panel);
                 }
                 let blocks = (c.rows() / height).max(1);
-                for top in (0..blocks).map(|block| block * height) {
-                    let bottom = if c.rows() - top < 2 * height.min(c.rows()) { c.rows() } else { top + height };
+                for block in 0..blocks {
+                    let top = block * height;
+                    let bottom = if block + 1 == blocks { c.rows() } else { top + height };
                     for (panel, j) in panels.chunks_exact(depth).zip(columns.clone()) {
                         let mut sink = Store { c: c.reborrow().range(top, bottom), bias: None, write };
                         let left = |p| &a.row(p)[top..bottom];
@@ -246,6 +247,8 @@ mod tests {
             (4, 300, 1100),
             (128, 32, 1100),
             (30, 200, 600),
+            (0, 5, 40),
+            (0, 5, 600),
         ] {
             check::<f32>(m, k, n, 3);
             check::<f64>(m, k, n, 3);
