@@ -27,7 +27,6 @@ use crate::{Real, Rows, RowsMut, Write};
 mod packing;
 
 pub(crate) use packing::Pack;
-use packing::panels;
 pub use packing::{pack, pack_adjoint, packed_len};
 
 /// What lies beyond the ends of x.
@@ -139,7 +138,10 @@ pub fn forward<T: Real>(
     assert!(bias.is_none_or(|bias| bias.len() == y.cols()), "conv1d_general: length of the bias");
     let (zeros, scratch) = scratch.split_at_mut(x.cols());
     zeros.fill(T::ZERO);
-    let packed = panels(isa, geometry, (x.cols(), y.cols()), (weight, false), scratch);
+    let sizes = (x.cols(), y.cols());
+    let (packed, _) = weight.panels(packed_len(geometry, sizes.0, sizes.1), scratch, |weight, packed| {
+        pack(isa, geometry, sizes, weight, packed);
+    });
     T::conv1d_general_forward(isa, Forward { left: Sources { geometry, x, zeros }, packed, bias, epilogue, y });
 }
 
@@ -237,7 +239,10 @@ pub fn backward_input<T: Real>(
     check(geometry, dx.rows(), dz.rows());
     let (zeros, scratch) = scratch.split_at_mut(dz.cols());
     zeros.fill(T::ZERO);
-    let packed = panels(isa, geometry, (dx.cols(), dz.cols()), (weight, true), scratch);
+    let sizes = (dx.cols(), dz.cols());
+    let (packed, _) = weight.panels(packed_len(geometry, sizes.1, sizes.0), scratch, |weight, packed| {
+        pack_adjoint(isa, geometry, sizes, weight, packed);
+    });
     T::conv1d_general_backward_input(isa, BackwardInput { geometry, dz, zeros, packed, dx, write });
 }
 

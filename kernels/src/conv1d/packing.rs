@@ -25,6 +25,19 @@ pub enum Weight<'a, T> {
     Packed(&'a [T]),
 }
 
+impl<'a, T> Weight<'a, T> {
+    /// The packed weight, by `pack` into the first `len` numbers of the scratch where it is not yet; and the rest of the scratch.
+    pub(crate) fn panels(self, len: usize, scratch: &'a mut [T], pack: impl FnOnce(&[T], &mut [T])) -> (&'a [T], &'a mut [T]) {
+        let weight = match self {
+            Self::Packed(packed) => return (packed, scratch),
+            Self::Plain(weight) => weight,
+        };
+        let (packed, rest) = scratch.split_at_mut(len);
+        pack(weight, packed);
+        (packed, rest)
+    }
+}
+
 /// Packs a weight for [`forward`](super::forward).
 ///
 /// # Panics
@@ -58,15 +71,11 @@ pub(super) fn panels<'a, T: Real>(
     (weight, transposed): (Weight<'a, T>, bool),
     scratch: &'a mut [T],
 ) -> (&'a [T], &'a mut [T]) {
-    let weight = match weight {
-        Weight::Packed(packed) => return (packed, scratch),
-        Weight::Plain(weight) => weight,
-    };
     let (reads, writes) = if transposed { (outputs, inputs) } else { (inputs, outputs) };
-    let (packed, rest) = scratch.split_at_mut(packed_len(geometry, reads, writes));
     let pack = if transposed { pack_transposed } else { pack };
-    pack(isa, geometry, (inputs, outputs), weight, packed);
-    (packed, rest)
+    weight.panels(packed_len(geometry, reads, writes), scratch, |weight, packed| {
+        pack(isa, geometry, (inputs, outputs), weight, packed);
+    })
 }
 
 pub(crate) struct Pack<'a, T> {

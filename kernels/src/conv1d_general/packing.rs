@@ -3,7 +3,6 @@
 //! Not here: any arithmetic.
 
 use super::Geometry;
-use crate::conv1d::Weight;
 use crate::instruction_set::{InstructionSet, Isa, Tiled};
 use crate::{Real, tile};
 
@@ -34,25 +33,6 @@ pub fn pack_adjoint<T: Real>(
 ) {
     assert_eq!(weight.len(), geometry.taps * inputs * outputs, "conv1d_general: length of the weight");
     T::conv1d_general_pack(isa, Pack { geometry, inputs, outputs, weight, packed, adjoint: true });
-}
-
-/// The weight packed for [`forward`](super::forward), or for [`backward_input`](super::backward_input) if `adjoint`, in the scratch where it is not yet.
-pub(super) fn panels<'a, T: Real>(
-    isa: InstructionSet,
-    geometry: Geometry,
-    (inputs, outputs): (usize, usize),
-    (weight, adjoint): (Weight<'a, T>, bool),
-    scratch: &'a mut [T],
-) -> &'a [T] {
-    let weight = match weight {
-        Weight::Packed(packed) => return packed,
-        Weight::Plain(weight) => weight,
-    };
-    let (reads, writes) = if adjoint { (outputs, inputs) } else { (inputs, outputs) };
-    let packed = &mut scratch[..packed_len(geometry, reads, writes)];
-    let pack = if adjoint { pack_adjoint } else { pack };
-    pack(isa, geometry, (inputs, outputs), weight, packed);
-    packed
 }
 
 pub(crate) struct Pack<'a, T> {
